@@ -19,10 +19,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the sou
 
 import numpy as np
 
-from demos.pictures.layer import plot_cut_off, plot_parameters
+from demos.pictures.layer import plot_cut_off, plot_parameters, plot_particle
 from vi_contact import boundary_layer
 from vi_contact.cli import status_of
-from vi_contact.plots.studies import plot_particle
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 STIFFNESSES = (0.5, 1.0, 2.0, 5.0, 10.0)  # k [N/m]

@@ -21,10 +21,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the sou
 import numpy as np
 
 import vi_contact as vc
-from demos.pictures.beam import plot_regularisation, plot_rubbing
+from demos.pictures.beam import plot_beam_energies, plot_regularisation, plot_rubbing, plot_shapes, plot_tips
 from vi_contact import beam
 from vi_contact.cli import status_of
-from vi_contact.plots.studies import plot_beam_energies, plot_shapes, plot_tips
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 VISCOSITIES = (0.001, 2.0)  # a2 of the source [s]: almost elastic, strongly damped

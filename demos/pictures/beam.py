@@ -1,4 +1,4 @@
-"""Draw what the demo of the beam shows beside its command: contact at the tip, and the limit of the regularisation."""
+"""Draw rod and beam as Figs. 8.1 to 8.9 of Ahn (2012), contact at the tip, and the limit of the regularisation."""
 
 from __future__ import annotations
 
@@ -8,8 +8,61 @@ from typing import Any
 
 import numpy as np
 
+from vi_contact.beam import BeamRun
 from vi_contact.core.algebra import Array
 from vi_contact.plots.histories import History, canvas, panels, save
+
+_QUANTITIES = ("(A) rotation [-]", "(B) angular speed [1/s]", "(C) displacement [m]", "(D) velocity [m/s]")
+
+
+def plot_beam_energies(runs: Mapping[str, BeamRun], path: str | Path, *, title: str) -> Path:
+    """Draw energies of several runs over time, above; losses by friction, below (Fig. 8.1). Dashed: no losses."""
+    figure, (top, bottom) = panels(2, (9.0, 7.0), height_ratios=(3, 2))
+    for label, run in runs.items():
+        (line,) = top.plot(run.history["t"], run.energy, lw=1.1, label=label)
+        bottom.plot(run.history["t"], run.history["loss_friction"], lw=1.1, color=line.get_color(), label=label)
+    start = max(run.energy[0] for run in runs.values())
+    top.axhline(start, color="tab:red", ls="--", lw=1.0, label="no viscosity, no friction")
+    top.set(ylabel="energy [J]", ylim=(0.0, 1.15 * start), title=title)
+    bottom.set(ylabel="lost to friction [J]")
+    top.legend(fontsize=8, loc="center right")
+    return save(figure, path)
+
+
+def plot_tips(runs: Mapping[str, BeamRun], path: str | Path, *, title: str) -> Path:
+    """Draw the displacement of the tip against time, a panel per run (Figs. 8.2, 8.3)."""
+    figure, axes = panels(len(runs), (9.0, 2.4 * len(runs) + 1.0))
+    for axis, (label, run) in zip(axes, runs.items(), strict=True):
+        axis.plot(run.history["t"], run.history["u_tip"], color="black", lw=1.1)
+        axis.set_ylabel("tip [m]")
+        axis.set_title(label, fontsize=9, loc="left")
+    return save(figure, path, title)
+
+
+def plot_shapes(
+    run: BeamRun, path: str | Path, *, span: tuple[float, float], title: str, count: int = 7, near: float = 0.2
+) -> Path:
+    """Draw rotation, angular speed, displacement and velocity along the beam at ``count`` times of a span [s] (Figs.
+    8.4 to 8.9): the last part ``near`` of the beam above, the whole below. The run needs snapshots in the span."""
+    from matplotlib import colormaps
+
+    figure, axes = canvas(2, 4, (13.0, 6.5))
+    inside = [snapshot for snapshot in run.snapshots if span[0] - 1e-9 <= snapshot.t <= span[1] + 1e-9]
+    chosen = np.unique(np.rint(np.linspace(0, len(inside) - 1, count)).astype(int))
+    colours = colormaps["viridis"](np.linspace(0.0, 0.92, len(chosen)))
+    close = run.x >= (1.0 - near) * run.x[-1]
+    for row, label in enumerate(_QUANTITIES):
+        for index, colour in zip(chosen, colours, strict=True):
+            snapshot = inside[index]
+            name = f"t = {snapshot.t:.3g} s"
+            axes[0, row].plot(run.x[close], snapshot.values[row][close], color=colour, lw=1.0)
+            axes[1, row].plot(run.x, snapshot.values[row], color=colour, lw=1.0, label=name)
+        axes[0, row].set_title(label, fontsize=10)
+        axes[1, row].set_xlabel("x [m]")
+    axes[0, 0].set_ylabel("near the tip")
+    axes[1, 0].set_ylabel("whole beam")
+    axes[0, 3].legend(*axes[1, 3].get_legend_handles_labels(), bbox_to_anchor=(1.02, 1.0), loc="upper left", fontsize=8)
+    return save(figure, path, title)
 
 
 def plot_rubbing(history: History, path: str | Path, *, mu: float, gap: float, title: str) -> Path:

@@ -1,4 +1,4 @@
-"""Draw what the demos of the boundary layer show: parameters, cut-offs, bounces of a body, thin layers."""
+"""Draw what the demos of the boundary layer show: impacts, parameters, cut-offs, bounces of a body, thin layers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,24 @@ from vi_contact.boundary_layer.particle import ParticleImpact
 from vi_contact.boundary_layer.trajectory import Trajectory
 from vi_contact.core.algebra import Array
 from vi_contact.plots.histories import canvas, save
-from vi_contact.plots.studies import COLOURS
+
+COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple")
+
+
+def plot_particle(impacts: Mapping[str, Sequence[tuple[str, ParticleImpact]]], path: str | Path) -> Path:
+    """Draw Fig. 1: distance and velocity against t/t_f, a row of panels for each group; group -> (label, impact)."""
+    figure, axes = canvas(len(impacts), 2, (10.0, 3.3 * len(impacts) + 0.3))
+    for (place, speed), (title, group) in zip(axes, impacts.items(), strict=True):
+        for (label, impact), colour in zip(group, COLOURS, strict=False):
+            part = np.linspace(0.0, 1.0, 301)
+            x, v = impact.position(part * impact.duration), impact.velocity(part * impact.duration)
+            place.plot(part, x / impact.layer.a, color=colour, lw=1.2, label=label)
+            speed.plot(part, v / impact.speed, color=colour, lw=1.2, label=label)
+        place.set(xlabel="t / t_f [-]", ylabel="x / a [-]", title=title)
+        speed.set(xlabel="t / t_f [-]", ylabel="velocity / V [-]", title=title)
+        speed.axhline(0.0, color="0.5", lw=0.8)
+        place.legend(fontsize=8)
+    return save(figure, path)
 
 
 def plot_parameters(values: Sequence[float], dampers: Sequence[float], path: str | Path) -> Path:

@@ -189,7 +189,7 @@ def test_petsc_options_are_told_from_ours():
     assert split_petsc(["run", "--out", "x"]) == (["run", "--out", "x"], [])
 
 
-@pytest.mark.parametrize("old", ["wall", "channel --size 0.25", "beam --t-end 0.5 --exact", "layer --k 1 2"])
+@pytest.mark.parametrize("old", ["wall", "channel --size 0.25"])
 def test_old_commands_name_the_new_ones(old, capsys):
     """One sentence, and where their options went; nothing is computed."""
     assert main(old.split()) == 1
@@ -201,23 +201,18 @@ def test_old_commands_name_the_new_ones(old, capsys):
 def test_cases_are_listed(capsys):
     assert main(["cases"]) == 0
     *lines, folder = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines] == ["beam", "channel", "layer", "wall"]
+    assert [line.split()[0] for line in lines] == ["channel", "wall"]
     assert (Path(folder.removeprefix("the files: ")) / "wall.toml").is_file()
 
 
-@pytest.mark.slow
-def test_the_beam_needs_no_finite_elements(tmp_path):
-    """Nor do the layer and their reports: what they import is numpy, scipy and matplotlib."""
-    blocked = "import sys\nfor name in ('dolfinx', 'petsc4py', 'mpi4py', 'gmsh'): sys.modules[name] = None\n"
-    commands = [
-        [*command, str(tmp_path / words[1])]
-        for words in (["run", "beam", "--set", "beam.t_end=0.02", "--set", "beam.elements=4"], ["run", "layer"])
-        for command in ([*words, "--out"], ["report"])
-    ]
-    code = f"{blocked}from vi_contact.cli import main\nraise SystemExit(max(map(main, {commands!r})))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False)
-    assert (done.returncode, done.stderr) == (0, ""), done.stderr
-    assert (tmp_path / "beam" / "tip.png").is_file() and (tmp_path / "layer" / "particle.png").is_file()
+@pytest.mark.parametrize("words", ["beam --t-end 0.5 --exact", "run layer", "run {file}", "report {folder}"])
+def test_retired_cases_name_their_demo(words, tmp_path, capsys):
+    """As a command of before, as a case, in a case file and in the folder of a run of before."""
+    (tmp_path / "case.toml").write_text("[layer]\nk = [1.0]\n")
+    assert main(words.format(file=tmp_path / "case.toml", folder=tmp_path).split()) == 1
+    said, demo = capsys.readouterr().err, "timoshenko_beam" if "beam" in words else "particle_layer"
+    assert f"is retired: bash demos/run.sh {demo} computes" in said and said.count("\n") == 1
+    assert (ROOT / "demos" / f"{demo}.py").is_file()
 
 
 def test_a_library_that_is_missing_is_named():

@@ -76,17 +76,6 @@ WRONG: dict[str, dict[str, list[str]]] = {  # command -> option -> values; an op
         "--part": ["0/1", "5/2", "x", "1"], "--launch": ["'"], "--motions": ["FILE FILE", "FILE,FILE", ",", ""],
         "--levels": ["1"], "--set": ["x"],
     },
-    "run beam --set beam.elements=4 --set beam.t_end=0.01 --out beam": {
-        **{f"--set beam.{key}=": SET for key in ("length", "rho", "E", "dt", "eps")},
-        "--set beam.elements=": ["0", "-1", "x", "1000000000", "1" * 5000], "--set beam.t_end=": [*SET, "1e300"],
-        "--set beam.mu=": ["nan", "-1", "inf"], "--set": ["beam.reading=Z", "beam.force=-1", "x.y=1", "beam=3"],
-        "--dt": POSITIVE, "--steps": ["3"], "--motion": ["FILE"], "--scheme": ["Newmark"], "--out": ["", "FILE"],
-    },
-    "run layer": {
-        **{f"--set layer.{key}=": SET for key in ("mass", "width", "k", "c")}, "--set layer.speed=": [*SET, "1e300"],
-        "--set layer.restitution=": ["2", "-1", "nan"], "--set": ["layer.metric=foo", "layer.k=[-1]", "layer.c=[nan]"],
-        "--dt": ["1"], "--scale": ["2"], "--out": ["FILE", ""], "": ["--cross-check", "--restart"],
-    },
     "run wall": STEP | {"--set model.case=": ["foo", "3"], "--set model.size=": [*SET, "1e-9"],
                         "--set model.divisions=": ["[0,1]", "[1.5,1]", "[1000000,1000000]"]},
     "run channel": STEP | {

@@ -27,7 +27,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
         "boundary_layer.trajectory",
     "boundary_layer/test_contact_law.py": "boundary_layer.layer boundary_layer.scheme",
     "cli/test_fuzz_cli.py": "cli.errors",
-    "cli/test_entry.py": "cli.options studies.cases.library studies.cases.own_case",
+    "cli/test_entry.py": "cli.options studies.cases.library",
     "cli/test_motion.py": "plots.records",
     "core/test_contact_last.py": "core.compiled",
     "core/test_friction_certificate.py": "core.certificate core.protocols",
@@ -60,8 +60,6 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "ground_motion/test_synthetic.py": "ground_motion.ec8 ground_motion.kanai_tajimi",
     "house/test_architecture.py": "core.lazy",
     "house/test_demos.py": "plots.run_pictures",
-    "house/test_demos_beam.py": "plots.studies studies.cases.beam_study",
-    "house/test_demos_layer.py": "studies.cases.layer_study",
     "laws/test_excitation.py": "core.excitation_values ground_motion.excitation",
     "meshes/test_ball.py": "meshes.checks meshes.extract meshes.mesh_file",
     "meshes/test_mesh_files.py": "meshes.channel",
@@ -110,7 +108,8 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "studies/test_case.py":
         "cli.case studies.cases.parsing studies.cases.toml_file studies.cases.vocabulary",
     "studies/test_case_inputs.py": "studies.cases.table_calls",
-    "studies/test_ida.py": "cli.batch cli.ida studies.ida.measures studies.ida.processes studies.ida.runs",
+    "studies/test_ida.py":
+        "cli.batch cli.ida plots.studies studies.ida.measures studies.ida.processes studies.ida.runs",
     "validation/test_pressed_square.py": "plots.deformed",
 }
 BY = {module: test for test, modules in COVERS.items() for module in modules.split()}

@@ -1,4 +1,4 @@
-"""The demos of the boundary layer and ``vi-contact run layer``: key numbers, figures, one sentence for bad input."""
+"""The demos of the boundary layer: key numbers and figures."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ import pytest
 from demo_runs import demo
 
 from demos.pictures.layer import plot_thin_limit
-from vi_contact.cli.entry import main
-from vi_contact.studies.cases.layer_study import LayerStudy
 
 serial = pytest.mark.serial
 
@@ -59,56 +57,6 @@ def test_the_contact_layer_demo(comm: Any, shared_tmp: Path) -> None:
     assert 0.0 < numbers["wall b 8e-06: deepest"] < 8e-6
     if comm.rank == 0:
         assert all(is_picture(shared_tmp / f"{name}.png") for name in ("ThrownBar", "ThrownBar_limit", "wall_limit"))
-
-
-def words(settings: list[str]) -> list[str]:
-    """The arguments --set layer.KEY=VALUE."""
-    return [word for setting in settings for word in ("--set", f"layer.{setting}")]
-
-
-@serial
-def test_the_command(tmp_path: Path, capsys: Any) -> None:
-    """Closed form, other readings, a wanted restitution; the table in its folder, and the picture of the report."""
-
-    def rows(*settings: str) -> list[list[float]]:
-        assert main(["run", "layer", *words([*settings]), "--out", str(tmp_path / "new" / "p")]) == 0
-        lines = capsys.readouterr().out.splitlines()
-        return [[float(word) for word in line.split()] for line in lines[1:] if line[:12].strip()[:1].isdigit()]
-
-    assert rows("k=[1]", "c=[0, 5]") == [
-        [1.0, 0.0, 1.0, 1.0, 1.0, 2.0, 0.606531], [1.0, 5.0, 0.196980, 0.204157, 0.358352, 1.19698, 0.879563]
-    ]
-    assert [one.duration for one in LayerStudy(k=(1.0,), c=(0.0,)).impacts] == pytest.approx([2.0])
-    (near,) = rows("k=[1]", "c=[1]", "start=0.99")
-    assert near[2] == 0.593624 and near[5] == pytest.approx(1.60709, abs=5.1e-6)
-    assert main(["report", str(tmp_path / "new" / "p")]) == 1 and "the closed form" in capsys.readouterr().err
-    (full,) = rows("c=[1]", "metric=full")
-    assert full[2] == pytest.approx(0.56918, abs=5.1e-6) and full[5:] == pytest.approx([2.70353, 0.55461], abs=5.1e-6)
-    wanted = rows("restitution=0.7", "mass=80", "speed=3", "width=1e-3")[0]
-    assert wanted[2] == 0.7 and wanted[6] == 5e-4
-    head, *lines = (tmp_path / "new" / "p" / "impacts.csv").read_text(encoding="utf-8").splitlines()
-    assert head.startswith("k [N/m],c [N],e,e_p") and float(lines[0].split(",")[6]) == pytest.approx(5e-4, rel=1e-12)
-    assert main(["report", str(tmp_path / "new" / "p")]) == 0
-    assert is_picture(tmp_path / "new" / "p" / "particle.png")
-
-
-@serial
-@pytest.mark.parametrize(
-    ("settings", "word"),
-    [
-        (["metric=round"], "unknown metric 'round'"),
-        (["restitution=1.5"], "restitution coefficient e is 1.5"),
-        (["restitution=0.5", "metric=full"], "is for the closed form"),
-        (["k=[0]", "c=[1]"], "parameter k is zero"),
-        (["width=-1"], "layer width b is -1.0"),
-        (["k=1"], "k is 1: give a list"),
-        (["q=1"], "unknown key 'q'"),
-    ],
-)
-def test_the_command_refuses(settings: list[str], word: str, capsys: Any) -> None:
-    assert main(["run", "layer", *words(settings)]) == 1
-    printed = capsys.readouterr()
-    assert word in printed.err and not printed.out
 
 
 @serial

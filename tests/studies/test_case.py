@@ -441,9 +441,6 @@ def test_short_options_are_settings() -> None:
     ):
         with pytest.raises(InputError, match=said):
             wrong.settings({"mesh": {}})
-    with pytest.raises(InputError, match=r"\[beam\] has no use for --steps"):
-        ShortOptions(steps=3).settings({"beam": {}})
-    assert ShortOptions(dt=0.1).settings({"beam": {}}, ["beam.E=1"]) == ["beam.dt=0.1", "beam.E=1"]
 
 
 @pytest.mark.serial

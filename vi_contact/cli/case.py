@@ -2,7 +2,7 @@
 
 import argparse
 import gc
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ def add_case_commands(commands: Any) -> None:
         description="Run a case. The short options and --set change what it says; 'vi-contact cases' lists those that "
         "ship with the package, 'vi-contact report DIR' draws what the run found.",
     )
-    run.add_argument("case", help="name of a case that ships (wall, channel, beam, layer), or a .toml file")
+    run.add_argument("case", help="name of a case that ships (wall, channel), or a .toml file")
     short = run.add_argument_group("short options", "an option that the case has no use for is refused")
     short.add_argument("--motion", metavar="FILE[,FILE]", help="shake by records, a horizontal and a vertical one")
     short.add_argument("--scale", type=float, metavar="F", help="factor on what shakes")
@@ -53,11 +53,11 @@ def _cases(options: argparse.Namespace) -> str:
 
 
 def _run(options: argparse.Namespace) -> str:
-    from ..run.wall_time import seconds_of
-    from ..studies.cases.own_case import OwnCase, open_case
+    import mpi4py.MPI  # noqa: F401  # first: ``world`` finds it
 
-    with suppress(ImportError):  # the beam and the layer need no MPI
-        import mpi4py.MPI  # noqa: F401
+    from ..run.wall_time import seconds_of
+    from ..studies.cases.case import read_case  # late: finite elements
+
     comm, path = world(), located(options.case)
     stages.show(not options.quiet)
     if options.wall_time is not None:
@@ -68,19 +68,13 @@ def _run(options: argparse.Namespace) -> str:
     with ExitStack() as after:
         after.callback(gc.enable if gc.isenabled() else gc.disable)
         gc.disable()  # modules are no garbage: looking for it takes a tenth of the way to the first step
-        case = open_case(path, short.settings(read_toml(path), options.settings), options.allow)
+        case = read_case(path, short.settings(read_toml(path), options.settings), allow=options.allow)
     name = case.tables.get("title") or path.stem
     restart = options.restart or options.changed
-    for option, given in (("--restart", restart), ("--wall-time", options.wall_time)):
-        if isinstance(case, OwnCase) and given:
-            raise InputError(f"{path}: this case keeps no checkpoint: leave {option} away, it takes seconds")
-    out = options.out or (None if isinstance(case, OwnCase) else case.out) or Path("results") / path.stem
+    out = options.out or case.out or Path("results") / path.stem
     if options.check:
-        if not isinstance(case, OwnCase):
-            case.check(comm)
+        case.check(comm)
         said = f"{options.case}: {name}: the file is in order"
-    elif isinstance(case, OwnCase):
-        said = f"{name}\n{case.run(comm, out)}\noutput: {out}"
     else:
         found = case.run(comm, out=out, restart=restart, progress=not options.quiet, changed=options.changed,
                          wall_time=options.wall_time)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 
 from ..core.errors import InputError, Interrupted, OutOfTime, ViContactError
 from ..core.version import __version__
+from ..studies.cases import library
 from .case import add_case_commands
 from .errors import Parser, check_words, fail_together, printable, told, world
 from .ida import add_ida_commands
@@ -44,9 +45,12 @@ def split_petsc(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
 
 
 def refuse_retired(arguments: Sequence[str]) -> None:
-    """Raise InputError for a command of before that is a case now, with the command in its place."""
-    if arguments and arguments[0] in ("wall", "channel", "beam", "layer"):
-        old = arguments[0]
+    """Raise InputError for a command of before, with the command or the demo in its place."""
+    if not arguments:
+        return
+    old = arguments[0]
+    library.refuse_retired([old])
+    if old in ("wall", "channel"):
         raise InputError(f"'{old}' is a case now: give vi-contact run {old}, and for its pictures vi-contact report "
                          f"DIR; vi-contact run --help and the table of options in CHANGELOG.md tell the rest")
 

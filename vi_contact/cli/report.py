@@ -1,7 +1,6 @@
 """``vi-contact report`` and ``vi-contact post peaks|spectrum|transfer|loop``: options and what each does."""
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +9,7 @@ from ..core.files import write_csv
 from ..engineering import floor_spectrum, hysteresis, peaks, recorded_motion, transfer_function, write_peaks
 from ..plots.records import plot_loop, plot_spectra, plot_transfer
 from ..run.files.folder import FILES
-from ..studies.cases.library import COPY, read_copy
+from ..studies.cases.library import read_copy, refuse_retired
 from .options import PICTURES, add_actions, output_file, spaced
 
 if TYPE_CHECKING:
@@ -62,13 +61,7 @@ def _report(options: argparse.Namespace) -> str:
 
     folder = Path(options.folder)
     tables = read_copy(folder)
-    if "beam" in tables or "layer" in tables:
-        from ..studies.cases.own_case import study_of
-
-        for option in ("out", "title", "show"):
-            if getattr(options, option) is not None:
-                raise InputError(f"the report of this case is pictures in its folder: leave --{option} away")
-        return _listed(study_of(folder / COPY, tables).draw(folder))
+    refuse_retired(tables)
     run = _run(options)
     out = output_file(options.out or folder / "report.pdf", picture=True)
     title = str(options.title or tables.get("title") or f"Run {folder.resolve().name}")
@@ -76,17 +69,14 @@ def _report(options: argparse.Namespace) -> str:
     page = plot_report(run, out, title=title, columns=shown)
     table = write_peaks(out.with_name("peaks.csv"), peaks(run.history, run.columns))
     drawn = draw_run(run, out.parent, title=title, unilateral=_contact_labels(tables.get("model")))
-    return f"report: {page}\ntable: {table}\n{_listed(drawn)}"
+    pictures = ", ".join(path.name for path in drawn)
+    return f"report: {page}\ntable: {table}\npictures in {drawn[0].parent}: {pictures}"
 
 
 def _run(options: argparse.Namespace) -> "RunFolder":
     from ..run.files.reading import read_run  # late: h5py, which records do not need
 
     return read_run(options.folder)
-
-
-def _listed(pictures: Sequence[Path]) -> str:
-    return f"pictures in {pictures[0].parent}: {', '.join(path.name for path in pictures)}"
 
 
 def _contact_labels(model: Any) -> list[str] | None:

@@ -16,6 +16,6 @@ _CONTENTS = {
     "rendered": ("render_deformed",),
     "report": ("plot_report",),
     "run_pictures": ("draw_run",),
-    "studies": ("plot_beam_energies", "plot_ida", "plot_particle", "plot_shapes", "plot_tips"),
+    "studies": ("plot_ida",),
 }
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -38,7 +38,7 @@ from ...run.recorders import Contact, Energy, Steps
 from ...run.simulate import Solution, simulate
 from ...run.time_steps import step_plan
 from ...solvers.automatic import Automatic
-from .library import base_folder, check_format, keep_copy
+from .library import base_folder, check_format, keep_copy, refuse_retired
 from .own_classes import packages
 from .parsing import Words, arguments, nearest, read
 from .table_calls import Call, Callee, Group, Node, Spot, build, callee, needs_body, nodes_in
@@ -252,6 +252,7 @@ def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence
     allowed = packages(allow)
     known = words(base_folder(path), allowed)
     check_format(path, tables)
+    refuse_retired(tables)
     for name in tables:
         if name not in ("format", *_TABLES):
             raise InputError(f"{path}: unknown table [{name}]: {nearest(name, ('format', *_TABLES))}")

@@ -1,7 +1,7 @@
 """Find the case files that ship with the package, and keep in a run folder the copy of the case that made it."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ FOLDER = Path(__file__).parent / "builtin"
 COPY = "case.toml"
 FORMAT = 1  # of case files
 _SET = "# set "  # before a setting, in the copy
+_RETIRED = {"beam": "timoshenko_beam", "layer": "particle_layer"}  # cases of before -> demos that draw the same
 
 
 def builtin_cases() -> dict[str, str]:
@@ -27,10 +28,19 @@ def located(case: str) -> Path:
     """Return the file of a case: what ends in ".toml" is a file, all else the name of one that ships."""
     if case.endswith(".toml"):
         return Path(case)
+    refuse_retired([case])
     if case not in builtin_cases():
         raise InputError(f"there is no built-in case {shown(case)}: {nearest(case, builtin_cases())}; a file ends in "
                          ".toml")
     return FOLDER / f"{case}.toml"
+
+
+def refuse_retired(names: Iterable[str]) -> None:
+    """Raise InputError, which names the demo in its place, for a name of a case or table that is retired."""
+    for name in names:
+        if name in _RETIRED:
+            raise InputError(f"the case '{name}' is retired: bash demos/run.sh {_RETIRED[name]} computes and draws "
+                             f"the same, with its parameters on top of demos/{_RETIRED[name]}.py")
 
 
 def check_format(path: Path, tables: Mapping[str, Any]) -> None:

@@ -1,7 +1,7 @@
 """Turn the short options of ``vi-contact run`` into settings KEY=VALUE of a case; refuse those it has no use for."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,6 @@ OF_MOTION = {  # settings of a model that come with records: with any, with a ve
 }
 REFERENCE = {"type": "Volume", "method": {"type": "ReducedNewton"}}
 IMPULSIVE = ("ZienkiewiczWoodTaylor", "SS22")  # whose contact points have mass: they take an impact law
-OF_OWN: dict[str, dict[str, str]] = {"beam": {"dt": "beam.dt"}, "layer": {}}  # table -> short options it has a use for
 
 
 @dataclass(frozen=True)
@@ -38,20 +37,9 @@ class ShortOptions:
 
         InputError for an option that the case has no use for.
         """
-        own = [name for name in tables if name in OF_OWN]
-        if own:
-            return [*self._of_own(own[0]), *given]
         first = [*self._motion(tables), *self._step(), *self._methods(tables)]
         after = with_settings(dict(tables), [*first, *given])
         return [*first, *given, *self._scale(after), *self._cross_check(after)]
-
-    def _of_own(self, name: str) -> list[str]:
-        keys = OF_OWN[name]
-        for one in fields(self):
-            if one.name not in keys and getattr(self, one.name) not in (None, False):
-                raise InputError(f"a case with [{name}] has no use for --{one.name.replace('_', '-')}: leave it out, "
-                                 f"or change a key, as --set {name}.KEY=VALUE")
-        return [f"{key}={getattr(self, one)!r}" for one, key in keys.items() if getattr(self, one) is not None]
 
     def _motion(self, tables: Mapping[str, Any]) -> list[str]:
         """Replace what shakes by records; the run lasts as long as they do."""
