@@ -26,6 +26,8 @@ _CONTENTS = {
     "ground_motion.formats.reader": ("read_record",),
     "core.surfaces": ("ContactSurface",),
     "core.obstacles": ("AnalyticGap", "HalfSpace", "Touching"),
+    "fem.own_matrices": ("system_from_arrays",),
+    "fem.contact.points": ("contact_points",),
     "core.problem": ("ContactProblem",),
     "core.certificate": ("Certificate",),
     "core.step": ("Report", "State", "StepProblem", "StepResult"),

@@ -46,6 +46,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "fem/test_second_order.py": "fem.numbering",
     "fem/test_section_forces.py":
         "fem.contact.frames fem.output.nodal_work fem.output.reactions laws.weight",
+    "fem/test_own_matrices.py": "fem.contact.points fem.matrix_space",
     "fem/test_space.py": "fem.nodal_space",
     "fem/test_surface.py": "fem.contact.faces",
     "fem/test_ties.py": "soil.soil_column",
@@ -76,7 +77,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "run/test_fuzz_folders.py": "run.files.writer run.session",
     "run/test_march.py": "core.state_checks",
     "run/test_march_many.py": "run.rows run.together",
-    "run/test_proximal.py": "run.rigid_bodies",
+    "run/test_proximal.py": "laws.free_motions run.rigid_bodies",
     "run/test_restart_refused.py": "run.files.identity",
     "run/test_simulate.py": "core.version run.files.log",
     "schemes/test_massless_contact.py": "solvers.beside_steps",

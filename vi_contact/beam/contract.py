@@ -23,58 +23,20 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ..core.algebra import Array, Indices, SerialAlgebra, SerialComm, SerialMatrix
+from ..core.algebra import Array
 from ..core.checks import array, function, instance, number, optional, provides, whole
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.protocols import FrictionLaw, Frictionless
 from ..core.step import Scheme
-from ..core.surfaces import ContactSurface
-from ..core.system import Load, SemiDiscreteSystem
+from ..core.system import Load
+from ..fem.contact.points import contact_points
+from ..fem.own_matrices import system_from_arrays
 from ..laws.mass import ConsistentMass
 from ..run.march import march
 from ..schemes.midpoint import Midpoint
 from .elements import Elements, beam_matrices, rod_matrices
 from .values import Rod, Start, TimoshenkoBeam
-
-
-class BeamSpace:
-    """Say what the unknowns of rod and beam mean, for recorders and writers: displacements (along, across) of nodes.
-
-    Nodes at ``x`` (the clamped one left out) on the axis. Unknowns: v_1 … v_n along the axis (n = m, or 1: of the
-    tip alone), then theta_1 … theta_m and u_1 … u_m of a beam, if there is one. Rotations belong to no point. ``ids``:
-    0, 1, …, one process owns all; ``coordinates``: (unknowns, d) [m]; ``bodies``: of every unknown, there is one.
-    """
-
-    def __init__(self, x: Array, along: int, beam: bool) -> None:
-        self.x, self.along, self.beam = x, along, beam
-        self.dimension = 2 if beam else 1
-        places = np.concatenate([x[len(x) - along :], x, x]) if beam else x[len(x) - along :]
-        self.unknowns = len(places)
-        self.ids: Indices = np.arange(self.unknowns)
-        self.coordinates: Array = places[:, None] * np.eye(1, self.dimension)
-        self.bodies: Indices = np.zeros(self.unknowns, dtype=np.int64)
-
-    def find_nodes(self, points: Array) -> Indices:
-        """Return the nearest nodes; InputError for points off the axis, beyond the tip or at the clamp."""
-        points = np.asarray(points, dtype=float)
-        start, end = 0.5 * float(self.x[0]), float(self.x[-1])
-        off = points[:, 0] < start, points[:, 0] > end * (1.0 + 1e-12), np.any(points[:, 1:] != 0.0, axis=1)
-        if np.any(off):
-            raise InputError(f"points {points.tolist()} are not all on the moving part of the beam: give x from "
-                             f"{start:g} to {end:g} on the axis")
-        return np.abs(points[:, :1] - self.x).argmin(axis=1)
-
-    def sample(self, u: Array, nodes: Indices, t: float, derivative: int = 0) -> Array:
-        """Return (k, d): displacement along the axis, zero where the rod has no unknowns, and across."""
-        values, m = np.zeros((len(nodes), self.dimension)), len(self.x)
-        rod = np.zeros(m)
-        rod[m - self.along :] = u[: self.along]
-        values[:, 0] = rod[nodes]
-        if self.beam:
-            values[:, 1] = u[self.along + m :][nodes]
-        return values
-
 
 History = Callable[[float], float]
 
@@ -210,7 +172,7 @@ def _check(
 def _problem(x: Array, along: _Part, across: _Part | None, gap: float, friction: FrictionLaw) -> ContactProblem:
     parts = [along] if across is None else [along, across]
     sizes = [len(part.u0) for part in parts]
-    space = BeamSpace(x, sizes[0], across is not None)
+    m, d = len(x), 1 if across is None else 2
     loads = []
     for i, part in enumerate(parts):
         for vector, history in part.loads:
@@ -218,23 +180,18 @@ def _problem(x: Array, along: _Part, across: _Part | None, gap: float, friction:
             whole[i] = vector
             loads.append((np.concatenate(whole), history))
     damped = any(part.viscosity for part in parts)
-    influence = np.zeros((space.unknowns, space.dimension))
-    influence[: sizes[0], 0] = 1.0
-    influence[space.unknowns - len(x) :, -1] = 1.0
-    M = SerialMatrix(sp.block_diag([part.M for part in parts]))
+    nodes = np.append(0.0, x)[:, None] * np.eye(1, d)  # the first one is clamped
+    last = np.arange(1, m + 1)
+    meaning = [np.column_stack([last[m - sizes[0] :], np.zeros(sizes[0])])]
+    meaning += [] if across is None else [np.column_stack([last, np.full(m, c)]) for c in (-1, 1)]  # rotations, across
+    system = system_from_arrays(
+        sp.block_diag([part.M for part in parts]),
+        sp.block_diag([part.viscosity * part.K for part in parts]) if damped else None,
+        sp.block_diag([part.K for part in parts]), coordinates=nodes, unknowns=np.concatenate(meaning),
+        load=Load(np.zeros(sum(sizes)), tuple(loads)), u0=np.concatenate([part.u0 for part in parts]),
+        v0=np.concatenate([part.v0 for part in parts]),
+    )
     inertia = sp.block_diag([part.inertia[:, None] for part in parts]).toarray()
-    system = SemiDiscreteSystem(
-        algebra=SerialAlgebra(), M=M,
-        C=SerialMatrix(sp.block_diag([part.viscosity * part.K for part in parts])) if damped else None,
-        K=SerialMatrix(sp.block_diag([part.K for part in parts])), load=Load(np.zeros(space.unknowns), tuple(loads)),
-        influence=influence, base_mass=inertia - np.column_stack([M @ rigid for rigid in influence.T]),
-        u0=np.concatenate([part.u0 for part in parts]), v0=np.concatenate([part.v0 for part in parts]), space=space,
-    )
-    d = space.dimension
-    tangents = np.array([[space.unknowns - 1]]) if space.beam else np.zeros((1, 0), dtype=np.int64)
-    tip = ContactSurface(  # one contact point, its weight 1: pressures are forces
-        comm=SerialComm(), points=np.eye(1, d) * x[-1], normals=np.eye(1, d), weights=np.ones(1),
-        gap0=np.array([gap]), bilateral=np.zeros(1, dtype=bool), compliance=np.zeros(1),
-        owned=np.array([space.along - 1]), slots=np.array([0]), tangents=tangents,
-    )
+    system = system.changed(base_mass=inertia - np.column_stack([system.M @ rigid for rigid in system.influence.T]))
+    tip = contact_points(system, [m], np.eye(1, d), gap0=gap)  # one point, its weight 1: pressures are forces
     return ContactProblem(system, tip, friction=friction, mass=None if across is None else ConsistentMass())

@@ -45,5 +45,10 @@ def matrix_defects(owner: str, comm: Comm, numbers: Indices, **matrices: Matrix 
             yield (f"{owner}: {name} is not symmetric, A w and Aᵀ w differ by {found:.1g} of their size; give a "
                    "symmetric matrix")
     M = matrices.get("M")
-    if M is not None and largest(comm, -np.min(M.diagonal(), initial=0.0)) > 0.0:
+    if M is None:
+        return
+    own = M.diagonal()
+    if largest(comm, -np.min(own, initial=0.0)) > 0.0:
         yield f"{owner}: M has a diagonal entry below zero; give masses that are positive, or zero"
+    if largest(comm, np.any((own == 0.0) & (M @ probe(numbers, 0) != 0.0))):
+        yield f"{owner}: M has a zero on its diagonal beside other entries; give positive masses, or empty rows"

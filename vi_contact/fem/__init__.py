@@ -27,6 +27,7 @@ _CONTENTS = {
     "output.functions": ("as_function", "read_function"),
     "output.reactions": ("Reactions",),
     "output.section_forces": ("SectionForces",),
+    "petsc_system": ("system_from_matrices",),
     "released_supports": ("release",),
     "ties": ("Tied",),
 }

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 import ufl
 
-from ..core.algebra import Array, Mask, largest
+from ..core.algebra import Array
 from ..core.checks import optional, whole
 from ..core.stages import stage
 from ..core.system import Load, SemiDiscreteSystem
-from ..laws.mass_transfer import rigid_motions
+from ..laws.free_motions import floating
 from ..laws.materials import Damping, Section
 from . import compat
 from .assembly_checks import check_body, check_boundaries, check_initial
@@ -98,10 +98,11 @@ def assemble(
         base_mass=np.column_stack([one - M @ r for one, r in zip(momenta, rigid.T, strict=True)]) if momenta else None,
         u0=_initial(space, "initial displacement", initial_displacement),
         v0=_initial(space, "initial velocity", initial_velocity),
-        space=space, floating=floats(space), tied=space.tied_unknowns,
+        space=space, tied=space.tied_unknowns,
         notes=describe_boundaries(boundaries, mesh.comm.rank), absolute=any(one.lets_waves_in for one in boundaries),
         companions=tuple(one for part in (*moved, *acting) for one in part.companions),
     )
+    system = floating(system)
     forms.own(system)
     del absorbers, damper, mass
     give_back(mesh.comm)
@@ -180,26 +181,3 @@ def _initial(space: FemSpace, name: str, value: Initial) -> Array:
 def _nodal(space: FemSpace, name: str, value: Any) -> Array:
     field: Any = (lambda points, t: value(points)) if callable(value) else value
     return evaluate(name, field, space.points, 0.0, space.comm)
-
-
-def floats(space: FemSpace) -> bool:
-    """Return whether a rigid motion of some body of the mesh leaves every prescribed component of it at rest.
-
-    The Gram matrix of its rigid modes on its prescribed components is singular exactly then (scaled by its size).
-    """
-    d = space.dimension
-    numbers = space.body_of_node
-    count = 1 + int(largest(space.comm, np.max(numbers, initial=0)))
-    return any(_floats(space, np.repeat(numbers == body, d)) for body in range(count))
-
-
-def _floats(space: FemSpace, body: Mask) -> bool:
-    """Return the answer of ``floats`` for the body with these components (owned full mask)."""
-    d = space.dimension
-    own = body[::d]
-    middle = space.comm.sum(np.append(space.points[own].sum(axis=0), own.sum()))
-    x = (space.points - middle[:d] / middle[d]) / space.size
-    rows = rigid_motions(np.tile(np.eye(d), (len(x), 1)), np.repeat(x, d, axis=0))[space.held.ravel() & body]
-    gram = space.comm.sum(rows.T @ rows)
-    values = np.linalg.eigvalsh(gram)
-    return bool(values[0] <= 1e-10 * max(values[-1], np.finfo(float).tiny))

@@ -61,6 +61,9 @@ class Redistributed:
             return system
         massless, contact = _contact_unknowns(system, surface, tangential)
         algebra, nodal, own = system.algebra, _row_sums(system), system.M.diagonal()
+        if largest(algebra.comm, np.any((own > 0.0) & ~system.influence.any(axis=1))):
+            raise InputError("redistributed mass has no place for the inertia of rotations, or of what else is no "
+                             "displacement: give the problem mass=ConsistentMass()")
         wrong = int(total(algebra.comm, np.sum(nodal < -LIGHT * own)))  # as of elements of higher order
         if wrong and self.lumping:
             raise InputError(f"redistributed mass cannot lump negative row sums of M and {wrong} unknowns have such: "
@@ -77,6 +80,7 @@ class Redistributed:
             _inertia_correction(system, moved, body & ~contact, body, nodal) for body in _bodies(system, ~contact)
         ]
         M = algebra.combine([(1.0, moved), *((1.0, correction) for correction in corrections)])
+        massless = massless if system.massless is None else massless | system.massless
         return system.changed(M=M, C=C, load=load, massless=massless)
 
 

@@ -4,28 +4,13 @@ Every body is asked by itself, in its own unknowns (``problem.turned``): with w 
 static stage asks for w·(f - B_nᵀ r_n - B_tᵀ r_t) = 0, the sums of forces and moments. No stiffness enters it.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-
 import numpy as np
 
-from ..core.algebra import Array, Comm, Indices, Matrix, largest, total
+from ..core.algebra import Array, Matrix, total
 from ..core.problem import ContactProblem
-from ..core.system import SemiDiscreteSystem
-from ..laws.mass_transfer import rigid_motions
+from ..laws.free_motions import bodies_in, free_motions
 
-FREE = 1e-10  # wᵀKw over the body's largest K_ii, for motions w of size one, that is round-off
 WEAK, STRONG = 4e-6, 1e-4  # of a stiffness: see body_springs
-
-
-@dataclass(frozen=True)
-class FreeMotions:
-    """Hold a body's owned unknowns, its free motions w (rows, k) of size one, and orthonormal in its mass, with M w."""
-
-    rows: Indices
-    unit: Array
-    motions: Array
-    momenta: Array
 
 
 class RigidBodies:
@@ -33,7 +18,7 @@ class RigidBodies:
 
     def __init__(self, problem: ContactProblem) -> None:
         self._coupling, self._comm = problem.surface.coupling, problem.surface.comm
-        self._free = list(_free(problem.turned))
+        self._free = list(free_motions(problem.turned))
 
     def imbalance(self, load: Array, reaction: Array) -> float:
         """Return the largest |w·(load - reaction)| over max |w| times the sum of |load| and |reaction| on the body,
@@ -59,60 +44,6 @@ class RigidBodies:
         return force if self._coupling is None else 2.0 * force - self._coupling.transpose_apply(force)
 
 
-def _free(system: SemiDiscreteSystem) -> Iterator[FreeMotions]:
-    comm, points = system.algebra.comm, system.space.coordinates
-    numbers = np.asarray(system.space.bodies)
-    stiffness = np.abs(system.K.diagonal())
-    for number in range(_count(comm, numbers)):
-        rows = np.flatnonzero(numbers == number)
-        stiffest = largest(comm, np.max(stiffness[rows], initial=0.0))
-        if stiffest == 0.0:
-            continue  # every node of it is held
-        high = comm.max(np.max(points[rows], axis=0, initial=-np.inf))
-        low = -comm.max(np.max(-points[rows], axis=0, initial=-np.inf))
-        x = (points[rows] - 0.5 * (low + high)) / max(float(np.max(high - low)), 1e-300)
-        w = rigid_motions(system.influence[rows], x)
-        bending = _form(system, system.K, rows, w)[1]
-        w = w @ _kernel(bending, FREE * stiffest)
-        momenta, inertia = _form(system, system.M, rows, w)
-        basis = _orthonormal(inertia)
-        size = comm.max(np.max(np.abs(w @ basis), axis=0, initial=0.0))
-        yield FreeMotions(rows, w @ basis / size, w @ basis, momenta @ basis)
-
-
-def _kernel(form: Array, zero: float) -> Array:
-    """Columns whose form is zero: axes of that kind, so that sums of forces stay apart, and others between the rest."""
-    free = np.abs(form.diagonal()) <= zero
-    values, vectors = np.linalg.eigh(form[np.ix_(~free, ~free)])
-    others = np.zeros((len(form), len(values)))
-    others[~free] = vectors
-    return np.column_stack([np.eye(len(form))[:, free], others[:, np.abs(values) <= zero]])
-
-
-def _orthonormal(form: Array) -> Array:
-    """Columns c with cᵀ form c = 1, by Gram and Schmidt; none of motions along a component that is held everywhere."""
-    columns: list[Array] = []
-    for column in np.eye(len(form)):
-        for c in columns:
-            column = column - c * (c @ form @ column)
-        size = float(column @ form @ column)
-        if size > 1e-10 * np.max(form):
-            columns.append(column / np.sqrt(size))
-    return np.column_stack(columns) if columns else np.zeros((len(form), 0))
-
-
-def _form(system: SemiDiscreteSystem, A: Matrix, rows: Indices, w: Array) -> tuple[Array, Array]:
-    """(A w, wᵀA w) of motions of a body, on the body."""
-    columns = []
-    for values in w.T:
-        x = np.zeros(system.rows)
-        x[rows] = values
-        columns.append((A @ x)[rows])
-    moved = np.column_stack(columns) if columns else np.zeros_like(w)
-    form = system.algebra.comm.sum(w.T @ moved)
-    return moved, 0.5 * (form + form.T)
-
-
 def body_springs(problem: ContactProblem) -> Matrix:
     """Return P: the mass matrix of every body, times a number [1/s²] that makes the sum of its entries along a
     direction STRONG of the stiffness of what is softest here, a body or the springs it stands on, and at least WEAK of
@@ -123,7 +54,7 @@ def body_springs(problem: ContactProblem) -> Matrix:
     """
     system, surface = problem.turned, problem.surface
     algebra, numbers = system.algebra, np.asarray(system.space.bodies)
-    count, d = _count(algebra.comm, numbers), system.influence.shape[1]
+    count, d = bodies_in(algebra.comm, numbers), system.influence.shape[1]
     row_sums = np.sum(system.influence * np.column_stack([system.M @ r for r in system.influence.T]), axis=1)
     mass = algebra.comm.sum(np.bincount(numbers, row_sums, minlength=count).astype(float)) / d
     stiffness = np.zeros(count)
@@ -137,7 +68,3 @@ def body_springs(problem: ContactProblem) -> Matrix:
     every = np.arange(system.rows)
     springs = algebra.congruence(algebra.local(every, every, root[numbers], system.rows), system.M)
     return springs if surface.coupling is None else algebra.congruence(surface.coupling, springs)
-
-
-def _count(comm: Comm, numbers: Indices) -> int:
-    return 1 + int(largest(comm, np.max(numbers, initial=0)))

@@ -21,7 +21,8 @@ class SingleStep:
         return ConsistentMass()
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for massless contact nodes: their forces would swing for ever."""
+        """Raise InputError for unknowns without mass, as contact nodes: their forces would swing for ever."""
+        _refuse_massless_elsewhere(problem)
         if problem.equations.massless is not None:
             raise InputError(f"{type(self).__name__} needs mass at the contact nodes, whose forces would swing for "
                              "ever: give the problem mass=ConsistentMass(), or use the default scheme Trapezoidal()")
@@ -80,6 +81,7 @@ def check_balance(name: str, problem: ContactProblem) -> None:
     Raises InputError for an impact law on massless contact nodes: there is no momentum that it could change. Warns,
     once for a problem, of mass at the contact nodes: the energy ½ (r0 g1 - r1 g0) is created whenever a contact opens.
     """
+    _refuse_massless_elsewhere(problem)
     massless, surface = problem.equations.massless is not None, problem.surface
     if massless and problem.impact is not None:
         raise InputError(f"the impact law {problem.impact} acts on the mass of contact nodes and this problem has none "
@@ -91,3 +93,11 @@ def check_balance(name: str, problem: ContactProblem) -> None:
         log.warning("%s with consistent mass can gain energy whenever a contact opens: leave out "
                     "mass=ConsistentMass(), or take ContactStabilisedNewmark() or Midpoint()", name)
     told.append(True)
+
+
+def _refuse_massless_elsewhere(problem: ContactProblem) -> None:
+    """Raise InputError for unknowns without mass beside contact nodes with mass."""
+    layer, surface = problem.equations.massless, problem.surface
+    if layer is not None and surface.some(~layer[surface.owned]):
+        raise InputError("rows of M are zero and contact nodes have mass: condense these unknowns out of K, which is "
+                         "exact (rotations of a lumped beam), give them inertia, or use mass=Redistributed()")

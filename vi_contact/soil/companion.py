@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from ..core.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
+from ..core.algebra import Array, SerialComm
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.step import Scheme, State
 from ..core.surfaces import empty_surface
-from ..core.system import Load, SemiDiscreteSystem
+from ..core.system import Load
+from ..fem.own_matrices import system_from_arrays
 from ..laws.mass import ConsistentMass
 from ..run.march import march
 from ..run.time_steps import LARGEST, HalvedAtImpact, Schedule, TimeSteps
@@ -76,27 +77,8 @@ class CompanionRun:
         return (1.0 - w) * self._u[k] + w * self._u[k + 1], (1.0 - w) * self._v[k] + w * self._v[k + 1]
 
 
-class _Nowhere:
-    """Describe unknowns without a place: nobody asks a companion for points."""
-
-    def __init__(self, dimension: int, unknowns: int) -> None:
-        self.dimension, self.unknowns = dimension, unknowns
-        self.ids, self.bodies = np.arange(unknowns), np.zeros(unknowns, dtype=np.int64)
-        self.coordinates = np.zeros((unknowns, dimension))
-
-    def find_nodes(self, points: Array) -> np.ndarray:
-        return np.zeros(len(points), dtype=np.int64)
-
-    def sample(self, u: Array, nodes: np.ndarray, t: float, derivative: int = 0) -> Array:
-        return np.tile(u[: self.dimension], (len(nodes), 1))
-
-
 def linear_problem(M: Any, C: Any | None, K: Any, load: Load, dimension: int) -> ContactProblem:
     """Return M u'' + C u' + K u = f, sparse matrices, at rest and without contact, ``dimension`` unknowns a node."""
-    n = M.shape[0]
-    system = SemiDiscreteSystem(
-        algebra=SerialAlgebra(), M=SerialMatrix(M), C=None if C is None else SerialMatrix(C), K=SerialMatrix(K),
-        load=load, influence=np.tile(np.eye(dimension), (n // dimension, 1)), u0=np.zeros(n), v0=np.zeros(n),
-        space=_Nowhere(dimension, n), floating=True,
-    )
+    nowhere = np.zeros((M.shape[0] // dimension, dimension))  # nobody asks a companion for points
+    system = system_from_arrays(M, C, K, coordinates=nowhere, load=load)
     return ContactProblem(system, empty_surface(SerialComm(), dimension))

@@ -115,6 +115,12 @@ class NodalFrames:
                              "node out of some of its surfaces (points=)")
 
 
+def snapped(directions: Array) -> Array:
+    """Turn directions to an axis where they are along it to round-off: axis-aligned walls stay unrotated."""
+    snapped = np.where(np.abs(directions) < 1e-13, 0.0, directions)
+    return np.asarray(snapped / np.linalg.norm(snapped, axis=1)[:, None])
+
+
 def given(parts: Sequence[NodalConditions]) -> tuple[Indices, Array, Array, Mask]:
     """Return what makes the frames of conditions: numbers and points of their nodes, directions, held components."""
     nodes = joined_nodes([part.nodes for part in parts])

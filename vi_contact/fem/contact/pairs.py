@@ -29,10 +29,10 @@ from ...meshes.rows import number_alike
 from ..mesh import Facets
 from ..space import FemSpace
 from .faces import Boundary, boundary, checked_angle, split, tell_corners
-from .frames import Facing, NodalConditions, NodalFrames, given, surface_of
+from .frames import Facing, NodalConditions, NodalFrames, given, snapped, surface_of
 from .matching import Matched, Matching, NodeToNode, Side
 from .nodes import Nodes, everywhere, joined_nodes
-from .surface import contact_space, listed, merged, nodes_on, snapped
+from .surface import contact_space, listed, merged, nodes_on
 
 log = logging.getLogger(__name__)
 

@@ -21,7 +21,7 @@ from ..mesh import Facets
 from ..numbering import supports
 from ..space import FemSpace, space_of
 from .faces import boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
-from .frames import NodalConditions, surface_of
+from .frames import NodalConditions, snapped, surface_of
 from .nodes import Nodes, asked, everywhere, joined_nodes, slots_of
 
 log = logging.getLogger(__name__)
@@ -222,9 +222,3 @@ def with_ties(space: FemSpace, name: str, nodes: Nodes, directions: Array, gap: 
     own = np.flatnonzero(space.blocks_of(every.numbers) >= 0)
     nodes, directions = joined_nodes([nodes.pick(~tied), every.pick(own)]), np.concatenate([directions[~tied], n[own]])
     return nodes, directions, np.concatenate([gap[~tied], (shares @ g)[own]])
-
-
-def snapped(directions: Array) -> Array:
-    """Turn directions to an axis where they are along it to round-off: axis-aligned walls stay unrotated."""
-    snapped = np.where(np.abs(directions) < 1e-13, 0.0, directions)
-    return np.asarray(snapped / np.linalg.norm(snapped, axis=1)[:, None])

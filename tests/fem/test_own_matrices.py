@@ -1,0 +1,274 @@
+"""Systems of scipy matrices, and contact at listed nodes: against closed forms, and against what is made by hand.
+
+Chains and bars have displacements only; Euler–Bernoulli beams and frames (tests/support/frame_elements.py) rotations
+too, and their cubic elements give static forms exactly. V2 of a user who brings matrices of his own.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from bar import bar_matrices
+from chain import chain_problem
+from frame_elements import frame, line
+
+import vi_contact as vc
+from vi_contact.core.errors import InputError
+from vi_contact.core.system import Load
+
+pytestmark = pytest.mark.serial  # numpy and scipy alone: ranks would all do the same
+EI, EA, RHO_A, L = 2.0e3, 5.0e5, 3.0, 2.0
+SECTION = {"EA": EA, "EI": EI, "rho_A": RHO_A}
+
+
+def beam(count: int = 6, **given):
+    """A horizontal beam, clamped at x = 0 unless told otherwise, under q = 100 N/m downwards."""
+    parts = frame(line([0.0, 0.0], [L, 0.0], count), [(i, i + 1) for i in range(count)], **SECTION)
+    h = L / count
+    force = np.zeros(3 * (count + 1))
+    for i in range(count):
+        force[3 * i + 1 : 3 * i + 6] += -100.0 * np.array([h / 2, h**2 / 12, 0.0, h / 2, -(h**2) / 12])
+    return vc.system_from_arrays(**(parts | {"clamped": [0, 1, 2], "load": force} | given))
+
+
+def marched(problem, steps=60, **options):
+    """States and the worst certificate of a run."""
+    states, worst = [], 0.0
+    for state, report in vc.march(problem, steps=steps, **options):
+        states.append(state)
+        worst = max(worst, report.certificate.worst)
+    assert worst <= 1e-9
+    return states
+
+
+# Displacements --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scheme", [vc.MoreauJean(), vc.ContactStabilisedNewmark()])
+def test_chain_between_walls_is_that_made_by_hand(scheme):
+    by_hand = chain_problem(8, gap=0.01, left_gap=0.02, damping=1e-4, v0=np.linspace(-1.0, 2.0, 8), floating=True)
+    M, C, K = by_hand.system.M.csr, by_hand.system.C.csr, by_hand.system.K.csr
+    system = vc.system_from_arrays(M, C.toarray(), K, coordinates=np.arange(1.0, 9.0)[:, None], v0=by_hand.system.v0)
+    surface = vc.contact_points(system, [7, 0], [[2.0], [-1.0]], weights=0.5, gap0=[0.01, 0.02])
+    problem = vc.ContactProblem(system, surface, mass=vc.ConsistentMass())
+    ours, theirs = (marched(one, steps=300, scheme=scheme, dt=2e-3) for one in (problem, by_hand))
+    assert all(np.array_equal(a.u, b.u) and np.array_equal(a.r_n, b.r_n) for a, b in zip(ours, theirs, strict=True))
+    assert any(a.active[0] for a in ours) and any(a.active[1] for a in ours)
+    assert system.floating and system.space.bodies.max() == 0
+
+
+def test_thrown_bar():
+    """Force rho c v while the wave goes forth and back, 2L/c, then the speed it came with (E = 900 Pa, L = 10 m)."""
+    n, v, c, gap = 200, 2.0, 30.0, 0.1
+    M, K = bar_matrices(n, length=10.0, E=900.0, rho=1.0)
+    system = vc.system_from_arrays(M, None, K, coordinates=line([0.0], [10.0], n), v0=np.full(n + 1, -v))
+    surface = vc.contact_points(system, [0], [-1.0], gap0=gap)
+    start, end, dt = gap / v, gap / v + 20.0 / c, 1e-3
+    states = marched(vc.ContactProblem(system, surface), steps=round((end + 0.1) / dt), dt=dt)
+    force = np.array([state.r_n[0] for state in states])
+    t = np.array([state.t for state in states])
+    held = (t > start + 0.05) & (t < end - 0.05)
+    assert force[held].mean() == pytest.approx(30.0 * v, rel=1e-3)
+    assert not force[(t < start) | (t > end + 0.03)].any()
+    assert np.mean(states[-1].v[1:]) == pytest.approx(v, rel=2e-2)
+
+
+def test_two_bars_exchange_their_speeds():
+    """Node against node: the bar that comes stops when its wave has gone forth and back, and the other leaves."""
+    n, v, c = 60, 1.0, 30.0
+    M, K = bar_matrices(n, length=10.0, E=900.0, rho=1.0)
+    points = np.concatenate([line([0.0], [10.0], n), line([10.02], [20.02], n)])
+    speeds = np.repeat([v, 0.0], n + 1)
+    system = vc.system_from_arrays(*(sp.block_diag([M, M]), None, sp.block_diag([K, K])), coordinates=points, v0=speeds)
+    assert system.space.bodies.tolist() == [0] * (n + 1) + [1] * (n + 1)
+    surface = vc.contact_points(system, [n], [1.0], opposite=[n + 1])
+    assert surface.gap0 == pytest.approx(0.02, rel=1e-12)
+    problem = vc.ContactProblem(system, surface)
+    dt = 1e-3
+    states = marched(problem, steps=round((0.02 / v + 20.0 / c + 0.1) / dt), dt=dt)
+    assert problem.cartesian(states[-1].v).reshape(2, -1).mean(axis=1) == pytest.approx([0.0, v], abs=0.02 * v)
+
+
+def test_corner_of_two_oblique_walls():
+    """A mass on springs is pressed into a corner of 60°: it stays, and the two reactions are the force's components."""
+    way = np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])
+    force = np.array([3.0, 2.0])
+    system = vc.system_from_arrays([1.0, 1.0], None, 10.0 * np.eye(2), coordinates=[[0.0, 0.0]], load=force)
+    surface = vc.contact_points(system, [0, 0], way)
+    state = vc.static_equilibrium(vc.ContactProblem(system, surface))
+    assert state.r_n == pytest.approx(np.linalg.solve(way.T, force), rel=1e-12)
+    with pytest.raises(InputError, match="several contact directions, and how they rub"):
+        vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3))
+
+
+# Rotations ------------------------------------------------------------------------------------------------------------
+
+
+def test_cantilever_on_a_stop():
+    """Tip reaction 3qL/8 - 3 EI g/L³ of an Euler–Bernoulli cantilever over a stop at the depth g."""
+    system, gap = beam(), 0.01
+    surface = vc.contact_points(system, [6], [0.0, -1.0], gap0=gap)
+    state = vc.static_equilibrium(vc.ContactProblem(system, surface))
+    assert not system.floating
+    assert state.r_n[0] == pytest.approx(3 * 100.0 * L / 8 - 3 * EI * gap / L**3, rel=1e-10)
+    assert state.u @ system.K.csr @ state.u > 0.0
+    high = vc.contact_points(system, [6], [0.0, -1.0], gap0=1.01 * 100.0 * L**4 / (8 * EI))
+    assert vc.static_equilibrium(vc.ContactProblem(system, high)).r_n == 0.0
+
+
+@pytest.mark.parametrize("normal", [(0.0, -1.0), (0.6, -0.8)])
+def test_plane_frame_on_a_stop(normal):
+    """A column of height H with an arm B, loaded at its end: r = (n·F p - g)/(n·F n), F the end's flexibility."""
+    H, B, p, gap = 3.0, 1.5, np.array([40.0, -200.0]), 0.02
+    nodes = np.concatenate([line([0.0, 0.0], [0.0, H], 4), line([0.0, H], [B, H], 3)[1:]])
+    load = np.zeros(3 * len(nodes))
+    load[-3:-1] = p
+    members = [(i, i + 1) for i in range(len(nodes) - 1)]
+    system = vc.system_from_arrays(**frame(nodes, members, **SECTION), clamped=[0, 1, 2], load=load)
+    surface = vc.contact_points(system, [len(nodes) - 1], normal, gap0=gap)
+    state = vc.static_equilibrium(vc.ContactProblem(system, surface))
+    xx, xy, yy = H**3 / 3 / EI + B / EA, -(H**2) * B / 2 / EI, (B**3 / 3 + B**2 * H) / EI + H / EA
+    F, n = np.array([[xx, xy], [xy, yy]]), np.array(normal)
+    assert state.r_n[0] == pytest.approx((n @ F @ p - gap) / (n @ F @ n), rel=1e-10)
+
+
+def test_beam_without_a_clamp_rests_on_two_points():
+    """Its rigid rotation is found although rotations are unknowns: half of q L on each support, at unequal heights."""
+    system = beam(clamped=())
+    assert system.floating
+    surface = vc.contact_points(system, [0, 6], [0.0, -1.0], gap0=[0.0, 0.003])
+    problem = vc.ContactProblem(system, surface)
+    state = vc.static_equilibrium(problem)
+    assert state.r_n == pytest.approx([100.0, 100.0], rel=1e-9)
+    alone = vc.ContactProblem(system, vc.contact_points(system, [0], [0.0, -1.0]))
+    with pytest.raises(InputError, match="no static equilibrium"):
+        vc.static_equilibrium(alone)
+
+
+@pytest.mark.parametrize("scheme", [vc.MoreauJean(), vc.ContactStabilisedNewmark(), vc.Midpoint()])
+def test_beam_strikes_a_stop_and_rubs(scheme):
+    """Ledger and certificates of an oblique stop with friction."""
+    system = beam(v0=np.tile([0.1, -1.0, 0.0], 7))
+    surface = vc.contact_points(system, [6, 3], [0.3, -1.0], gap0=0.002, weights=0.01)
+    problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.4), mass=vc.ConsistentMass())
+    probe = vc.Probe({"tip": (L, 0.0), "foot": (0.0, 0.0)})
+    found = vc.simulate(problem, scheme=scheme, dt=2e-4, steps=150, record=[vc.Energy(), vc.Contact(), probe])
+    assert found.facts["energy_defect"] <= 1e-10 and found.history["certificate"].max() <= 1e-9
+    assert found.history["contact_active"].max() >= 1 and found.history["loss_friction"][-1] > 0.0
+    assert not found.history["u_y_foot"].any() and found.history["u_y_tip"].min() < -0.001
+
+
+# Mass laws, weight, bodies --------------------------------------------------------------------------------------------
+
+
+def test_mass_of_rotations():
+    """Redistributed mass has no place for rotations; rotations without mass only beside contact nodes without any."""
+    system = beam()
+    problem = vc.ContactProblem(system, vc.contact_points(system, [6], [0.0, -1.0]))
+    with pytest.raises(InputError, match=r"no place for the inertia of rotations.*mass=ConsistentMass\(\)"):
+        marched(problem, dt=1e-3)
+    lumped = beam(M=np.tile([1.0, 1.0, 0.0], 7))
+    assert lumped.massless.sum() == 6
+    for scheme in (vc.MoreauJean(), vc.Trapezoidal()):
+        problem = vc.ContactProblem(lumped, vc.contact_points(lumped, [6], [0.0, -1.0]), mass=vc.ConsistentMass())
+        with pytest.raises(InputError, match="rows of M are zero and contact nodes have mass: condense"):
+            marched(problem, scheme=scheme, dt=1e-3)
+
+
+def test_rotations_and_tip_without_mass():
+    """The default scheme takes mass that its user has redistributed: all contact unknowns are without any."""
+    masses = np.tile([1.0, 1.0, 0.0], 7)
+    masses[-3:] = 0.0
+    system = beam(M=masses, v0=np.tile([0.0, -1.0, 0.0], 7))
+    surface = vc.contact_points(system, [6], [0.0, -1.0], gap0=0.002)
+    problem = vc.ContactProblem(system, surface, mass=vc.ConsistentMass())
+    found = vc.simulate(problem, scheme=vc.Trapezoidal(), dt=5e-4, steps=200)
+    assert found.facts["energy_defect"] <= 1e-10 and found.history["contact_active"].max() == 1
+    total = found.history["energy_kinetic"] + found.history["energy_strain"] - found.history["work_input"]
+    assert total == pytest.approx(total[0], rel=1e-2)  # 0.3 % at the impacts, of the time step
+
+
+def test_weight_counts_the_mass_shared_with_the_clamp():
+    """with_weight gives the consistent load of rho A g, as if no row were left out; so does the ground's motion."""
+    system = beam(load=None)
+    heavy = vc.with_weight(system, acceleration=100.0 / RHO_A)
+    assert heavy.load.constant == pytest.approx(beam().load.constant, rel=1e-12)
+    assert system.inertia(np.array([0.0, -100.0 / RHO_A])) == pytest.approx(beam().load.constant, rel=1e-12)
+
+
+def test_loads_with_histories_lose_the_clamped_rows():
+    vector = np.arange(21.0)
+    load = Load(vector, ((2.0 * vector, np.sin),), (lambda t: t * vector,))
+    assert beam(load=load).load(0.5) == pytest.approx((1.0 + 2.0 * np.sin(0.5) + 0.5) * vector[3:], rel=1e-15)
+
+
+def test_restart_is_the_straight_run(tmp_path):
+    system = beam(v0=np.tile([0.1, -1.0, 0.0], 7))
+    surface = vc.contact_points(system, [6, 3], [0.3, -1.0], gap0=0.002)
+    problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.4), mass=vc.ConsistentMass())
+    run = partial(vc.simulate, problem, scheme=vc.MoreauJean(), dt=2e-4, progress=False)
+    straight = run(steps=80)
+    run(steps=40, out=tmp_path)
+    again = run(steps=80, out=tmp_path, restart=True)
+    assert np.array_equal(again.state.u, straight.state.u) and np.array_equal(again.state.r_n, straight.state.r_n)
+    for name, values in straight.history.items():
+        np.testing.assert_array_equal(again.history[name], values)
+
+
+# Bad input ------------------------------------------------------------------------------------------------------------
+
+ONE, POINTS = np.eye(2), [[0.0, 0.0]]
+
+
+@pytest.mark.parametrize(("given", "said"), [
+    ({"K": np.ones((2, 3))}, r"M has shape \(2, 2\) and K has 2 rows|K has shape \(2, 3\)"),
+    ({"M": np.eye(3)}, r"M has shape \(3, 3\) and K has 2 rows; give square matrices of one size"),
+    ({"K": 1j * ONE}, "K is .*give real numbers"),
+    ({"K": sp.csr_matrix(1j * ONE)}, "K has entries of type complex128; give real numbers"),
+    ({"K": [[1.0, np.nan], [np.nan, 1.0]]}, "K is nan at"),
+    ({"K": sp.csr_matrix([[1.0, np.inf], [np.inf, 1.0]])}, "K has NaN or infinite entries"),
+    ({"K": [[1.0, 0.1], [0.0, 1.0]]}, "K is not symmetric"),
+    ({"C": [[1.0, 0.1], [-0.1, 1.0]]}, "C is not symmetric"),
+    ({"M": [1.0, -1.0]}, "M has a diagonal entry below zero"),
+    ({"M": [[0.0, 1.0], [1.0, 0.0]]}, "M has a zero on its diagonal beside other entries"),
+    ({"M": None}, "M is None"),
+    ({"coordinates": np.zeros((1, 4))}, "give 1, 2 or 3 coordinates of every node"),
+    ({"coordinates": np.zeros((3, 1))}, "K has 2 rows, and 3 nodes have 3 components; give unknowns="),
+    ({"unknowns": [[0, 0], [1, 1]]}, r"row 1 of unknowns is \[1, 1\]; give a node from 0 to 0"),
+    ({"unknowns": [[0, 0], [0, 2]]}, "component from -1 to 1"),
+    ({"unknowns": [[0, 0], [0, 0]]}, "component 0 of node 0 has several rows"),
+    ({"clamped": [2]}, "clamped goes from 2 to 2; give numbers of rows below 2"),
+    ({"load": [1.0]}, r"load has shape \(1,\)"),
+    ({"load": Load(np.zeros(3))}, r"a vector of load has shape \(3,\)"),
+    ({"u0": [0.0, np.inf]}, "u0 is inf at"),
+])
+def test_bad_matrices(given, said):
+    with pytest.raises(InputError, match=said):
+        vc.system_from_arrays(**({"M": ONE, "C": None, "K": ONE, "coordinates": POINTS} | given))
+
+
+@pytest.mark.parametrize(("given", "said"), [
+    ({"nodes": []}, "nodes is empty"),
+    ({"nodes": [7]}, "nodes has node 7, which the system has not"),
+    ({"nodes": [0.5]}, "give whole numbers"),
+    ({"normals": [0.0, 0.0]}, "the normal of node 6 is zero"),
+    ({"normals": [1.0, 0.0, 0.0]}, r"normals has shape \(3,\)"),
+    ({"weights": 0.0}, "weights has 0; give lengths or areas above zero"),
+    ({"gap0": -1e-3}, "penetrates its obstacle by 0.001 m"),
+    ({"obstacle": vc.Touching(), "gap0": 0.1}, "an obstacle says its own gaps"),
+    ({"obstacle": vc.HalfSpace((0.0, -1.0), (0.0, -1.0))}, "points into the body"),
+    ({"opposite": [6]}, "node 6 is opposite to itself"),
+    ({"nodes": [0]}, "is also prescribed along its contact direction"),
+    ({"nodes": [6, 6]}, "several contact surfaces with one contact direction"),
+])
+def test_bad_contact(given, said):
+    with pytest.raises(InputError, match=said):
+        vc.contact_points(**({"system": beam(), "nodes": [6], "normals": [0.0, -1.0]} | given))
+
+
+def test_contact_needs_nodes():
+    with pytest.raises(InputError, match="the unknowns of this system have no nodes"):
+        vc.contact_points(chain_problem(3).system, [2], [1.0])

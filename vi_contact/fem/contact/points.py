@@ -1,0 +1,94 @@
+"""Make contact conditions of listed nodes: of a user's own matrices, where nothing is known of facets."""
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from ...core.algebra import Array, Indices
+from ...core.checks import array, instance, integers, optional, provides
+from ...core.errors import InputError
+from ...core.obstacles import Obstacle, admissible_gap, facing
+from ...core.surfaces import ContactSurface
+from ...core.system import SemiDiscreteSystem
+from ..nodal_space import NodalSpace
+from .frames import Facing, NodalConditions, snapped, surface_of
+from .nodes import Nodes
+
+OWNER = "contact_points"
+
+
+def contact_points(
+    system: SemiDiscreteSystem, nodes: Any, normals: Any, *, weights: Any = None, gap0: Any = None,
+    obstacle: Obstacle | None = None, opposite: Any = None,
+) -> ContactSurface:
+    """Make one contact condition gap0 - u·n >= 0 at each listed node, in this order; also node against node.
+
+    All ranks give the same. Nodes at which the normal is oblique get frames of their own, and tangents for friction.
+
+    Args:
+        system: of ``system_from_arrays`` or ``fem.system_from_matrices``, whose numbers of nodes count.
+        nodes: (m,) numbers; a node that is listed with several normals has a condition for each of these.
+        normals: (m, d), or (d,) for all, from the body to what it may touch, of any length.
+        weights: (m,) or one for all: the length times thickness [m²], or area, of each, so that r_n / weight is a
+            pressure. None: 1, what is called a pressure then is the force in newtons.
+        gap0: (m,) or one for all, the initial gap [m], >= 0. None: zero, or what lies between node and opposite node.
+        obstacle: HalfSpace(…), AnalyticGap(…) or another, which says contact directions and gaps instead.
+        opposite: (m,) numbers of nodes of another body, each of which the node faces: the gap is gap0 - (u - u_opp)·n.
+    Raises:
+        InputError: a system of another kind, nodes that do not exist, normals of no length or along components that
+            stand still, gaps below zero, directions of one node that depend on one another.
+    """
+    instance(OWNER, "system", system, SemiDiscreteSystem, "give a system, such as system_from_arrays returns")
+    space = system.space
+    if not isinstance(space, NodalSpace):
+        raise InputError(f"{OWNER}: the unknowns of this system have no nodes; give one of system_from_arrays")
+    optional(provides, OWNER, "obstacle", obstacle, ("directions", "gap"), "give HalfSpace(…) or another")
+    if obstacle is not None and (gap0 is not None or opposite is not None):
+        raise InputError(f"{OWNER}: an obstacle says its own gaps; leave gap0 and opposite out, or the obstacle")
+    numbers = integers(OWNER, "nodes", nodes, (None,))
+    m, d = len(numbers), space.dimension
+    if not m:
+        raise InputError(f"{OWNER}: nodes is empty; list the nodes that may touch")
+    outward = _spread("normals", normals, (m, d))
+    length = np.linalg.norm(outward, axis=1)
+    if not length.all():
+        raise InputError(f"{OWNER}: the normal of node {numbers[np.argmin(length)]} is zero; give its direction")
+    area = _spread("weights", 1.0 if weights is None else weights, (m,), "m²")
+    if area.min() <= 0.0:
+        raise InputError(f"{OWNER}: weights has {area.min():g}; give lengths or areas above zero")
+    every = _nodes(space, "nodes", numbers, outward / length[:, None], area)
+    directions, faced = every.normals, None
+    gap = _spread("gap0", 0.0 if gap0 is None else gap0, (m,), "metres")
+    if obstacle is not None:
+        directions, gap = facing(obstacle, every.points, every.normals)
+    if opposite is not None:
+        faced = _nodes(space, "opposite", integers(OWNER, "opposite", opposite, (m,)), -every.normals, area)
+        if np.any(faced.numbers == numbers):
+            raise InputError(f"{OWNER}: node {numbers[faced.numbers == numbers][0]} is opposite to itself; give a node "
+                             "of the other body")
+        gap = gap if gap0 is not None else np.sum((faced.points - every.points) * directions, axis=1)
+    gap = admissible_gap(gap, every.points, space.size)
+    own = np.flatnonzero(space.blocks_of(numbers) >= 0)
+    pairs = None if faced is None else Facing(faced, sp.identity(m, format="csr")[own])
+    part = NodalConditions(every.pick(own), snapped(directions)[own], own, pairs)
+    return surface_of(space, [part], gap0=gap[own], weights=area[own])
+
+
+def _spread(meaning: str, value: Any, shape: tuple[int, ...], unit: str = "") -> Array:
+    """Values of this shape, also given once for all nodes."""
+    once = shape[1:] if np.ndim(value) < len(shape) else shape
+    return np.array(np.broadcast_to(array(OWNER, meaning, value, once, unit=unit), shape))
+
+
+def _nodes(space: NodalSpace, meaning: str, numbers: Indices, normals: Array, weights: Array) -> Nodes:
+    """What all ranks need to know of nodes. Collective."""
+    d, own = space.dimension, np.column_stack([np.ones(len(space.nodes)), space.points, space.held, space.numbers])
+    found = space.at_nodes(numbers, own)
+    for number in numbers[found[:, 0] == 0.0]:
+        raise InputError(f"{OWNER}: {meaning} has node {number}, which the system has not; its nodes are numbered from "
+                         "0 on, in the order of their coordinates")
+    for number in numbers[np.isin(numbers, space.tied_nodes)]:
+        raise InputError(f"{OWNER}: node {number} moves together with another; give fem.contact_surface(points=…)")
+    points, held, unknowns = np.split(found[:, 1:], [d, 2 * d], axis=1)
+    return Nodes(numbers, points, normals, weights, held > 0.0, unknowns.astype(np.int64))
