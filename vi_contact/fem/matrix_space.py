@@ -19,8 +19,7 @@ class MatrixSpace(NodalSpace):
         self.algebra, self.comm, self.points = algebra, algebra.comm, points
         (k, d), n, first = points.shape, len(block), algebra.first(len(block))
         self.dimension, self.unknowns = d, round(total(self.comm, n))
-        self.nodes, self.tied_nodes = algebra.first(k) + np.arange(k), np.zeros(0, dtype=np.int64)
-        self.size = bounding_box(self.comm, points)
+        self.nodes, self.size = algebra.first(k) + np.arange(k), bounding_box(self.comm, points)
         self.component, moves, every = component, component >= 0, np.arange(n)
         self.free_index = np.full(k * d, -1)
         self.free_index[(block * d + component)[moves]] = every[moves]

@@ -20,7 +20,6 @@ class NodalSpace:
         free_index: (k d,) the owned unknown that a component is, -1 where it is none; numbers: (k, d) the same among
             those of all ranks, also of a component that follows another; held: (k, d) components that are given.
         ids: (n,) numbers of the owned unknowns on any ranks (node * d + component); unknowns: how many on all ranks.
-        tied_nodes: numbers of all nodes that move together with another, on every rank.
     """
 
     algebra: Algebra
@@ -34,7 +33,6 @@ class NodalSpace:
     held: Mask
     ids: Indices
     unknowns: int
-    tied_nodes: Indices
 
     def expand(self, u: Array, t: float, derivative: int = 0) -> Array:
         """Expand a vector of unknowns (n,) at time t -> displacements of owned nodes (k, d), or their derivatives."""

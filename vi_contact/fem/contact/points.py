@@ -11,7 +11,7 @@ from ...core.errors import InputError
 from ...core.obstacles import Obstacle, admissible_gap, facing
 from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
-from ..nodal_space import NodalSpace
+from ..matrix_space import MatrixSpace
 from .frames import Facing, NodalConditions, snapped, surface_of
 from .nodes import Nodes
 
@@ -41,8 +41,8 @@ def contact_points(
     """
     instance(OWNER, "system", system, SemiDiscreteSystem, "give a system, such as system_from_arrays returns")
     space = system.space
-    if not isinstance(space, NodalSpace):
-        raise InputError(f"{OWNER}: the unknowns of this system have no nodes; give one of system_from_arrays")
+    if not isinstance(space, MatrixSpace):
+        raise InputError(f"{OWNER} needs a system of own matrices; fem.contact_surface(points=…) is for fem.assemble")
     optional(provides, OWNER, "obstacle", obstacle, ("directions", "gap"), "give HalfSpace(…) or another")
     if obstacle is not None and (gap0 is not None or opposite is not None):
         raise InputError(f"{OWNER}: an obstacle says its own gaps; leave gap0 and opposite out, or the obstacle")
@@ -55,8 +55,6 @@ def contact_points(
     if not length.all():
         raise InputError(f"{OWNER}: the normal of node {numbers[np.argmin(length)]} is zero; give its direction")
     area = _spread("weights", 1.0 if weights is None else weights, (m,), "m²")
-    if area.min() <= 0.0:
-        raise InputError(f"{OWNER}: weights has {area.min():g}; give lengths or areas above zero")
     every = _nodes(space, "nodes", numbers, outward / length[:, None], area)
     directions, faced = every.normals, None
     gap = _spread("gap0", 0.0 if gap0 is None else gap0, (m,), "metres")
@@ -64,9 +62,6 @@ def contact_points(
         directions, gap = facing(obstacle, every.points, every.normals)
     if opposite is not None:
         faced = _nodes(space, "opposite", integers(OWNER, "opposite", opposite, (m,)), -every.normals, area)
-        if np.any(faced.numbers == numbers):
-            raise InputError(f"{OWNER}: node {numbers[faced.numbers == numbers][0]} is opposite to itself; give a node "
-                             "of the other body")
         gap = gap if gap0 is not None else np.sum((faced.points - every.points) * directions, axis=1)
     gap = admissible_gap(gap, every.points, space.size)
     own = np.flatnonzero(space.blocks_of(numbers) >= 0)
@@ -81,14 +76,12 @@ def _spread(meaning: str, value: Any, shape: tuple[int, ...], unit: str = "") ->
     return np.array(np.broadcast_to(array(OWNER, meaning, value, once, unit=unit), shape))
 
 
-def _nodes(space: NodalSpace, meaning: str, numbers: Indices, normals: Array, weights: Array) -> Nodes:
+def _nodes(space: MatrixSpace, meaning: str, numbers: Indices, normals: Array, weights: Array) -> Nodes:
     """What all ranks need to know of nodes. Collective."""
     d, own = space.dimension, np.column_stack([np.ones(len(space.nodes)), space.points, space.held, space.numbers])
     found = space.at_nodes(numbers, own)
     for number in numbers[found[:, 0] == 0.0]:
         raise InputError(f"{OWNER}: {meaning} has node {number}, which the system has not; its nodes are numbered from "
                          "0 on, in the order of their coordinates")
-    for number in numbers[np.isin(numbers, space.tied_nodes)]:
-        raise InputError(f"{OWNER}: node {number} moves together with another; give fem.contact_surface(points=…)")
     points, held, unknowns = np.split(found[:, 1:], [d, 2 * d], axis=1)
     return Nodes(numbers, points, normals, weights, held > 0.0, unknowns.astype(np.int64))
