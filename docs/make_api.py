@@ -3,6 +3,9 @@
     python3 docs/make_api.py            # write the page
     python3 docs/make_api.py --check    # status 1 and one sentence when the page is not what the docstrings say
 
+It also writes ``__init__.pyi`` beside every list of public names: they are imported when they are first used, which
+checkers of types and editors do not see, so that for them every name of ``vc.`` could be anything.
+
 The source is parsed, never imported: signatures stand as they are written, and neither DOLFINx nor PETSc is needed.
 """
 
@@ -314,13 +317,32 @@ def page() -> str:
     return re.sub(r"\n{3,}", "\n\n", "\n".join(parts)).rstrip() + "\n"
 
 
+def stub(where: Module) -> str:
+    """Return the public names of a package as imports that a checker of types follows."""
+    lines = ["# ruff: noqa", "# Made from __init__.py by docs/make_api.py, for checkers of types and editors."]
+    for part, names in contents(where).items():
+        lines += [f"from .{part} import {name} as {name}" for name in names] or [f"from . import {part} as {part}"]
+    return "\n".join([*lines, "", f"__all__: list[str] = {sorted(public(where)) or sorted(contents(where))}", ""])
+
+
+def files() -> Iterator[tuple[Path, str]]:
+    """Yield every file that is made here, and what it holds."""
+    yield PAGE, page()
+    for path in sorted(PACKAGE.rglob("__init__.py")):
+        where = module(path.parent.relative_to(PACKAGE).as_posix().replace("/", ".").strip("."))
+        if assigned(where, "_CONTENTS") is not None:
+            yield path.with_suffix(".pyi"), stub(where)
+
+
 def main(arguments: list[str]) -> int:
-    """Write the page, or compare it."""
-    if "--check" not in arguments:
-        PAGE.write_text(page(), encoding="utf-8")
-    elif PAGE.read_text(encoding="utf-8") != page():
-        print("docs/reference/api.md is not what the docstrings say: run python3 docs/make_api.py", file=sys.stderr)
-        return 1
+    """Write the page and the stubs, or compare them."""
+    for path, text in files():
+        if "--check" not in arguments:
+            path.write_text(text, encoding="utf-8")
+        elif not path.is_file() or path.read_text(encoding="utf-8") != text:
+            name = path.relative_to(ROOT).as_posix()
+            print(f"{name} is not what the docstrings say: run python3 docs/make_api.py", file=sys.stderr)
+            return 1
     return 0
 
 

@@ -127,7 +127,7 @@ def circles(found: list[Import]) -> list[str]:
 def test_every_room_has_its_row_and_nothing_lies_at_the_root():
     assert set(ROOMS) == {room_of(module) for module in SOURCES} - ROOT_MODULES
     loose = {path.name for path in PACKAGE.iterdir() if path.is_file()}
-    assert loose <= {"__init__.py", "__main__.py", "py.typed"}
+    assert loose <= {"__init__.py", "__init__.pyi", "__main__.py", "py.typed"}
 
 
 def test_imports_point_down():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 import sys
 import tomllib
 from fnmatch import fnmatch
@@ -59,6 +61,79 @@ def test_the_cases_that_ship_are_installed() -> None:
     files = sorted(path.relative_to(FOLDER.parent).as_posix() for path in FOLDER.rglob("*") if path.is_file())
     assert len(files) == 4 and all(any(fnmatch(file, one) for one in patterns) for file in files)
     others = [path for path in (ROOT / "vi_contact").rglob("*") if path.is_file() and "__pycache__" not in path.parts
-              and path.suffix not in (".py", ".toml", ".typed")]
-    named = project["tool"]["setuptools"]["package-data"]["vi_contact.core"]
+              and path.suffix not in (".py", ".pyi", ".toml", ".typed")]
+    data = project["tool"]["setuptools"]["package-data"]
+    assert data["vi_contact"] == ["py.typed"] and data["*"] == ["*.pyi"]  # checkers of types look for them
+    assert (ROOT / "vi_contact" / "py.typed").read_bytes() == b""
+    named = data["vi_contact.core"]
     assert [path.relative_to(ROOT / "vi_contact" / "core").as_posix() for path in others] == named
+
+
+def ran(script: str, **environment: str) -> str:
+    """What a script prints in a process of its own."""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=ROOT, check=False,
+                          env={**os.environ, **environment})
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+@pytest.mark.serial
+def test_finite_elements_without_dolfinx_say_how_to_get_it() -> None:
+    """All else is imported; a module of the room says the same as the room, and so does the command line."""
+    told = ran("""
+import sys
+sys.modules["dolfinx"] = None
+import vi_contact as vc
+vc.simulate, vc.Condensed, vc.GroundMotion
+for name in ("vi_contact.fem", "vi_contact.fem.compat"):
+    try:
+        __import__(name)
+    except ModuleNotFoundError as error:
+        print(error, error.name)
+""").splitlines()
+    assert len(told) == 2 and told[0] == told[1]
+    assert told[0].startswith("vi_contact.fem needs DOLFINx, which is missing") and told[0].endswith("dolfinx")
+
+
+@pytest.mark.serial
+def test_runs_without_h5py_need_no_folder(tmp_path: Path) -> None:
+    """In a virtual environment of its own pip leaves h5py out on Python 3.11: a run keeps its rows in memory then."""
+    told = ran(f"""
+import sys
+sys.path.insert(0, {str(ROOT / "tests" / "support")!r})
+sys.modules["h5py"] = None  # as find_spec sees what is missing
+from chain import chain_problem
+import vi_contact as vc
+run = dict(dt=1e-3, steps=2, scheme=vc.Midpoint(), progress=False)
+solution = vc.simulate(chain_problem(3), **run)
+print(solution.facts["status"], len(solution.plot().axes))
+try:
+    vc.simulate(chain_problem(3), **run, out={str(tmp_path / "run")!r})
+except vc.InputError as error:
+    print(error)
+""").splitlines()
+    assert told[0] == "finished 3" and told[1].endswith("needs h5py, which is missing here: install it, or run without")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.serial
+def test_nothing_is_done_to_conda(tmp_path: Path) -> None:
+    """Importing takes nothing from CONDA_PREFIX and leaves nothing there; installing runs no code of this project."""
+    for name in ("bin/python", "lib/python3.11/site-packages/numpy/__init__.py", "etc/conda/activate.d/a.sh"):
+        (tmp_path / name).parent.mkdir(parents=True)
+        (tmp_path / name).write_text("raise SystemExit(1)\n")
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")}
+    script = """
+import os, sys
+import vi_contact as vc
+vc.simulate, vc.Condensed, vc.read_run
+from vi_contact import fem
+fem.assemble
+used = [one for one in (*sys.path, *(getattr(m, "__file__", None) or "" for m in list(sys.modules.values())))]
+print(os.environ["CONDA_PREFIX"], sum(os.environ["CONDA_PREFIX"] in one for one in used))
+"""
+    assert ran(script, CONDA_PREFIX=str(tmp_path), CONDA_DEFAULT_ENV="marker") == f"{tmp_path} 0"
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")} == before
+    build = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["build-system"]
+    assert build["build-backend"] == "setuptools.build_meta" and "backend-path" not in build
+    assert not (ROOT / "setup.py").exists() and not (ROOT / "setup.cfg").exists()

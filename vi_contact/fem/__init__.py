@@ -9,7 +9,15 @@ In this order: ``build_mesh`` or ``read_mesh``, ``assemble``, ``contact_surface`
 3
 """
 
+from importlib.util import find_spec
+
 from ..core.lazy import lazy
+
+if find_spec("dolfinx") is None:
+    raise ModuleNotFoundError(
+        "vi_contact.fem needs DOLFINx, which is missing here and which pip does not have: install it by apt (on Debian "
+        "python3-dolfinx-real, and make virtual environments with --system-site-packages) or by conda (fenics-dolfinx "
+        "of conda-forge), see docs/start/install.md", name="dolfinx")
 
 _CONTENTS = {
     "assembly": ("assemble",),

@@ -1,18 +1,20 @@
 """Draw in one figure what a person wants to see of a run first."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..run.files.reading import RunFolder
-from ..run.solution import Solution
 from ..solvers.certified import TOLERANCE
 from .histories import draw_ledger, length_unit, log_axis, panels, plain, scaled
+
+if TYPE_CHECKING:  # a solution without a folder is drawn where h5py is missing
+    from ..run.files.reading import RunFolder
+    from ..run.solution import Solution
 
 CURVES = 8  # of probes: beyond, nobody tells them apart
 
 
-def plot_overview(run: Solution | RunFolder) -> Any:
+def plot_overview(run: "Solution | RunFolder") -> Any:
     """Return a matplotlib Figure: the displacements of probes (the first 8), the contact force, the energy ledger, each
     where it was recorded, and the certificate of every step."""
     history, t = run.history, run.history["t"]

@@ -12,6 +12,7 @@ import socket
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,8 @@ _held: dict[Path, int] = {}  # locks that this process has -> the thread that to
 def run_folder(comm: Comm, path: str | Path) -> Path:
     """Make the folder, with parents, and try to write into it, before any work is done; InputError if not."""
     folder = Path(path)
+    if find_spec("h5py") is None:
+        raise InputError(f"output folder '{folder}' needs h5py, which is missing here: install it, or run without")
 
     def make() -> None:
         try:

@@ -84,8 +84,9 @@ def turn_of(run: object) -> Iterator[None]:
 def versions(*needed: str) -> dict[str, str]:
     """Return the version of everything that computes in this process, and of what else is needed to write."""
     for name in needed:
-        import_module(name)
-    names = [name for name in ("numpy", "scipy", "h5py", "petsc4py", "mpi4py", "dolfinx") if name in sys.modules]
+        with suppress(ModuleNotFoundError):  # nothing is written, else the folder was refused
+            import_module(name)
+    names = [name for name in ("numpy", "scipy", "h5py", "petsc4py", "mpi4py", "dolfinx") if sys.modules.get(name)]
     own = {"vi_contact": __version__, "python": platform.python_version()}
     return own | {name: str(sys.modules[name].__version__) for name in names}
 

@@ -1,0 +1,17 @@
+# ruff: noqa
+# Made from __init__.py by docs/make_api.py, for checkers of types and editors.
+from .floor_spectra import TransferFunction as TransferFunction
+from .floor_spectra import floor_spectrum as floor_spectrum
+from .floor_spectra import recorded_motion as recorded_motion
+from .floor_spectra import transfer_function as transfer_function
+from .modal import lowest_frequency as lowest_frequency
+from .peak_values import Loop as Loop
+from .peak_values import Peak as Peak
+from .peak_values import hysteresis as hysteresis
+from .peak_values import peaks as peaks
+from .peak_values import write_peaks as write_peaks
+from .racking import Racking as Racking
+from .resultants import Resultants as Resultants
+from .resultants import contact_summary as contact_summary
+
+__all__: list[str] = ['Loop', 'Peak', 'Racking', 'Resultants', 'TransferFunction', 'contact_summary', 'floor_spectrum', 'hysteresis', 'lowest_frequency', 'peaks', 'recorded_motion', 'transfer_function', 'write_peaks']

@@ -1,0 +1,28 @@
+# ruff: noqa
+# Made from __init__.py by docs/make_api.py, for checkers of types and editors.
+from .bodies import film as film
+from .bodies import plot_deformed as plot_deformed
+from .deformed import read_frames as read_frames
+from .deformed import read_tractions as read_tractions
+from .faces import plot_faces as plot_faces
+from .histories import plot_certificate as plot_certificate
+from .histories import plot_energy as plot_energy
+from .histories import plot_excitation as plot_excitation
+from .histories import plot_points as plot_points
+from .histories import plot_runs as plot_runs
+from .maps import plot_contact as plot_contact
+from .overview import plot_overview as plot_overview
+from .records import plot_loop as plot_loop
+from .records import plot_motion as plot_motion
+from .records import plot_spectra as plot_spectra
+from .records import plot_transfer as plot_transfer
+from .rendered import render_deformed as render_deformed
+from .report import plot_report as plot_report
+from .run_pictures import draw_run as draw_run
+from .studies import plot_beam_energies as plot_beam_energies
+from .studies import plot_ida as plot_ida
+from .studies import plot_particle as plot_particle
+from .studies import plot_shapes as plot_shapes
+from .studies import plot_tips as plot_tips
+
+__all__: list[str] = ['draw_run', 'film', 'plot_beam_energies', 'plot_certificate', 'plot_contact', 'plot_deformed', 'plot_energy', 'plot_excitation', 'plot_faces', 'plot_ida', 'plot_loop', 'plot_motion', 'plot_overview', 'plot_particle', 'plot_points', 'plot_report', 'plot_runs', 'plot_shapes', 'plot_spectra', 'plot_tips', 'plot_transfer', 'read_frames', 'read_tractions', 'render_deformed']

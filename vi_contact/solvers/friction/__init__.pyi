@@ -1,0 +1,12 @@
+# ruff: noqa
+# Made from __init__.py by docs/make_api.py, for checkers of types and editors.
+from .extrapolation import Anderson as Anderson
+from .extrapolation import Plain as Plain
+from .fixed_point import FixedPoint as FixedPoint
+from .given_forces import GivenForces as GivenForces
+from .newton import FrictionNewton as FrictionNewton
+from .nsgs import NSGS as NSGS
+from .slip_rate import RateIteration as RateIteration
+from .uzawa import Uzawa as Uzawa
+
+__all__: list[str] = ['Anderson', 'FixedPoint', 'FrictionNewton', 'GivenForces', 'NSGS', 'Plain', 'RateIteration', 'Uzawa']

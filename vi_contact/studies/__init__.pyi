@@ -1,0 +1,8 @@
+# ruff: noqa
+# Made from __init__.py by docs/make_api.py, for checkers of types and editors.
+from .cases.case import Case as Case
+from .cases.case import read_case as read_case
+from .ida.ida import IDA as IDA
+from .ida.ida import run_ida as run_ida
+
+__all__: list[str] = ['Case', 'IDA', 'read_case', 'run_ida']
