@@ -45,24 +45,27 @@ def with_field(problem: ContactProblem, A: Any) -> vc.State:
     return replace(initial_state(problem), u=u, v=2.0 * u)
 
 
-def on_sides(comm: Any, A: Any, **spec: Any) -> ContactProblem:
+def on_sides(comm: Any, A: Any, integration: Any = "full", degree: int = 1, **spec: Any) -> ContactProblem:
     """A body whose left side is moved by the field A x, and whose right side may touch an obstacle that is oblique."""
     mesh, tags = block(comm, **spec)
     grown = fem.Prescribed(tags["left"], displacement=lambda x, t: x @ A.T, velocity=lambda x, t: 2.0 * x @ A.T,
                            acceleration=lambda x, t: 0.0 * x)
-    system = fem.assemble(mesh, CONCRETE, prescribed=grown)
+    system = fem.assemble(mesh, CONCRETE, prescribed=grown, integration=integration, degree=degree)
     d = mesh.geometry.dim
     wall = vc.HalfSpace((3.0,) * d, (-1.0,) * d)
     return ContactProblem(system, fem.contact_surface(system, tags["right"], obstacle=wall))
 
 
-@pytest.mark.parametrize("body", [name for name in BODIES if name != "bar"])
-def test_values_of_a_state(comm: Any, body: str) -> None:
+@pytest.mark.parametrize("body, options", [
+    *((name, {}) for name in BODIES if name != "bar"), ("quadrilaterals", {"integration": "selective"}),
+    ("triangles", {"degree": 2}), ("quadrilaterals", {"degree": 2}),
+], ids=str)
+def test_values_of_a_state(comm: Any, body: str, options: dict[str, Any]) -> None:
     """u and v are those of the state in Cartesian axes, though contact frames are turned, with the prescribed sides and
     with ghosts; the stress of a patch is Hooke's, in every cell and projected."""
     d = len(BODIES[body]["lengths"])
     A = 1e-4 * np.array([[1.0, 2.0, -1.0], [0.5, -3.0, 0.25], [2.0, 0.125, 1.5]])[:d, :d]
-    problem = on_sides(comm, A, **BODIES[body])
+    problem = on_sides(comm, A, **options, **BODIES[body])
     state = with_field(problem, A)
     assert not np.allclose(problem.cartesian(state.u), state.u) or comm.size > 1
     for name, factor in (("u", 1.0), ("v", 2.0)):

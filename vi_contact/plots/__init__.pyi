@@ -19,10 +19,6 @@ from .records import plot_transfer as plot_transfer
 from .rendered import render_deformed as render_deformed
 from .report import plot_report as plot_report
 from .run_pictures import draw_run as draw_run
-from .studies import plot_beam_energies as plot_beam_energies
 from .studies import plot_ida as plot_ida
-from .studies import plot_particle as plot_particle
-from .studies import plot_shapes as plot_shapes
-from .studies import plot_tips as plot_tips
 
-__all__: list[str] = ['draw_run', 'film', 'plot_beam_energies', 'plot_certificate', 'plot_contact', 'plot_deformed', 'plot_energy', 'plot_excitation', 'plot_faces', 'plot_ida', 'plot_loop', 'plot_motion', 'plot_overview', 'plot_particle', 'plot_points', 'plot_report', 'plot_runs', 'plot_shapes', 'plot_spectra', 'plot_tips', 'plot_transfer', 'read_frames', 'read_tractions', 'render_deformed']
+__all__: list[str] = ['draw_run', 'film', 'plot_certificate', 'plot_contact', 'plot_deformed', 'plot_energy', 'plot_excitation', 'plot_faces', 'plot_ida', 'plot_loop', 'plot_motion', 'plot_overview', 'plot_points', 'plot_report', 'plot_runs', 'plot_spectra', 'plot_transfer', 'read_frames', 'read_tractions', 'render_deformed']
