@@ -25,7 +25,8 @@ from .output.functions import as_function as as_function
 from .output.functions import read_function as read_function
 from .output.reactions import Reactions as Reactions
 from .output.section_forces import SectionForces as SectionForces
+from .petsc_system import system_from_matrices as system_from_matrices
 from .released_supports import release as release
 from .ties import Tied as Tied
 
-__all__: list[str] = ['BodyForce', 'Cells', 'CompliantBase', 'Dashpots', 'DualMortar', 'Facets', 'Heterogeneous', 'NodeToNode', 'Prescribed', 'Reactions', 'SectionForces', 'Tags', 'TangentialTraction', 'Tied', 'Traction', 'XDMF', 'as_function', 'assemble', 'build_mesh', 'contact_pair', 'contact_surface', 'geometric_stiffness', 'joined_surfaces', 'node_numbers', 'read_function', 'read_mesh', 'release']
+__all__: list[str] = ['BodyForce', 'Cells', 'CompliantBase', 'Dashpots', 'DualMortar', 'Facets', 'Heterogeneous', 'NodeToNode', 'Prescribed', 'Reactions', 'SectionForces', 'Tags', 'TangentialTraction', 'Tied', 'Traction', 'XDMF', 'as_function', 'assemble', 'build_mesh', 'contact_pair', 'contact_surface', 'geometric_stiffness', 'joined_surfaces', 'node_numbers', 'read_function', 'read_mesh', 'release', 'system_from_matrices']
