@@ -22,7 +22,7 @@ from vi_contact.cli.entry import main
 from vi_contact.cli.errors import printable
 
 pytestmark = pytest.mark.serial
-COUNT = 300
+COUNT = 120
 NUMBER = ["nan", "x", "", "1e400e", "1_0x", "--", "\0"]  # no number at all
 POSITIVE = ["0", "-1", "inf", "1e400", *NUMBER]
 COUNTED = ["0", "-3", "2.5", "1e3", "1" * 5000, "nan", "x", ""]

@@ -96,6 +96,15 @@ def cold(tmp_path: Path, monkeypatch: Any) -> Any:
     compiled._library.cache_clear()
 
 
+@pytest.fixture
+def small(cold: Path, monkeypatch: Any) -> Path:
+    """A source of the same names that compiles in no time."""
+    source = cold.with_name("small.c")
+    source.write_text("long columns(void) { return 1; }\ndouble relax(void) { return 1.0; }\n")
+    monkeypatch.setattr(compiled, "SOURCE", source)
+    return source
+
+
 @pytest.mark.parametrize("how", ["no compiler", "no header", "no cache"])
 def test_without_it_today_s_factor_serves_and_the_log_says_so_once(
     how: str, cold: Path, monkeypatch: Any, caplog: Any
@@ -113,7 +122,7 @@ def test_without_it_today_s_factor_serves_and_the_log_says_so_once(
     assert not cold.is_dir() or not list(cold.iterdir())
 
 
-def test_a_file_that_cannot_be_loaded_is_made_again(cold: Path) -> None:
+def test_a_file_that_cannot_be_loaded_is_made_again(small: Path) -> None:
     """As after a change of CHOLMOD."""
     file = compiled.compiled()
     file.write_bytes(b"not a library")
@@ -121,9 +130,10 @@ def test_a_file_that_cannot_be_loaded_is_made_again(cold: Path) -> None:
     assert compiled.compiled() == file and file.stat().st_size > 1000 and file.stat().st_mtime > 0
 
 
-def test_processes_that_compile_at_once_do_not_meet(cold: Path) -> None:
+def test_processes_that_compile_at_once_do_not_meet(small: Path, cold: Path) -> None:
     """Both find it missing, both make it, one file is left, and each has loaded a whole one."""
-    script = "from vi_contact.core.compiled import compiled; print(compiled())"
+    script = f"import pathlib; from vi_contact.core import compiled; compiled.SOURCE = pathlib.Path({str(small)!r}); " \
+             "print(compiled.compiled())"
     runs = [subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) for _ in range(2)]
     told = {run.communicate()[0].strip() for run in runs}
     assert all(run.returncode == 0 for run in runs) and told == {str(file) for file in cold.iterdir()}

@@ -21,7 +21,7 @@ from vi_contact.core.errors import InputError
 from vi_contact.ground_motion import UNITS, Record, read_record
 
 pytestmark = pytest.mark.serial
-COUNT = 3000
+COUNT = 1200
 G10 = 98.0665
 TABLE = "".join(f"{0.02 * k:.2f};{v:.4f}\n" for k, v in enumerate(VALUES))
 AT2 = "PEER NGA\nA TITLE, 5/19/40\nACCELERATION TIME SERIES IN UNITS OF CM/S2\nNPTS=    11, DT=   .0200 SEC\n"

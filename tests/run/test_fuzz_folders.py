@@ -30,7 +30,7 @@ from vi_contact.run.simulate import Solution
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 
 pytestmark = pytest.mark.serial
-CHECKPOINTS, FOLDERS, SECONDS, SEED = 400, 100, 10.0, 0  # how many, and what one may take at most
+CHECKPOINTS, FOLDERS, SECONDS, SEED = 160, 50, 10.0, 0  # how many, and what one may take at most
 Dice = np.random.Generator
 Arrays = dict[str, Any]
 PROBLEM = chain()
@@ -170,7 +170,7 @@ def mutated(data: bytes, dice: Dice) -> tuple[bytes, bool]:
 
 
 def test_checkpoints(sound: Path, tmp_path: Path) -> None:
-    """400 of them. Where a checksum was forged, numbers may be others, but are finite and of the right shape."""
+    """160 of them. Where a checksum was forged, numbers may be others, but are finite and of the right shape."""
     good = (sound / "checkpoint.npz").read_bytes()
     wanted = read(sound)
     refused = 0

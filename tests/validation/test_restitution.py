@@ -25,7 +25,7 @@ from vi_contact.schemes.moreau_jean import MoreauJean
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 
 SPEED, MASS = 10.0, 10.0  # V1.1: of the approach [m/s], of the bar [kg] for a unit area
-MESHES, RESTITUTIONS = (1, 5, 20, 80, 320), (0.0, 0.5, 1.0)
+MESHES, RESTITUTIONS = (1, 5, 20, 80, 160), (0.0, 0.5, 1.0)
 COURANT, END = 0.45, 1.3  # the gap closes well inside a step: no tie that round-off decides; contact ends at 7/6 s
 LAWS = {
     "reset": lambda e: (ZienkiewiczWoodTaylor(), Newton(e)),
@@ -58,7 +58,7 @@ def test_a_single_mass_rebounds_with_e(law: str, e: float) -> None:
 def test_the_rebound_of_a_bar_tends_to_one_for_every_restitution(law: str) -> None:
     """V1.1, Courant number 0.45: with every finer mesh less of the full rebound is missing, and e changes less of it.
 
-    Of 320 elements 0.6 % are missing at most and e = 0, ½, 1 differ by less than 0.1 %; of one element 34 to 50 % are
+    Of 160 elements 1 % are missing at most and e = 0, ½, 1 differ by 0.4 % (of 320 0.6 and 0.1 %); of one element 34 to 50 % are
     missing and e decides on 13 to 21 %, without being the rebound even there.
     """
     table = np.array([[rebound(n, *LAWS[law](e)) for n in MESHES] for e in RESTITUTIONS])
@@ -66,7 +66,7 @@ def test_the_rebound_of_a_bar_tends_to_one_for_every_restitution(law: str) -> No
     assert table.max() < 1.0
     assert np.all(np.diff(missing) < 0.0) and np.all(np.diff(differences) < 0.0)
     assert missing[0] > 0.3 and differences[0] > 0.1
-    assert missing[-1] < 6e-3 and differences[-1] < 1e-3
+    assert missing[-1] < 1.2e-2 and differences[-1] < 5e-3
 
 
 @pytest.mark.serial
