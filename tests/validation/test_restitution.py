@@ -58,8 +58,8 @@ def test_a_single_mass_rebounds_with_e(law: str, e: float) -> None:
 def test_the_rebound_of_a_bar_tends_to_one_for_every_restitution(law: str) -> None:
     """V1.1, Courant number 0.45: with every finer mesh less of the full rebound is missing, and e changes less of it.
 
-    Of 160 elements 1 % are missing at most and e = 0, ½, 1 differ by 0.4 % (of 320 0.6 and 0.1 %); of one element 34 to 50 % are
-    missing and e decides on 13 to 21 %, without being the rebound even there.
+    Of 160 elements 1 % are missing at most and e = 0, ½, 1 differ by 0.4 % (of 320 0.6 and 0.1 %); of one element 34
+    to 50 % are missing and e decides on 13 to 21 %, without being the rebound even there.
     """
     table = np.array([[rebound(n, *LAWS[law](e)) for n in MESHES] for e in RESTITUTIONS])
     missing, differences = np.max(1.0 - table, axis=0), np.ptp(table, axis=0)
