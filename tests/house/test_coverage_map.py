@@ -37,9 +37,10 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "engineering/test_resultants.py":
         "engineering.floor_spectra engineering.peak_values engineering.racking plots.maps",
     "exact/test_exact_hertz.py": "exact.hertz",
-    "fem/test_assembly.py": "fem.assembly_checks fem.forms",
+    "fem/test_assembly.py": "fem.assembly_checks",
     "fem/test_corners.py": "core.corners laws.mass_transfer",
     "fem/test_forces_in_space.py": "fem.output.cut_cells",
+    "fem/test_forms.py": "fem.form_checks fem.own_forms",
     "fem/test_heterogeneous.py": "fem.quadrature laws.kelvin_voigt",
     "fem/test_mortar_in_space.py": "fem.contact.clipping fem.contact.sight",
     "fem/test_pairs.py": "fem.contact.matching",

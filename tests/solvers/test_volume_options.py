@@ -60,6 +60,7 @@ class Rubbing:
     def __init__(self, c: Case, friction: Any) -> None:
         self.surface, self.friction = c.step.surface, friction
         self.frictional = not isinstance(friction, Frictionless)
+        self.system = c.step.A  # for its algebra
 
 
 def test_friction_is_refused_with_the_methods_that_carry_it(pushed: Case) -> None:

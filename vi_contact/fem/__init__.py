@@ -31,6 +31,7 @@ _CONTENTS = {
     "initial_stress": ("geometric_stiffness",),
     "loads": ("BodyForce", "Prescribed", "TangentialTraction", "Traction"),
     "mesh": ("Cells", "Facets", "Tags", "build_mesh", "node_numbers", "read_mesh"),
+    "own_forms": ("Forms",),
     "output.fields": ("XDMF",),
     "output.functions": ("as_function", "read_function"),
     "output.reactions": ("Reactions",),

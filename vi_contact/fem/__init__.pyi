@@ -20,6 +20,7 @@ from .mesh import Tags as Tags
 from .mesh import build_mesh as build_mesh
 from .mesh import node_numbers as node_numbers
 from .mesh import read_mesh as read_mesh
+from .own_forms import Forms as Forms
 from .output.fields import XDMF as XDMF
 from .output.functions import as_function as as_function
 from .output.functions import read_function as read_function
@@ -29,4 +30,4 @@ from .petsc_system import system_from_matrices as system_from_matrices
 from .released_supports import release as release
 from .ties import Tied as Tied
 
-__all__: list[str] = ['BodyForce', 'Cells', 'CompliantBase', 'Dashpots', 'DualMortar', 'Facets', 'Heterogeneous', 'NodeToNode', 'Prescribed', 'Reactions', 'SectionForces', 'Tags', 'TangentialTraction', 'Tied', 'Traction', 'XDMF', 'as_function', 'assemble', 'build_mesh', 'contact_pair', 'contact_surface', 'geometric_stiffness', 'joined_surfaces', 'node_numbers', 'read_function', 'read_mesh', 'release', 'system_from_matrices']
+__all__: list[str] = ['BodyForce', 'Cells', 'CompliantBase', 'Dashpots', 'DualMortar', 'Facets', 'Forms', 'Heterogeneous', 'NodeToNode', 'Prescribed', 'Reactions', 'SectionForces', 'Tags', 'TangentialTraction', 'Tied', 'Traction', 'XDMF', 'as_function', 'assemble', 'build_mesh', 'contact_pair', 'contact_surface', 'geometric_stiffness', 'joined_surfaces', 'node_numbers', 'read_function', 'read_mesh', 'release', 'system_from_matrices']

@@ -27,6 +27,7 @@ from .dashpots import DashpotMatrix, Dashpots, describe_boundaries
 from .forms import ElasticForms, Materials, cell_materials
 from .loads import ActingLoad, BodyForce, Prescribed, Traction, as_tuple, evaluate
 from .mesh import Cells, Facets
+from .own_forms import Forms, OwnForms
 from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
 from .petsc_rows import moved
 from .quadrature import compiled
@@ -39,9 +40,10 @@ Initial = Field | Sequence[tuple[Cells, Field]] | None
 
 @stage("assembling")
 def assemble(
-    mesh: Any, material: Materials, *, section: Section | None = None, clamped: Facets | Sequence[Facets] = (),
-    prescribed: Prescribed | Sequence[Prescribed] = (), tied: Tied | Sequence[Tied] = (),
-    dashpots: Dashpots | Sequence[Dashpots] = (), loads: Traction | BodyForce | Sequence[Traction | BodyForce] = (),
+    mesh: Any, material: Materials | None = None, *, forms: Forms | None = None, section: Section | None = None,
+    clamped: Facets | Sequence[Facets] = (), prescribed: Prescribed | Sequence[Prescribed] = (),
+    tied: Tied | Sequence[Tied] = (), dashpots: Dashpots | Sequence[Dashpots] = (),
+    loads: Traction | BodyForce | Sequence[Traction | BodyForce] = (),
     damping: Damping | None = None, initial_displacement: Initial = None, initial_velocity: Initial = None,
     base_inertia: bool = True, degree: int = 1, quadrature_degree: int | None = None, integration: str = "full",
 ) -> SemiDiscreteSystem:
@@ -51,6 +53,8 @@ def assemble(
         mesh: DOLFINx mesh (``read_mesh``), cells of first order or, with degree 2, of second order too.
         degree: of the displacement in each cell: 1 for P1 or Q1, 2 for P2 or Q2 (docs/guide/second_order.md).
         material: LinearElastic, Orthotropic or fem.Heterogeneous, or (cells, material) pairs that cover the mesh.
+        forms: the user's own weak forms, ``fem.Forms``; a material beside them gives the density where they have no
+            mass, and the wave speeds that dashpots and free fields ask for.
         section: PlaneStrain() by default in 2D (Solid() in 3D); PlaneStress(thickness) for panels.
         clamped: facets with u = 0; prescribed: facets that move (eq. 3) or are held in some components.
         dashpots: absorbing boundaries: Dashpots, CompliantBase, soil.FreeField. Their loss counts as damping.
@@ -68,24 +72,22 @@ def assemble(
         InputError: cells without material, of an order that the degree does not suit, or folded; NaN in data,
             components that do not exist, dashpots on what is held, groups of another mesh or kind, contradictions.
     """
-    section, damping = check_body(mesh, material, section, damping, base_inertia, degree, integration)
+    section, damping = check_body(mesh, material, forms, section, damping, base_inertia, degree, integration)
     held, moved, boundaries = as_tuple(clamped), as_tuple(prescribed), as_tuple(dashpots)
     check_boundaries(mesh, held, moved, as_tuple(tied), boundaries, as_tuple(loads))
     check_initial(mesh, displacement=initial_displacement, velocity=initial_velocity)
-    optional(whole, "assemble", "quadrature_degree", quadrature_degree)
-    space = FemSpace(mesh, tuple(Prescribed(facets) for facets in held) + moved, as_tuple(tied), degree)
-    space.quadrature_degree = quadrature_degree
-    forms = ElasticForms(space, cell_materials(mesh, material), section, damping, selective=integration == "selective")
-    forms.boundaries = boundaries
-    algebra = algebra_for(space.comm.mpi, space.dimension, space.unknowns)
-    absorbers = [DashpotMatrix(space, forms, one) for one in boundaries]
-    acting = [one.dashpots.loads(one, forms) for one in absorbers]
+    conditions = tuple(Prescribed(facets) for facets in held) + moved
+    space = _space(mesh, conditions, as_tuple(tied), degree, quadrature_degree)
+    body = _stated(space, material, forms, section, damping, boundaries, selective=integration == "selective")
+    algebra = algebra_for(space.comm.mpi, space.dimension, space.unknowns, symmetric=body.symmetric)
+    absorbers = [DashpotMatrix(space, body, one) for one in boundaries]
+    acting = [one.dashpots.loads(one, body) for one in absorbers]
     load = assemble_loads(space, section, as_tuple(loads))
     rigid = np.column_stack([space.restrict(one) for one in space.translations])
-    K, pull = _reduced(forms.matrix("K"), space, algebra, 0)  # one after the other: each is large before it is reduced
-    damper = _damper(forms, absorbers)
+    K, pull = _reduced(body.matrix("K"), space, algebra, 0)  # one after the other: each is large before it is reduced
+    damper = _damper(body, absorbers)
     C, viscous = _reduced(damper, space, algebra, 1) if damper is not None else (None, ())
-    mass = forms.matrix("M")
+    mass = body.matrix("M")
     # less M r, what accelerated prescribed nodes pull on the free ones
     momenta = [space.pull(PetscMatrix(mass) @ one) for one in space.translations] if base_inertia else []
     M, inertial = _reduced(mass, space, algebra, 2)
@@ -98,15 +100,39 @@ def assemble(
         base_mass=np.column_stack([one - M @ r for one, r in zip(momenta, rigid.T, strict=True)]) if momenta else None,
         u0=_initial(space, "initial displacement", initial_displacement),
         v0=_initial(space, "initial velocity", initial_velocity),
-        space=space, tied=space.tied_unknowns,
-        notes=describe_boundaries(boundaries, mesh.comm.rank), absolute=any(one.lets_waves_in for one in boundaries),
+        space=space, tied=space.tied_unknowns, notes=describe_boundaries(boundaries, mesh.comm.rank, body.notes),
+        absolute=any(one.lets_waves_in for one in boundaries),
         companions=tuple(one for part in (*moved, *acting) for one in part.companions),
     )
     system = floating(system)
-    forms.own(system)
+    body.own(system)
     del absorbers, damper, mass
     give_back(mesh.comm)
     return system
+
+
+def _space(
+    mesh: Any, prescribed: tuple[Prescribed, ...], tied: tuple[Tied, ...], degree: int, quadrature_degree: int | None
+) -> FemSpace:
+    """The space of the displacements."""
+    optional(whole, "assemble", "quadrature_degree", quadrature_degree)
+    space = FemSpace(mesh, prescribed, tied, degree)
+    space.quadrature_degree = quadrature_degree
+    return space
+
+
+def _stated(
+    space: FemSpace, material: Materials | None, forms: Forms | None, section: Section, damping: Damping,
+    boundaries: tuple[Dashpots, ...], *, selective: bool,
+) -> ElasticForms:
+    """The forms of the materials, or the user's own with those of the materials beside them."""
+    materials = [] if material is None else cell_materials(space.mesh, material)
+    if forms is None:
+        body = ElasticForms(space, materials, section, damping, selective=selective)
+    else:
+        body = OwnForms(space, forms, materials, section, damping)
+    body.boundaries = boundaries
+    return body
 
 
 def _damper(forms: ElasticForms, absorbers: Sequence[DashpotMatrix]) -> Any:

@@ -9,16 +9,18 @@ import numpy as np
 import ufl
 from dolfinx.mesh import Mesh
 
-from ..core.checks import check_word, flag, instance, provides, refuse, several, shown
+from ..core.checks import check_word, flag, instance, optional, provides, refuse, several, shown
 from ..core.errors import InputError
-from ..laws.materials import Damping, LinearElastic, NoDamping, PlaneStrain, PlaneStress, Section, Solid
+from ..laws.materials import Damping, LinearElastic, NoDamping, PlaneStrain, PlaneStress, Rayleigh, Section, Solid
 from . import compat
 from .communicators import MpiComm
 from .dashpots import Dashpots
+from .form_checks import refuse_complex
 from .forms import KINDS
 from .groups import cells_of, facets_of, field_given
 from .loads import BodyForce, Prescribed, Traction
 from .numbering import is_curved
+from .own_forms import Forms
 from .ties import Tied
 
 log = logging.getLogger(__name__)
@@ -27,7 +29,8 @@ LOCKING = 0.495  # Poisson's ratio; CHOSEN: 0.49 is common for wet soil, 0.499 i
 
 
 def check_body(
-    mesh: Any, material: Any, section: Any, damping: Any, base_inertia: Any, degree: Any = 1, integration: Any = "full"
+    mesh: Any, material: Any, forms: Any, section: Any, damping: Any, base_inertia: Any, degree: Any = 1,
+    integration: Any = "full",
 ) -> tuple[Section, Damping]:
     """Return (section, damping), the usual for None; InputError for objects of another kind, cells of another mesh."""
     instance(OWNER, "mesh", mesh, Mesh, "give a DOLFINx mesh, such as fem.read_mesh(path, comm)[0]")
@@ -35,7 +38,11 @@ def check_body(
         raise InputError(f"assemble: the mesh has cells of dimension {mesh.topology.dim} at points of "
                          f"{mesh.geometry.dim} coordinates; read it with gdim={mesh.topology.dim}")
     _check_degree(mesh, degree)
-    if not isinstance(material, KINDS):
+    refuse_complex()
+    optional(instance, OWNER, "forms", forms, Forms, "give fem.Forms(stiffness=…, mass=…), or leave them out")
+    if material is None and forms is None:
+        raise InputError("assemble: neither a material nor forms are given; give one of them")
+    if material is not None and not isinstance(material, KINDS):
         remedy = "give a LinearElastic, Orthotropic or Heterogeneous, or (cells, material) pairs"
         for pair in several(OWNER, "material", material, remedy):
             cells, one = _pair("material", pair, remedy)
@@ -49,14 +56,17 @@ def check_body(
         raise InputError(f"assemble: {section} is a section of a plane body and this one has three dimensions; give "
                          "Solid(), or leave it out")
     provides(OWNER, "damping", damping, ("coefficients",), "give Rayleigh(alpha, beta), MassProportional(c) or None")
+    if forms is not None and not (isinstance(damping, Rayleigh | NoDamping) or hasattr(damping, "viscosities")):
+        raise InputError(f"assemble: {damping} beside forms=…, which have no density of a material to go by; give "
+                         "Rayleigh(alpha, beta), KelvinVoigt(…), or Forms(…, damping=)")
     if isinstance(section, PlaneStress) and any(getattr(damping, "viscosities", ())):
         raise InputError(f"assemble: {damping} in PlaneStress, where the strain across the panel would have a motion "
                          "of its own; give Rayleigh(0, beta), or another section")
     flag(OWNER, "base_inertia", base_inertia)
-    found = [material] if isinstance(material, KINDS) else [one for _, one in material]
-    _check_integration(mesh, found, section, damping, degree, integration)
+    found = [material] if material is None or isinstance(material, KINDS) else [one for _, one in material]
+    _check_integration(mesh, found if forms is None else [forms], section, damping, degree, integration)
     thick = mesh.geometry.dim > 1 and not isinstance(section, PlaneStress)
-    if degree == 1 and thick and integration == "full" and mesh.comm.rank == 0:
+    if forms is None and degree == 1 and thick and integration == "full" and mesh.comm.rank == 0:
         _tell_locking([one for one in found if isinstance(one, LinearElastic)])
     return section, damping
 

@@ -13,7 +13,7 @@ from petsc4py import PETSc
 
 from ..core.algebra import Array, Indices, Matrix, largest, total, upper_blocks
 from .communicators import give_back
-from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc, triple_product
+from .petsc_algebra import PetscAlgebra, PetscMatrix, UnsymmetricAlgebra, as_petsc, triple_product
 from .petsc_rows import aij_of, rows_of
 
 COMPACT = 20_000  # unknowns in space from which on it pays: those that are solved iteratively
@@ -139,8 +139,10 @@ class CompactAlgebra(PetscAlgebra):
         return np.flatnonzero(marks.array_r)
 
 
-def algebra_for(comm: Any, dimension: int, unknowns: int) -> PetscAlgebra:
+def algebra_for(comm: Any, dimension: int, unknowns: int, *, symmetric: bool = True) -> PetscAlgebra:
     """Return the algebra for the matrices of a body of this size."""
+    if not symmetric:
+        return UnsymmetricAlgebra(comm)
     return CompactAlgebra(comm, dimension) if dimension == 3 and unknowns >= COMPACT else PetscAlgebra(comm)
 
 

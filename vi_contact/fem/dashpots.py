@@ -177,9 +177,9 @@ def impedances(dashpots: Dashpots, section: Section, lame: Any, shear: Any, rho:
     return dashpots.normal * np.sqrt((lame + 2.0 * shear) * rho), dashpots.tangential * np.sqrt(shear * rho)
 
 
-def describe_boundaries(boundaries: Sequence[Dashpots], rank: int) -> tuple[str, ...]:
-    """Return what each boundary expects, logged on rank 0."""
-    notes = tuple(f"{type(one).__name__} on '{one.facets.name}' {one.expects}" for one in boundaries)
+def describe_boundaries(boundaries: Sequence[Dashpots], rank: int, notes: tuple[str, ...] = ()) -> tuple[str, ...]:
+    """Return these notes and what each boundary expects, logged on rank 0."""
+    notes += tuple(f"{type(one).__name__} on '{one.facets.name}' {one.expects}" for one in boundaries)
     for note in notes if rank == 0 else ():
         log.info("%s", note)
     return notes

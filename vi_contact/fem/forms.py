@@ -39,10 +39,12 @@ class ElasticForms:
         damped: whether there is a C; densities: whether ``fields`` tell the mass and its damping, cell by cell.
         dilatation: with ``selective``, the mean of tr eps over each cell, which takes its place in K, in C = beta K
             and in stresses (``fem.dilatation``); None otherwise.
+        tells_stress: whether ``stress`` is known; symmetric: whether all matrices are; notes: what comes from where.
     """
 
     boundaries: tuple[Dashpots, ...] = ()  # of the same system
-    densities = True
+    densities = tells_stress = symmetric = True
+    notes: tuple[str, ...] = ()
 
     def __init__(
         self, space: FemSpace, materials: list[tuple[Any, Material]], section: Section, damping: Damping,
@@ -88,8 +90,8 @@ class ElasticForms:
         return "".join(name for name in names if getattr(system, name) not in (None, *self._matrices[name]))
 
     def stress(self, u: Any) -> Any:
-        """Return sigma(u) (d, d) times the thickness; None where nothing tells the stresses. With selective integration
-        of a Function u: ``follow`` when its values have changed since."""
+        """Return sigma(u) (d, d) times the thickness. With selective integration of a Function u: ``follow`` when its
+        values have changed since."""
         eps, d = ufl.sym(ufl.grad(u)), self.space.dimension
         if self._anisotropic is not None:
             flat, place = self._flat_stress(eps), {pair: k for k, pair in enumerate(VOIGT[d])}

@@ -90,18 +90,20 @@ class PetscFactor:
     several ranks each keeps a whole copy of it, so that results do not depend on the order of messages, as those of
     MUMPS do. MUMPS takes the rest: large 3D matrices on several ranks, and what is too large to be copied.
     Options with the prefix vi_contact_factor_ choose otherwise. InputError when the matrix cannot be factorised.
+    ``symmetric`` False: LU of MUMPS.
     """
 
-    def __init__(self, matrix: PetscMatrix) -> None:
+    def __init__(self, matrix: PetscMatrix, *, symmetric: bool = True) -> None:
         mat = matrix.mat
-        mat.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        mat.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)
+        kind = "cholesky" if symmetric else "lu"
         self._b, self._x = mat.createVecs()
         self._pc = PETSc.PC().create(mat.comm)
         self._pc.setOptionsPrefix(PREFIX)
         self._pc.setOperators(mat)
-        self._by_blocks = not _own_serves(mat)
+        self._by_blocks = not symmetric or not _own_serves(mat)
         if self._by_blocks:
-            self._pc.setType("cholesky")
+            self._pc.setType(kind)
             self._pc.setFactorSolverType("mumps")
             # MUMPS may crash on distributed right-hand sides, and only the options database reaches it in time
             _default_options({"mat_mumps_icntl_20": 0})
@@ -113,7 +115,7 @@ class PetscFactor:
             self._pc.setType("redundant")
             _default_options({f"redundant_{name}": value for name, value in OWN_FACTOR.items()})
         self._pc.setFromOptions()
-        self._by_blocks = self._by_blocks and self._pc.getType() == "cholesky"
+        self._by_blocks = self._by_blocks and self._pc.getType() == kind
         self._set_up()
 
     def _set_up(self) -> None:
@@ -191,7 +193,9 @@ def _default_options(values: Mapping[str, object]) -> None:
 
 
 class PetscAlgebra:
-    """Make and combine PETSc matrices on one communicator."""
+    """Make and combine PETSc matrices on one communicator; ``symmetric``: whether those of its system are."""
+
+    symmetric = True
 
     def __init__(self, comm: Any) -> None:
         self.comm = MpiComm(comm)
@@ -266,6 +270,18 @@ class PetscAlgebra:
 
     def dot(self, x: Array, y: Array) -> float:
         return total(self.comm, x @ y)
+
+
+class UnsymmetricAlgebra(PetscAlgebra):
+    """Make and combine the matrices of a system of which some is not symmetric."""
+
+    symmetric = False
+
+    def factor(self, A: Matrix) -> Factor:
+        return PetscFactor(as_petsc(A), symmetric=False)
+
+    def contact_last(self, A: Matrix, last: Indices) -> None:
+        return None
 
 
 def triple_product(K: Any, P: Any) -> Any:

@@ -80,7 +80,7 @@ class Scene:
         from matplotlib import colormaps
         from matplotlib.colors import Normalize
 
-        most = float(np.percentile(self.stress, 99.0)) or 1.0
+        most = float(np.nan_to_num(np.percentile(self.stress, 99.0))) or 1.0
         factor, unit = scale(most, "Pa")
         return Painter(Normalize(0.0, factor * most), colormaps["YlGnBu"], f"von Mises stress [{unit}]", factor)
 

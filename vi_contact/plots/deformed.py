@@ -61,11 +61,14 @@ class StoredFrames:
     places: tuple[tuple[Path, str], ...]
 
     def at(self, t: float) -> tuple[float, Array, Array]:
-        """Return (its time [s], u (n, d) [m], von Mises stress (c,) [Pa]) of the frame nearest to t."""
+        """Return (its time [s], u (n, d) [m], von Mises stress (c,) [Pa]) of the frame nearest to t; stresses are
+        NaN where the run has none."""
         (row,) = nearest(self.t, [t])
         path, group = self.places[row]
         with _opened(path) as file:
-            return float(self.t[row]), file[group]["u"][:, : self.points.shape[1]], file[group]["von_mises"][:]
+            frame, unknown = file[group], np.full(len(self.cells), np.nan)
+            stress = frame["von_mises"][:] if "von_mises" in frame else unknown
+            return float(self.t[row]), frame["u"][:, : self.points.shape[1]], stress
 
     @cached_property
     def bodies(self) -> Indices:

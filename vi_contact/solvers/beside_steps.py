@@ -13,7 +13,12 @@ TOLERANCE = 1e-12  # of conjugate gradients: what starts a run should not be see
 
 def solver_beside_steps(A: EffectiveMatrix, surface: ContactSurface) -> Solver:
     """Return Condensed() for a problem that is small (``core.sizes``), else conjugate gradients, which factorise
-    nothing: these matrices, of mass or of a layer of nodes, are well-conditioned. Collective."""
+    nothing: these matrices, of mass or of a layer of nodes, are well-conditioned. Volume() for systems that are not
+    symmetric. Collective."""
+    if not getattr(A.algebra, "symmetric", True):
+        from .volume import Volume
+
+        return Volume()
     if small(surface.comm, A.matrix.rows, surface.count) or find_spec("petsc4py") is None:
         return Condensed()
     from .iterative import Iterative

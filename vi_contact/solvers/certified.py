@@ -75,9 +75,13 @@ class CertifiedSolver:
                           f"{self._tolerance:g} ({'; '.join(tried)}): {self._advice}")
 
 
-def check_friction_law(owner: str, problem: ContactProblem) -> None:
-    """Raise InputError for friction without a tangential direction, or of a wrong number of values. Collective."""
+def check_laws(owner: str, problem: ContactProblem, *, unsymmetric: bool = False) -> None:
+    """Raise InputError for friction without a tangential direction, or of a wrong number of values, and for matrices
+    that are not symmetric unless the owner solves with them. Collective."""
     surface, law = problem.surface, problem.friction
+    if not unsymmetric and not getattr(problem.system.algebra, "symmetric", True):
+        raise InputError(f"{owner} needs symmetric matrices and those of the system are not: use "
+                         "solver=Volume(), whose ReducedNewton and SemismoothNewton do not")
     if problem.frictional and surface.tangents.shape[1] == 0:
         raise InputError(f"{owner} would ignore {law}: a body in one dimension cannot slide, use Frictionless()")
     on_all(surface.comm, "the friction law", lambda: law.limit(np.zeros(surface.count), surface.weights, 1.0))

@@ -28,7 +28,7 @@ from ..core.sizes import refuse_dense
 from ..core.stages import stage
 from ..core.step import Answers, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
-from .certified import check_friction_law
+from .certified import check_laws
 from .friction.condensed import CondensedFriction
 from .friction.newton import FrictionNewton
 from .friction.problem import FrictionMethod, inner_method
@@ -74,7 +74,7 @@ class Condensed:
             refuse_dense(f"Condensed() with {problem.friction}", surface.total * (1 + surface.tangents.shape[1]))
         else:
             refuse_dense("Condensed()", surface.total)
-        check_friction_law("Condensed", problem)
+        check_laws("Condensed", problem)
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> "PreparedCondensed":
         """Return what condenses A at its first step, which tells of friction. InputError for too many conditions."""

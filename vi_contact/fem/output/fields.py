@@ -6,6 +6,7 @@ moment, also while the run goes on or after it was killed. Nothing in the files 
 What a frame holds: docs/reference/files.md. In the first one a is zero, and with friction all closed nodes stick.
 """
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -22,6 +23,8 @@ from ...core.problem import ContactProblem
 from ...core.step import Report, State
 from .. import compat
 from ..space import FemSpace, known_matrices, space_of
+
+log = logging.getLogger(__name__)
 
 
 class VonMises:
@@ -77,8 +80,11 @@ class XDMF:
 
     def open(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]) -> "FrameWriter":
         """Write the mesh; go on after the frames of ``kept`` (step -> time) that are in the folder. Collective."""
-        space_of("XDMF", problem.system)
-        known_matrices("XDMF, von_mises", problem.system, "K")
+        space = space_of("XDMF", problem.system)
+        if space.forms.tells_stress:
+            known_matrices("XDMF, von_mises", problem.system, "K")
+        elif space.comm.rank == 0:
+            log.info("XDMF: forms=… tell no stress, so that frames have no von_mises: give fem.Forms(…, stress=)")
         return FrameWriter(problem, folder, kept, self.frames_per_file)
 
 
@@ -90,7 +96,7 @@ class FrameWriter:
         assert isinstance(space, FemSpace)
         self._problem, self._space, self._folder, self._per_file = problem, space, folder, per_file
         self._names = _VECTORS + (_RUBBING if problem.frictional else ())
-        self._von_mises = VonMises(space.forms)
+        self._von_mises = VonMises(space.forms) if space.forms.tells_stress else None
         owned, slots = problem.surface.owned, problem.surface.slots
         self._contact_nodes = on_first(space.comm, slots, space.ids[owned] // space.dimension)
         self._type, mine = _cells(space)
@@ -144,7 +150,8 @@ class FrameWriter:
             space.expand(problem.cartesian(x), state.t, derivative)
             for derivative, x in enumerate((state.u, state.v, acceleration))
         ]
-        stress = on_first(space.comm, self._cell_numbers, self._von_mises(moving[0]))
+        von_mises = self._von_mises
+        stress = None if von_mises is None else on_first(space.comm, self._cell_numbers, von_mises(moving[0]))
         slipping = np.zeros(problem.surface.count, dtype=bool)
         if problem.frictional:
             moving += self._rubbing(state)
@@ -169,13 +176,15 @@ class FrameWriter:
         full[space.free] = surface.along_axes(turned)  # tangents are at right angles to all that is oblique
         return full.reshape(-1, space.dimension)
 
-    def _write(self, state: State, vectors: Array, stress: Array, contact: Array) -> None:
+    def _write(self, state: State, vectors: Array, stress: Array | None, contact: Array) -> None:
         pressure, status = self._contact(*contact.T)
 
         def fill(file: Any) -> None:
             for i, name in enumerate(self._names):
                 file[name] = vectors[:, 3 * i : 3 * i + 3]
-            file["von_mises"], file["contact_pressure"], file["contact_status"] = stress, pressure, status
+            file["contact_pressure"], file["contact_status"] = pressure, status
+            if stress is not None:
+                file["von_mises"] = stress
 
         path = self._folder / FIELDS / f"frame_{state.k:06d}.h5"
         hdf5_atomically(path, fill)
@@ -217,7 +226,8 @@ class FrameWriter:
         attributes = [attribute(name, "Node", nodes, 3) for name in self._names]
         attributes.append(attribute("contact_pressure", "Node", nodes))
         attributes.append(attribute("contact_status", "Node", nodes, number="Int", size=4))
-        attributes.append(attribute("von_mises", "Cell", cells))
+        if self._von_mises is not None:
+            attributes.append(attribute("von_mises", "Cell", cells))
         return (
             f'<Grid Name="step {k}" GridType="Uniform"><Time Value="{t!r}"/>\n'
             f'<Topology TopologyType="{self._type}" NumberOfElements="{cells}" NodesPerElement="{corners}">'

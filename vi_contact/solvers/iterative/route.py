@@ -22,7 +22,7 @@ from ...core.errors import InputError, StepFailure
 from ...core.problem import ContactProblem
 from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
-from ..certified import check_friction_law
+from ..certified import check_laws
 from ..volume.failures import raised
 from ..volume.options import OptionLayers
 from .conjugate_gradients import SOLVED, WRONG_SIGNS, ConjugateGradients
@@ -79,7 +79,7 @@ class Iterative:
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for friction without a tangential direction, or of a wrong number of values."""
-        check_friction_law("Iterative()", problem)
+        check_laws("Iterative()", problem)
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> "PreparedIterative":
         """Choose and make the preconditioner; collective. InputError for options that cannot work."""

@@ -30,11 +30,13 @@ class BoundedSystem:
         soft: (m,) True where the support is a spring.
         spring, feet: stiffness k of these springs, in the unit of A, and the positions in x of their body ends.
         bounded: (m,) position of the bounded unknown in z.
+        symmetric: whether A is.
     """
 
     def __init__(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
         self.A, self.surface, self.scale = A, surface, scale
         self.rows = A.matrix.rows
+        self.symmetric = bool(getattr(A.algebra, "symmetric", True))
         self.soft: Mask = surface.compliance > 0.0
         self.spring = scale / surface.compliance[self.soft]
         self.feet = surface.owned[self.soft]

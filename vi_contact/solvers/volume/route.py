@@ -19,7 +19,7 @@ from ...core.errors import InputError, StepFailure
 from ...core.problem import ContactProblem
 from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
-from ..certified import check_friction_law
+from ..certified import check_laws
 from .bounded_system import BoundedSystem
 from .failures import raised
 from .friction import VolumeFriction
@@ -96,7 +96,7 @@ class Volume:
                 f"Volume({self.method}) only enforces bounds on displacements and would ignore {problem.friction}: use "
                 "Volume(ReducedNewton()), or Condensed(), the condensed route"
             )
-        check_friction_law("Volume", problem)
+        check_laws(f"Volume({self.method})", problem, unsymmetric=not isinstance(self.method, TaoTron))
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> "PreparedVolume":
         """Return the solver for one effective matrix; collective. InputError for options that cannot work."""
@@ -113,7 +113,8 @@ class PreparedVolume:
         self._system = BoundedSystem(A, surface, scale)
         PETSc.garbage_cleanup(self._system.comm)
         self._settings, self._method = settings, settings.method
-        self._layers = self._layered(settings.method.defaults(surface.comm.size))
+        own = settings.method.defaults(surface.comm.size)
+        self._layers = self._layered(own if self._system.symmetric else {**own, "pc_type": "lu"})
         self._scaled = ScaledStep(self._system, settings.tolerance)
         self._name = f"Volume({type(settings.method).__name__})"
         self._friction: VolumeFriction | None = None

@@ -119,20 +119,20 @@ def write_bounds(scaled: ScaledStep, lower: Any, upper: Any) -> None:
 
 
 class AssembledJacobian:
-    """Assemble H = A x_ref / r_ref as an AIJ matrix, symmetric positive definite."""
+    """Assemble H = A x_ref / r_ref as an AIJ matrix, positive definite, and symmetric where A is."""
 
     def __init__(self, system: BoundedSystem) -> None:
         self._A = system.assembled()
         self._own = self._A is not getattr(system.A.matrix, "mat", None)
         self.mat = self._A.duplicate(copy=True)
-        self._ratio = np.nan
+        self._ratio, self._symmetric = np.nan, system.symmetric
 
     def rescale(self, ratio: float) -> None:
         """Take the units of a step."""
         if ratio != self._ratio:
             self._ratio = ratio
             self._copy()
-            self.mat.setOption(PETSc.Mat.Option.SPD, True)
+            self.mat.setOption(PETSc.Mat.Option.SPD, self._symmetric)
 
     def evaluate(self, snes: Any, y: Any, J: Any, P: Any) -> None:
         """Do nothing: the matrix is constant."""
@@ -166,7 +166,7 @@ class ReducedNewton:
     """Solve by SNES VINEWTONRSLS, Cholesky by MUMPS on each reduced matrix, in every iteration: the reference.
 
     Other linear solvers by ``petsc_options``, e.g. {"ksp_type": "cg", "pc_type": "hypre"}; gamg, mg and fieldsplit are
-    refused, they do not survive the reduction. With friction LU in the place of Cholesky.
+    refused, they do not survive the reduction. With friction, and where A is not symmetric, LU in place of Cholesky.
     """
 
     carries_friction: ClassVar[bool] = True

@@ -1,0 +1,100 @@
+"""Check the forms that a user gives for a body: functions, bilinear, of this mesh; matrices finite, masses positive."""
+
+from collections.abc import Callable, Iterator
+from inspect import signature
+from typing import Any
+
+import numpy as np
+import ufl
+from petsc4py import PETSc
+
+from ..core.algebra import largest
+from ..core.checks import function, instance, on_all
+from ..core.errors import InputError
+from ..core.matrix_checks import SYMMETRIC, asymmetry, probe
+from . import compat
+from .petsc_algebra import PetscMatrix
+from .space import FemSpace
+
+PROBES = 4
+
+
+def refuse_complex() -> None:
+    """Raise InputError where PETSc computes with complex numbers: inequalities have no meaning there."""
+    if np.issubdtype(PETSc.ScalarType, np.complexfloating):
+        raise InputError("assemble: this PETSc computes with complex numbers, of which none is less than another; use "
+                         "DOLFINx with a PETSc of real numbers (Debian: python3-dolfinx-real)")
+
+
+def takes(name: str, call: Any, *arguments: str) -> None:
+    """Raise InputError unless this is a function of so many arguments."""
+    remedy = f"give a function of {' and '.join(arguments)}"
+    function("Forms", name, call, remedy)
+    try:
+        signature(call).bind(*arguments)
+    except TypeError as error:
+        raise InputError(f"Forms: {name} cannot be called with ({', '.join(arguments)}), {error}; {remedy}") from None
+    except ValueError:  # of a function in C: it tells when it is called
+        return
+
+
+def form_of(name: str, call: Callable[[Any, Any], Any], u: Any, v: Any, space: FemSpace) -> Any:
+    """Return call(u, v), a form in both on the mesh of the space; InputError on all ranks otherwise. Collective."""
+    said = f"Forms: {name}"
+    form = on_all(space.comm, said, lambda: call(u, v))
+    instance("Forms", f"what {name} returns", form, ufl.Form, "return an integral, such as ufl.inner(…, …) * ufl.dx")
+    if set(on_all(space.comm, said, form.arguments)) != {u, v}:
+        raise InputError(f"{said} is no form in the trial and test functions it is given; return one that is linear in "
+                         "u and in v")
+    own = space.mesh.ufl_domain().ufl_id()
+    functions = (getattr(one, "function_space", space.V) for one in form.coefficients())
+    if any(one.ufl_id() != own for one in form.ufl_domains()) or any(V.mesh is not space.mesh for V in functions):
+        raise InputError(f"{said} is of another mesh; give measures and Functions of the mesh of the body")
+    return form
+
+
+def matrix_of(name: str, space: FemSpace, compiled: Callable[[], Any]) -> Any:
+    """Return the assembled matrix of a form, finite. Collective."""
+    said = f"Forms: {name}, which must be linear in u and in v,"
+    matrix = compat.assemble_matrix(on_all(space.comm, said, compiled))
+    if not np.isfinite(matrix.norm(PETSc.NormType.FROBENIUS)):
+        raise InputError(f"Forms: {name} has NaN or infinite entries; check its Functions and Constants")
+    return matrix
+
+
+def is_symmetric(matrix: Any, space: FemSpace) -> bool:
+    """Return whether a full matrix is symmetric to round-off. Collective."""
+    return asymmetry(PetscMatrix(matrix), space.comm, _numbers(space)) <= SYMMETRIC
+
+
+def refuse_masses(matrix: Any, space: FemSpace) -> None:
+    """Raise InputError unless a full mass matrix is symmetric and positive, as its diagonal and some products tell."""
+    M = PetscMatrix(matrix)
+    if not is_symmetric(matrix, space):
+        raise InputError("Forms: mass is not symmetric; give a form in which u and v may be exchanged")
+    least = -largest(space.comm, -np.min(M.diagonal(), initial=np.inf))
+    energies = [space.comm.sum(np.array([w @ (M @ w)]))[0] for w in _motions(space)]
+    if not (least > 0.0 and min(energies) > 0.0):
+        raise InputError("Forms: mass is not positive, some motion would have no kinetic energy or less; give a "
+                         "density above zero everywhere")
+
+
+def _motions(space: FemSpace) -> Iterator[Any]:
+    yield from space.translations
+    for j in range(PROBES):
+        yield probe(_numbers(space), j)
+
+
+def _numbers(space: FemSpace) -> Any:
+    """Numbers of all owned components, prescribed ones too."""
+    return (space.nodes[:, None] * space.dimension + np.arange(space.dimension)).ravel()
+
+
+def refuse_stress(call: Callable[[Any], Any], space: FemSpace) -> None:
+    """Raise InputError unless call(u) is a tensor of UFL, (d, d) or in the plane (3, 3). Collective."""
+    d, u = space.dimension, compat.function(space.V)
+    stress = on_all(space.comm, "Forms: stress", lambda: call(u))
+    shape = getattr(stress, "ufl_shape", None)
+    if shape != (d, d) and not (d == 2 and shape == (3, 3)):
+        more = " or, with sigma_zz, (3, 3)" if d == 2 else ""
+        raise InputError(f"Forms: stress has shape {shape}; return a tensor of shape {(d, d)}{more}")
