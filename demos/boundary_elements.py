@@ -268,6 +268,6 @@ def table(numbers: dict[str, float]) -> str:
 
 
 # Things to try: ELEMENTS of twice the number; bem.SpaceTimeUzawa(rho=...), whose iterations depend on rho;
-# vc.cross_check(..., references=[run]).
+# compare_runs(problem, [run], ...) of demos/problems/whole_runs.py beside finite elements.
 if __name__ == "__main__":
     raise SystemExit(status_of(main))

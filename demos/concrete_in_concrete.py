@@ -22,11 +22,12 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from demos.pictures.deformed import plot_snapshots
+from demos.pictures.runs import plot_runs
 from demos.problems.embedded import Embedded, build
 from demos.problems.square import concrete
 from vi_contact import fem
 from vi_contact.cli import status_of
-from vi_contact.plots.histories import History, plot_runs
+from vi_contact.plots.histories import History
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 CELLS = 10  # along a side of the box

@@ -22,10 +22,11 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from demos.pictures.deformed import plot_snapshots, plot_tractions
+from demos.pictures.runs import plot_runs
 from demos.problems.square import Square, build, concrete
 from vi_contact import fem
 from vi_contact.cli import status_of
-from vi_contact.plots.histories import History, plot_runs
+from vi_contact.plots.histories import History
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 BOX = concrete(cells=20)

@@ -24,10 +24,11 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from demos.pictures.deformed import plot_snapshots, plot_tractions
+from demos.pictures.runs import plot_runs
 from demos.problems.square import Square, build
 from vi_contact import fem
 from vi_contact.cli import status_of
-from vi_contact.plots.histories import History, plot_runs
+from vi_contact.plots.histories import History
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 SQUARE = Square(cells=20, pressure=0.1)  # h = dt = 0.05, as the source has it

@@ -25,10 +25,11 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from demos.pictures.deformed import plot_snapshots, plot_tractions
+from demos.pictures.runs import plot_runs
 from demos.problems.disk import Disk, Momentum, Push, build
 from vi_contact import fem
 from vi_contact.cli import status_of
-from vi_contact.plots.histories import History, plot_runs
+from vi_contact.plots.histories import History
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 DISK = Disk(radius=0.5, size=0.04, push=Push(height=0.05, rise=1.0))  # h = 2 dt = 0.04

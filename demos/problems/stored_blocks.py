@@ -5,14 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from ..core import checks
-from ..core.errors import InputError
-from ..core.files import hdf5_atomically
-from ..laws.materials import LinearElastic
-from .boundary_mesh import BoundaryMesh
-from .boundary_operators import check_body
-from .energetic import EnergeticBlocks, energetic_blocks
-from .quadrature import Orders
+from vi_contact.bem.boundary_mesh import BoundaryMesh
+from vi_contact.bem.boundary_operators import check_body
+from vi_contact.bem.energetic import EnergeticBlocks, energetic_blocks
+from vi_contact.bem.quadrature import Orders
+from vi_contact.core import checks
+from vi_contact.core.errors import InputError
+from vi_contact.core.files import hdf5_atomically
+from vi_contact.laws.materials import LinearElastic
 
 FORMAT = "vi_contact boundary element blocks, 2"
 EQUAL = 1e-12  # relative difference up to which geometry, speeds and time step count as equal

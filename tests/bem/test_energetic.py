@@ -10,6 +10,7 @@ import pytest
 from bem_rod import rod, smooth_integral, smooth_load
 from plane_waves import MATERIAL, SQUARE, pulse
 
+from demos.problems.stored_blocks import stored_blocks
 from vi_contact import LinearElastic
 from vi_contact.bem import (
     BoundaryMesh,
@@ -20,7 +21,6 @@ from vi_contact.bem import (
     energetic_blocks,
     from_segments,
     polygon,
-    stored_blocks,
     traction_forces,
 )
 from vi_contact.bem.energetic import marched

@@ -19,7 +19,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "beam/test_algorithm.py": "beam.source_data beam.tip beam.values",
     "bem/test_boundary_operators.py": "bem.loops",
     "bem/test_contact.py": "bem.contact_run bem.two_bodies bem.uzawa_space_time",
-    "bem/test_energetic.py": "bem.loads bem.poincare_steklov bem.storage",
+    "bem/test_energetic.py": "bem.loads bem.poincare_steklov",
     "bem/test_fundamental_solution.py": "bem.rules",
     "bem/test_thin_bodies.py": "bem.element_pairs bem.quadrature",
     "boundary_layer/test_constrained_motion.py":

@@ -365,8 +365,7 @@ def runs() -> Table:
         (vc.cross_check, given | {"solvers": (vc.Condensed(), vc.Condensed(solvers.Hildreth()))}, {
             "problem": NEEDED, "solvers": {"one": vc.Condensed(), "alone": [vc.Condensed()],
             "texts for a solver": ["a", "b"], "none": None},
-            "scheme": THING, "dt": STEP, "steps": {"text": "3", "half": 2.5}, "state": states(), "bound": POSITIVE,
-            "references": {"number": 3.0, "texts": ["bem"], "none": None}}),
+            "scheme": THING, "dt": STEP, "steps": {"text": "3", "half": 2.5}, "state": states()}),
         (vc.static_equilibrium, {"problem": b.problem},
          {"problem": NEEDED, "solver": but(THING, "none"), "t": NUMBER, "tolerance": POSITIVE}),
         (vc.quasi_static, {"problem": b.problem, "times": [0.0, 1.0]}, {

@@ -20,7 +20,6 @@ _CONTENTS = {
     "loads": ("traction_forces",),
     "poincare_steklov": ("BoundaryMotion", "BoundaryProblem", "CondensedCompliance", "PoincareSteklov"),
     "quadrature": ("Orders",),
-    "storage": ("stored_blocks",),
     "two_bodies": ("TwoBodies",),
     "uzawa_space_time": ("SpaceTimeUzawa",),
 }

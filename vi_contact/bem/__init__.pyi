@@ -23,8 +23,7 @@ from .poincare_steklov import BoundaryProblem as BoundaryProblem
 from .poincare_steklov import CondensedCompliance as CondensedCompliance
 from .poincare_steklov import PoincareSteklov as PoincareSteklov
 from .quadrature import Orders as Orders
-from .storage import stored_blocks as stored_blocks
 from .two_bodies import TwoBodies as TwoBodies
 from .uzawa_space_time import SpaceTimeUzawa as SpaceTimeUzawa
 
-__all__: list[str] = ['BoundaryContact', 'BoundaryMesh', 'BoundaryMotion', 'BoundaryProblem', 'CondensedCompliance', 'Conditions', 'ContactLedger', 'ContactRun', 'EnergeticBlocks', 'Galerkin', 'OperatorMatrices', 'Orders', 'PoincareSteklov', 'SpaceTimeUzawa', 'TimeKernels', 'TwoBodies', 'circle', 'conditions_on', 'energetic_blocks', 'from_segments', 'interior_displacement', 'ledger', 'march_contact', 'polygon', 'stored_blocks', 'traction_forces']
+__all__: list[str] = ['BoundaryContact', 'BoundaryMesh', 'BoundaryMotion', 'BoundaryProblem', 'CondensedCompliance', 'Conditions', 'ContactLedger', 'ContactRun', 'EnergeticBlocks', 'Galerkin', 'OperatorMatrices', 'Orders', 'PoincareSteklov', 'SpaceTimeUzawa', 'TimeKernels', 'TwoBodies', 'circle', 'conditions_on', 'energetic_blocks', 'from_segments', 'interior_displacement', 'ledger', 'march_contact', 'polygon', 'traction_forces']

@@ -82,7 +82,7 @@ class ContactRun:
 
     @property
     def name(self) -> str:
-        """Return the name that ``cross_check`` gives it."""
+        """Return the name of the method in comparisons of runs."""
         return "boundary elements"
 
     @property

@@ -7,9 +7,9 @@ from ..core.lazy import lazy
 
 _CONTENTS = {
     "bodies": ("film", "plot_deformed"),
-    "deformed": ("read_frames", "read_tractions"),
+    "deformed": ("read_frames",),
     "faces": ("plot_faces",),
-    "histories": ("plot_certificate", "plot_energy", "plot_excitation", "plot_points", "plot_runs"),
+    "histories": ("plot_certificate", "plot_energy", "plot_excitation", "plot_points"),
     "maps": ("plot_contact",),
     "overview": ("plot_overview",),
     "records": ("plot_loop", "plot_motion", "plot_spectra", "plot_transfer"),

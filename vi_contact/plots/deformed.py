@@ -33,25 +33,6 @@ _SIDES = {  # the sides of a cell by (dimension, corners), its corners in the or
 
 
 @dataclass(frozen=True)
-class Tractions:
-    """Hold contact tractions on the body: ``points``, ``normals`` (m, d) [m], the normals towards the support;
-    ``tangents`` (m, d, d - 1); times ``t`` (k,) [s]; pressures ``normal`` (k, m) [Pa] and shear tractions ``shear``
-    (k, m, d - 1) [Pa] of the support on the body along the tangents."""
-
-    points: Array
-    normals: Array
-    tangents: Array
-    t: Array
-    normal: Array
-    shear: Array
-
-    def at(self, t: float) -> tuple[Array, Array]:
-        """Return (pressure (m,), shear (m, d) along the axes) of the step that ends next to t."""
-        (row,) = nearest(self.t, [t])
-        return self.normal[row], np.einsum("mj,mij->mi", self.shear[row], self.tangents)
-
-
-@dataclass(frozen=True)
 class StoredFrames:
     """Hold fields of a run: ``points`` (n, d) [m], ``cells`` (c, corners), times ``t`` (f,) [s], (file, group) each."""
 
@@ -144,17 +125,6 @@ def contact_states(history: Mapping[str, Array]) -> Array:
 def stored_tangents(contact: Geometry) -> Array:
     """Return the tangents (m, d, d - 1) of slip and traction_t in a history; what is at one place is one node."""
     return tangent_vectors(contact.normals, np.unique(contact.points, axis=0, return_inverse=True)[1].ravel())
-
-
-def read_tractions(folder: str | Path) -> Tractions:
-    """Read tractions from the history of a run. InputError for a folder without one."""
-    run = read_run(folder)
-    contact, history = run.contact, run.history
-    if contact is None or "pressure" not in history or contact.points.shape[1] < 2:
-        raise InputError(f"'{folder}' is not of a finished run in plane or space with Contact(): run it with both")
-    pressure, tangents = history["pressure"], stored_tangents(contact)
-    shear = -history["traction_t"] if "traction_t" in history else np.zeros((*pressure.shape, tangents.shape[2]))
-    return Tractions(contact.points, contact.normals, tangents, history["t"], pressure, shear)
 
 
 def read_frames(run: RunFolder | str | Path) -> StoredFrames:
