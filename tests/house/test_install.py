@@ -59,7 +59,7 @@ def test_the_cases_that_ship_are_installed() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     patterns = project["tool"]["setuptools"]["package-data"]["vi_contact.studies.cases"]
     files = sorted(path.relative_to(FOLDER.parent).as_posix() for path in FOLDER.rglob("*") if path.is_file())
-    assert len(files) == 4 and all(any(fnmatch(file, one) for one in patterns) for file in files)
+    assert len(files) == 2 and all(any(fnmatch(file, one) for one in patterns) for file in files)
     others = [path for path in (ROOT / "vi_contact").rglob("*") if path.is_file() and "__pycache__" not in path.parts
               and path.suffix not in (".py", ".pyi", ".toml", ".typed")]
     data = project["tool"]["setuptools"]["package-data"]
