@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import subprocess
 import sys
@@ -67,6 +68,22 @@ def test_the_cases_that_ship_are_installed() -> None:
     assert (ROOT / "vi_contact" / "py.typed").read_bytes() == b""
     named = data["vi_contact.core"]
     assert [path.relative_to(ROOT / "vi_contact" / "core").as_posix() for path in others] == named
+
+
+@pytest.mark.serial
+def test_stubs_name_what_is_public() -> None:
+    """Names are imported when they are first used: a checker of types finds them in the stubs, in the same modules."""
+    stubs = sorted((ROOT / "vi_contact").rglob("__init__.pyi"))
+    assert len(stubs) > 20
+    for path in stubs:
+        package = import_module(path.parent.relative_to(ROOT).as_posix().replace("/", "."))
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        nodes = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
+        found = {alias.asname: node.module for node in nodes for alias in node.names}
+        assert set(found) == set(package.__all__)
+        for name, module in found.items():
+            home = import_module(f"{package.__name__}.{module or name}")
+            assert getattr(package, name) is (getattr(home, name) if module else home)
 
 
 def ran(script: str, **environment: str) -> str:
