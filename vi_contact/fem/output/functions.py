@@ -109,10 +109,7 @@ class Stress:
         self._tensors = compat.lagrange(space.mesh, degree, (d, d), continuous=continuous)
         self._u, scalars = compat.function(space.V), compat.lagrange(space.mesh, degree, continuous=continuous)
         self._blocks, dx = _blocks(scalars, self._tensors), ufl.dx(metadata={"quadrature_degree": 2 * degree + 2})
-        self._forms, sigma = space.forms, space.forms.stress(self._u)
-        if sigma is None:
-            raise InputError("stress: the forms of the system do not tell it; give fem.Forms(…, stress=…)")
-        sigma = sigma / space.forms.section.thickness
+        self._forms, sigma = space.forms, space.forms.stress(self._u) / space.forms.section.thickness
         self._load = compat.compile_form(ufl.inner(sigma, ufl.TestFunction(self._tensors)) * dx)
         mass = ufl.inner(ufl.TrialFunction(scalars), ufl.TestFunction(scalars)) * dx
         matrix = compat.assemble_matrix(compat.compile_form(mass))
