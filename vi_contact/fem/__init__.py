@@ -29,6 +29,7 @@ _CONTENTS = {
     "dashpots": ("CompliantBase", "Dashpots"),
     "heterogeneous": ("Heterogeneous",),
     "initial_stress": ("geometric_stiffness",),
+    "linear_forms": ("LinearForm",),
     "loads": ("BodyForce", "Prescribed", "TangentialTraction", "Traction"),
     "mesh": ("Cells", "Facets", "Tags", "build_mesh", "node_numbers", "read_mesh"),
     "own_forms": ("Forms",),

@@ -25,7 +25,8 @@ from .communicators import give_back
 from .compact import algebra_for
 from .dashpots import DashpotMatrix, Dashpots, describe_boundaries
 from .forms import ElasticForms, Materials, cell_materials
-from .loads import ActingLoad, BodyForce, Prescribed, Traction, as_tuple, evaluate
+from .linear_forms import AnyLoad, LinearForm, Loads
+from .loads import Prescribed, as_tuple, evaluate
 from .mesh import Cells, Facets
 from .own_forms import Forms, OwnForms
 from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
@@ -43,7 +44,7 @@ def assemble(
     mesh: Any, material: Materials | None = None, *, forms: Forms | None = None, section: Section | None = None,
     clamped: Facets | Sequence[Facets] = (), prescribed: Prescribed | Sequence[Prescribed] = (),
     tied: Tied | Sequence[Tied] = (), dashpots: Dashpots | Sequence[Dashpots] = (),
-    loads: Traction | BodyForce | Sequence[Traction | BodyForce] = (),
+    loads: Loads = (),
     damping: Damping | None = None, initial_displacement: Initial = None, initial_velocity: Initial = None,
     base_inertia: bool = True, degree: int = 1, quadrature_degree: int | None = None, integration: str = "full",
 ) -> SemiDiscreteSystem:
@@ -58,7 +59,7 @@ def assemble(
         section: PlaneStrain() by default in 2D (Solid() in 3D); PlaneStress(thickness) for panels.
         clamped: facets with u = 0; prescribed: facets that move (eq. 3) or are held in some components.
         dashpots: absorbing boundaries: Dashpots, CompliantBase, soil.FreeField. Their loss counts as damping.
-        tied: boundaries whose opposite nodes move together; loads: tractions (eqs. 4, 6) and body forces.
+        tied: boundaries whose opposite nodes move together; loads: tractions (eqs. 4, 6), body forces, LinearForm.
         damping: NoDamping() by default, MassProportional(c) (eq. 7), Rayleigh or KelvinVoigt.
         base_inertia: whether a ground motion's inertia load counts the mass that elements share with prescribed nodes,
             as it must to be the motion seen from the ground; False is the load of docs/start/first_wall.md.
@@ -155,7 +156,7 @@ def _reduced(
 
 
 def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...]) -> Load:
-    """Assemble f(t) on the free unknowns: tractions and body forces."""
+    """Assemble f(t) on the free unknowns: tractions, body forces and linear forms."""
     constant = np.zeros(len(space.ids))
     separable: list[tuple[Array, Callable[[float], float]]] = []
     general: list[Callable[[float], Array]] = []
@@ -170,8 +171,10 @@ def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...]) ->
     return Load(constant, tuple(separable), tuple(general))
 
 
-def _integrated(space: FemSpace, section: Section, load: ActingLoad) -> Callable[[float], Array]:
-    """t -> Pᵀ ∫ interpolated value · v, as one product with a matrix assembled here."""
+def _integrated(space: FemSpace, section: Section, load: AnyLoad) -> Callable[[float], Array]:
+    """t -> Pᵀ ∫ interpolated value · v, as one product with a matrix assembled here; of a form its own."""
+    if isinstance(load, LinearForm):
+        return load.integrated(space, section.thickness)
     g, v = ufl.TrialFunction(space.V), ufl.TestFunction(space.V)
     form = ufl.inner(load.acting(g, space.mesh), v) * load.measure(space.mesh)
     matrix = PetscMatrix(compat.assemble_matrix(compiled(space, form)))

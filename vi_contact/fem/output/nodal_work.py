@@ -21,6 +21,7 @@ from ...core.problem import ContactProblem
 from ...core.step import Report, State
 from .. import compat
 from ..groups import facets_of
+from ..linear_forms import AnyLoad, LinearForm, Loads
 from ..loads import BodyForce, Traction, as_tuple, evaluate
 from ..quadrature import compiled
 from ..space import known_matrices, space_of
@@ -31,13 +32,12 @@ Beyond = Callable[[Array | float, Any], Array]  # (density, its load or None) ->
 # (components of nodes that move, (owned, d) or (owned, 1); centre of their rotations (d,); mask of local cells of the
 # group, ghosts too, None for all; what is taken away of inertia, its damping and loads, or None)
 Rigid = tuple[Mask, Array, Mask | None, Beyond | None]
-Loads = Traction | BodyForce | Sequence[Traction | BodyForce]
 
 
 def check_actions(owner: str, loads: Any, gravity: Any) -> None:
     """Raise InputError unless these are loads, as for ``fem.assemble``, and an acceleration."""
     for load in as_tuple(loads):
-        instance(owner, "loads", load, (Traction, BodyForce), "give the loads of fem.assemble")
+        instance(owner, "loads", load, (Traction, BodyForce, LinearForm), "give the loads of fem.assemble")
     optional(array, owner, "gravity", gravity, (None,), unit="m/s²")
 
 
@@ -68,9 +68,14 @@ class NodalWork:
         ]
         g, mesh, factor = ufl.TestFunction(space.V), space.mesh, space.forms.section.thickness * self._inside
         self._load_forms = [  # their products with nodal values of the loads are rᵀf
-            compiled(space, factor * ufl.inner(self._r, load.acting(g, mesh)) * load.measure(mesh))
+            None if isinstance(load, LinearForm)
+            else compiled(space, factor * ufl.inner(self._r, load.acting(g, mesh)) * load.measure(mesh))
             for load in self._loads
         ]
+        thickness = space.forms.section.thickness
+        self._nodal = {
+            k: one.full(space, thickness) for k, one in enumerate(self._loads) if isinstance(one, LinearForm)
+        }
         self._tell_constant_loads(owner)
 
     def _tell_constant_loads(self, owner: str) -> None:
@@ -85,6 +90,9 @@ class NodalWork:
 
     def take(self, parts: Sequence[Rigid]) -> None:
         """Take the rigid motions of each part as r, one after the other. Collective."""
+        if self._nodal and any(cells is not None or beyond is not None for _, _, cells, beyond in parts):
+            raise InputError("section forces: nobody knows which part of a LinearForm acts on the cells of a cut; give "
+                             "such loads as Traction and BodyForce, or record Reactions")
         forms, ours = [*self._forms, *self._load_forms], self.space.forms
         if not ours.densities and any(beyond for *_, beyond in parts):
             raise InputError("a section goes through elements, and forms=… do not tell the mass of their parts: let it "
@@ -99,10 +107,12 @@ class NodalWork:
                 self._r.x.array[: motion.size] = np.where(where, motion, 0.0).ravel()
                 self._r.x.scatter_forward()
                 self.space.forms.follow(self._r)
-                for own, form, away in zip(rows, forms, [None, *less], strict=True):
+                for n, (own, form, away) in enumerate(zip(rows, forms, [None, *less], strict=True)):
                     if form is not None:
                         row = compat.assemble_vector(form).array_r
                         own.append(sp.csr_matrix(row if away is None else row - away[k]))
+                    elif n - len(self._forms) in self._nodal:
+                        own.append(sp.csr_matrix(self._r.x.array[: motion.size]))
         self._count = len(rows[0])
         self._matrices: list[Any] = [sp.vstack(own).tocsr() if own else None for own in rows]
         self._still: dict[int, Array] = {}
@@ -148,11 +158,14 @@ class NodalWork:
             total -= self._of_load(k, load, at)
         return self.space.comm.sum(total)
 
-    def _of_load(self, k: int, load: Traction | BodyForce, at: Callable[[Callable[[float], Any]], Any]) -> Array:
+    def _of_load(self, k: int, load: AnyLoad, at: Callable[[Callable[[float], Any]], Any]) -> Array:
         """Return rᵀf on this rank, (count,); what does not change with time is evaluated once."""
 
         def work(t: float) -> Array:
-            values = evaluate(type(load).__name__, load.value, self.space.points, t, self.space.comm)
+            if isinstance(load, LinearForm):
+                values = self._nodal[k](t)
+            else:
+                values = evaluate(type(load).__name__, load.value, self.space.points, t, self.space.comm)
             return np.asarray(self._matrices[len(self._forms) + k] @ values.ravel())
 
         if load.history is None and not load.is_constant:

@@ -1,0 +1,102 @@
+"""Take loads as a user of UFL writes them: as linear forms, the virtual work of the load on a displacement v."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import ufl
+from ufl.algorithms import compute_form_data
+from ufl.algorithms.check_arities import ArityMismatch
+
+from ..core.algebra import Array
+from ..core.checks import function, on_all, optional, refuse, shown
+from ..core.errors import InputError
+from . import compat
+from .loads import BodyForce, Traction
+from .quadrature import compiled
+from .space import FemSpace
+
+NAME = "LinearForm"
+
+
+@dataclass(frozen=True)
+class LinearForm:
+    """Apply the load whose virtual work is L(v) = ∫ f·v dx + ∫ g·v ds + …, as UFL with measures: v -> ufl.Form.
+
+    f in N/m³ and g in Pa push along +v; what the form gives is multiplied by the section's thickness, as other loads
+    are. The form may hold DOLFINx Functions and Constants of this mesh, gradients of v and Measures with the user's own
+    MeshTags: LinearForm(lambda v: ufl.inner(g, v) * ds(3)).
+
+    Args:
+        form: called once, with a test function of the displacement's space.
+        history: factor f(t) of the form, which is assembled once, as it is without one; t in seconds.
+        update: function of the time alone that sets Constants and Functions of the form to their values at t, on every
+            rank (``f.x.scatter_forward()`` where it writes to arrays). The form is then assembled anew at every time
+            that a step asks for: one sweep over its cells or facets, where a history costs one vector update.
+    Raises:
+        InputError: history and update together; from ``assemble``, on all ranks: what is no linear form in v on this
+            mesh; from ``assemble`` and in steps: NaN or infinite forces, an update that ends in an error.
+    """
+
+    form: Callable[[Any], Any]
+    history: Callable[[float], float] | None = None
+    update: Callable[[float], Any] | None = None
+
+    def __post_init__(self) -> None:
+        function(NAME, "form", self.form, "give a function of the test function v that returns a UFL form")
+        for name in ("history", "update"):
+            optional(function, NAME, name, getattr(self, name), "give a function of the time [s], or None")
+        if self.history is not None and self.update is not None:
+            raise InputError(f"{NAME} has a history and an update; give one of them, a factor or all that changes")
+
+    @property
+    def is_constant(self) -> bool:
+        """Return whether one assembly serves all times."""
+        return self.update is None
+
+    def full(self, space: FemSpace, thickness: float) -> Callable[[float], Array]:
+        """Return t -> the forces (owned full,) on all components, less the history. Collective."""
+        form = on_all(space.comm, f"the form of {NAME}", lambda: compiled(space, self._checked(space)))
+        update = self.update
+
+        def at(t: float) -> Array:
+            if update is not None:
+                on_all(space.comm, f"{NAME}: update({t:g})", lambda: update(t))
+            vector = compat.assemble_vector(form)
+            forces = thickness * vector.array_r
+            vector.destroy()
+            defect = f"{NAME} gives NaN or infinite forces at t = {t:g} s: check its Functions, Constants and numbers"
+            refuse(["" if np.all(np.isfinite(forces)) else defect], space.comm)
+            return np.asarray(forces)
+
+        return at
+
+    def integrated(self, space: FemSpace, thickness: float) -> Callable[[float], Array]:
+        """Return t -> the forces on the free unknowns, less the history."""
+        full = self.full(space, thickness)
+        return lambda t: space.pull(full(t))
+
+    def _checked(self, space: FemSpace) -> Any:
+        """The form in v; InputError unless it is one, linear, and of this mesh."""
+        v, mesh = ufl.TestFunction(space.V), space.mesh
+        form = self.form(v)
+        if not isinstance(form, ufl.Form):
+            raise InputError(f"{NAME}: form returned {shown(form)}; return a UFL form with its measure, such as "
+                             "ufl.inner(f, v) * ufl.dx")
+        if form.arguments() != (v,):
+            raise InputError(f"{NAME}: the form has other arguments than v, or is zero; return one that is linear in "
+                             "v, without other test or trial functions")
+        spaces = (one.ufl_function_space() for one in form.coefficients())
+        if {*form.ufl_domains(), *(one.ufl_domain() for one in spaces)} != {mesh.ufl_domain()}:
+            raise InputError(f"{NAME}: the form integrates over another mesh, or has Functions of one; use this one")
+        try:
+            compute_form_data(form)
+        except (Exception, ArityMismatch) as error:  # compilers hang after these
+            raise InputError(f"{NAME}: UFL has no form data, {type(error).__name__}: {shown(str(error))}; return a form "
+                             "that is linear in v") from error
+        return form
+
+
+AnyLoad = Traction | BodyForce | LinearForm
+Loads = AnyLoad | Sequence[AnyLoad]
