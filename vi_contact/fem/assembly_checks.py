@@ -38,6 +38,7 @@ def check_body(
     if mesh.topology.dim != mesh.geometry.dim:
         raise InputError(f"assemble: the mesh has cells of dimension {mesh.topology.dim} at points of "
                          f"{mesh.geometry.dim} coordinates; read it with gdim={mesh.topology.dim}")
+    _refuse_lonely_nodes(mesh)
     _check_degree(mesh, degree)
     refuse_complex()
     optional(instance, OWNER, "forms", forms, Forms, "give fem.Forms(stiffness=…, mass=…), or leave them out")
@@ -70,6 +71,15 @@ def check_body(
     if forms is None and degree == 1 and thick and integration == "full" and mesh.comm.rank == 0:
         _tell_locking([one for one in found if isinstance(one, LinearElastic)])
     return section, damping
+
+
+def _refuse_lonely_nodes(mesh: Mesh) -> None:
+    """Raise InputError, on all ranks, where a rank owns nodes of which it has no cell, as parts of meshes may leave."""
+    own = np.arange(mesh.geometry.index_map().size_local)
+    lonely = mesh.comm.allreduce(len(np.setdiff1d(own, compat.geometry_dofmap(mesh))))
+    if lonely:
+        raise InputError(f"assemble: {lonely} nodes of the mesh belong to ranks that have none of their cells, as "
+                         "create_submesh may leave them; write the part to a file and read it, or use fewer ranks")
 
 
 def _check_degree(mesh: Mesh, degree: Any) -> None:

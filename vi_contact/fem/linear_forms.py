@@ -90,11 +90,11 @@ class LinearForm:
         spaces = (one.ufl_function_space() for one in form.coefficients())
         if {*form.ufl_domains(), *(one.ufl_domain() for one in spaces)} != {mesh.ufl_domain()}:
             raise InputError(f"{NAME}: the form integrates over another mesh, or has Functions of one; use this one")
-        try:
+        try:  # before compilers do, which leave the other ranks waiting
             compute_form_data(form)
-        except (Exception, ArityMismatch) as error:  # compilers hang after these
-            raise InputError(f"{NAME}: UFL has no form data, {type(error).__name__}: {shown(str(error))}; return a form "
-                             "that is linear in v") from error
+        except (Exception, ArityMismatch) as error:
+            raise InputError(f"{NAME}: UFL has no form data, {type(error).__name__}: {shown(str(error))}; return a "
+                             "form that is linear in v") from error
         return form
 
 
