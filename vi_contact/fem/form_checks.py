@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 import ufl
 from petsc4py import PETSc
+from ufl.algorithms import compute_form_data
+from ufl.algorithms.check_arities import ArityMismatch
 
 from ..core.algebra import largest
 from ..core.checks import function, instance, on_all
@@ -46,6 +48,7 @@ def form_of(name: str, call: Callable[[Any, Any], Any], u: Any, v: Any, space: F
     if set(on_all(space.comm, said, form.arguments)) != {u, v}:
         raise InputError(f"{said} is no form in the trial and test functions it is given; return one that is linear in "
                          "u and in v")
+    on_all(space.comm, said, lambda: _refuse_not_linear(said, form))
     own = space.mesh.ufl_domain().ufl_id()
     functions = (getattr(one, "function_space", space.V) for one in form.coefficients())
     if any(one.ufl_id() != own for one in form.ufl_domains()) or any(V.mesh is not space.mesh for V in functions):
@@ -53,10 +56,17 @@ def form_of(name: str, call: Callable[[Any, Any], Any], u: Any, v: Any, space: F
     return form
 
 
+def _refuse_not_linear(said: str, form: Any) -> None:
+    """Ask UFL here, on every rank: the compiler asks on one, and the others would wait for it."""
+    try:
+        compute_form_data(form)
+    except (ArityMismatch, TypeError):  # the former is no Exception; the latter where UFL of 0.5 words the former
+        raise InputError(f"{said} is not linear in u or in v; return a sum of products of one and the other") from None
+
+
 def matrix_of(name: str, space: FemSpace, compiled: Callable[[], Any]) -> Any:
     """Return the assembled matrix of a form, finite. Collective."""
-    said = f"Forms: {name}, which must be linear in u and in v,"
-    matrix = compat.assemble_matrix(on_all(space.comm, said, compiled))
+    matrix = compat.assemble_matrix(on_all(space.comm, f"Forms: {name}", compiled))
     if not np.isfinite(matrix.norm(PETSc.NormType.FROBENIUS)):
         raise InputError(f"Forms: {name} has NaN or infinite entries; check its Functions and Constants")
     return matrix

@@ -33,7 +33,8 @@ class Heterogeneous:
     A Function that is constant on every cell is taken as it is. Of all others the Lamé constants and rho are taken at
     the vertices of every cell and are linear in it (DG1), so that E and rho may be linear exactly. Where the material
     jumps inside of a function, at a side of a cell, vertices cannot tell which side is meant: give (cells, material)
-    pairs or a Function of DG0. The body keeps the values of the moment when it is assembled.
+    pairs or a Function of DG0. The body keeps the values of the moment when it is assembled. Columns of free fields and
+    section forces through elements take means over cells.
 
     Raises InputError: neither number nor function; and when a body is assembled, values outside E > 0, -1 < nu < 1/2,
     rho > 0, with the first place of them, and Functions of another mesh.
