@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.algebra import Array
-from ..core.checks import attributes
-from ..core.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.checks import attributes
+from vi_contact.core.errors import InputError
 
 
 def contact_modulus(*bodies: tuple[float, float]) -> float:

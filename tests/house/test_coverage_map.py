@@ -36,7 +36,6 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "core/test_surfaces.py": "core.obstacles",
     "engineering/test_resultants.py":
         "engineering.floor_spectra engineering.peak_values engineering.racking plots.maps",
-    "exact/test_exact_hertz.py": "exact.hertz",
     "fem/test_assembly.py": "fem.assembly_checks",
     "fem/test_corners.py": "core.corners laws.mass_transfer",
     "fem/test_forces_in_space.py": "fem.output.cut_cells",
