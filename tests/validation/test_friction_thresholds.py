@@ -36,6 +36,8 @@ BODIES = {
     "quadrilaterals": {"lengths": (1.2, 0.7), "divisions": (6, 4)},
     "turned triangles": {"lengths": (1.2, 0.7), "divisions": (6, 4), "simplices": True, "angle": 0.4},
     "tetrahedra": {"lengths": (1.2, 0.7, 0.8), "divisions": (3, 3, 2), "simplices": True},
+    "P2 triangles": {"lengths": (1.2, 0.7), "divisions": (3, 2), "simplices": True, "degree": 2},
+    "Q2 hexahedra": {"lengths": (1.2, 0.7, 0.8), "divisions": (2, 1, 2), "degree": 2},
 }
 bodies = pytest.mark.parametrize("body", list(BODIES))
 laws = pytest.mark.parametrize("law", LAWS, ids=["Coulomb", "Tresca"])
@@ -43,7 +45,8 @@ laws = pytest.mark.parametrize("law", LAWS, ids=["Coulomb", "Tresca"])
 
 def sheared(law: FrictionLaw, body: str, share: float, *, nu: float = 0.0) -> ContactProblem:
     """``share`` of the threshold as shear at t = 1, in proportion to t; the pressure is there from the start."""
-    spec = BODIES[body]
+    spec = dict(BODIES[body])
+    degree = spec.pop("degree", 1)
     angle, d = float(spec.get("angle", 0.0)), len(spec["lengths"])
     mesh, tags = block(COMM, **spec)
 
@@ -54,7 +57,7 @@ def sheared(law: FrictionLaw, body: str, share: float, *, nu: float = 0.0) -> Co
     shear = [(tags["top"], along(q, 0.0)), (tags["right"], along(0.0, q)), (tags["left"], along(0.0, -q))]
     loads = [Traction(tags["top"], along(0.0, -P))]
     loads += [Traction(facets, value, history=lambda t: t) for facets, value in shear]
-    system = assemble(mesh, LinearElastic(E=E, nu=nu, rho=2000.0), loads=loads)
+    system = assemble(mesh, LinearElastic(E=E, nu=nu, rho=2000.0), loads=loads, degree=degree)
     assert system.floating
     ground = HalfSpace(point=(0.0,) * d, normal=along(0.0, 1.0))
     return ContactProblem(system, contact_surface(system, tags["bottom"], obstacle=ground), friction=law)
