@@ -34,6 +34,11 @@ class NodalSpace:
     ids: Indices
     unknowns: int
 
+    @property
+    def hierarchy(self) -> Any:
+        """Return the change to unknowns of a hierarchy, where contact conditions need one; None elsewhere."""
+        return None
+
     def expand(self, u: Array, t: float, derivative: int = 0) -> Array:
         """Expand a vector of unknowns (n,) at time t -> displacements of owned nodes (k, d), or their derivatives."""
         where = self.free_index.reshape(-1, self.dimension)

@@ -79,7 +79,7 @@ def _ranked(comm: Any, keys: Indices, count: int) -> tuple[Indices, int]:
     return ranks, comm.allreduce(mine)
 
 
-def facet_rows(V: Any, facets: Indices) -> Indices:
+def facet_rows(V: Any, facets: Any) -> Indices:
     """Return the local blocks (k, n) on each of these local facets: of its vertices first, then of mid-points.
 
     Collective.

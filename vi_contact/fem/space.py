@@ -16,6 +16,7 @@ from ..core.system import SemiDiscreteSystem
 from . import compat
 from .communicators import MpiComm, kept
 from .groups import components_of
+from .hierarchical import Hierarchy, needs_hierarchy
 from .loads import Prescribed, evaluate_here
 from .mesh import Facets, node_numbers
 from .nodal_space import NodalSpace, bounding_box, parts_of
@@ -128,6 +129,15 @@ class FemSpace(NodalSpace):
         if self.degree == 1:
             return node_numbers(self.mesh)[compat.entities_to_geometry(self.mesh, self.mesh.topology.dim - 1, facets)]
         return self.node_of_block[facet_rows(self.V, facets)]
+
+    def corners_of_facets(self, facets: Any) -> Indices:
+        """Return the numbers (k, n) of those of them that may have contact conditions: in a hierarchy the vertices."""
+        return self.nodes_of_facets(facets)[:, : None if self.hierarchy is None else self.dimension]
+
+    @cached_property
+    def hierarchy(self) -> Hierarchy | None:
+        """Return the hierarchy of P2 tetrahedra, None of other cells. Collective when first asked."""
+        return Hierarchy(self) if needs_hierarchy(self.V) else None
 
     def _everywhere(self, facets: Facets) -> tuple[Indices, Array]:
         """(original numbers, points) of the nodes of facets, ascending, on every rank."""

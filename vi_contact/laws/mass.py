@@ -61,7 +61,10 @@ class Redistributed:
             return system
         massless, contact = _contact_unknowns(system, surface, tangential)
         algebra, nodal, own = system.algebra, _row_sums(system), system.M.diagonal()
-        if largest(algebra.comm, np.any((own > 0.0) & ~system.influence.any(axis=1))):
+        still = (own > 0.0) & ~system.influence.any(axis=1)  # no translation moves them
+        if getattr(system.space, "hierarchy", None) is not None:
+            nodal[still] = own[still]
+        elif largest(algebra.comm, still.any()):
             raise InputError("redistributed mass has no place for the inertia of rotations, or of what else is no "
                              "displacement: give the problem mass=ConsistentMass()")
         wrong = int(total(algebra.comm, np.sum(nodal < -LIGHT * own)))  # as of elements of higher order

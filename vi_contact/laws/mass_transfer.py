@@ -33,7 +33,7 @@ def from_neighbours(system: SemiDiscreteSystem, massless: Mask, contact: Mask, n
     node = np.asarray(system.space.ids) // system.influence.shape[1]
     levels: list[Matrix] = []
     tied = np.zeros_like(contact) if system.tied is None else system.tied
-    left, donors, exact = massless.copy(), ~contact & ~tied, True
+    left, donors, exact = massless.copy(), ~contact & ~tied & system.influence.any(axis=1), True
     while largest(comm, left.any()):
         ready, entries = _rows(system, left & ~tied if exact else left, donors, nodal, exact=exact)
         if largest(comm, len(ready)):

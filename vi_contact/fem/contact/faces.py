@@ -77,7 +77,7 @@ def boundary(space: FemSpace, facets: Facets, *, beyond: float | None = None) ->
     it from others: of a smooth boundary none. Collective."""
     mesh, local = space.mesh, np.asarray(facets.indices)
     geometry = compat.entities_to_geometry(mesh, mesh.topology.dim - 1, local)
-    vertices, normals = space.nodes_of_facets(local), _outward(mesh, local, geometry)
+    vertices, normals = space.corners_of_facets(local), outward(mesh, local, geometry)
     if beyond is not None:
         kept = np.isin(vertices, _turning(space, vertices, normals, beyond)).any(axis=1)
         local, vertices, normals = local[kept], vertices[kept], normals[kept]
@@ -112,8 +112,8 @@ def _boxes(nodes: Indices, low: Array, high: Array) -> tuple[Indices, Array, Arr
     return numbers, np.minimum.reduceat(low[order], starts), np.maximum.reduceat(high[order], starts)
 
 
-def _outward(mesh: Any, facets: Any, geometry: Any) -> Array:
-    """Outward unit normals (k, d) of local facets with these nodes."""
+def outward(mesh: Any, facets: Any, geometry: Any) -> Array:
+    """Return outward unit normals (k, d) of local facets with these nodes."""
     d = mesh.geometry.dim
     x = mesh.geometry.x[geometry][:, :, :d]
     middle = x.mean(axis=1)
@@ -139,13 +139,17 @@ def components(count: int, links: list[Indices]) -> Indices:
 
 
 def integrals(space: FemSpace, indices: Any) -> Array:
-    """Integrate phi_i and phi_i n, (owned nodes, 1 + d), over local facets. Collective."""
+    """Integrate phi_i and phi_i n, (owned nodes, 1 + d), over local facets; in a hierarchy those of the vertices, which
+    are of first order. Collective."""
     mesh, d = space.mesh, space.dimension
     ds = compat.measure(mesh, mesh.topology.dim - 1, indices)
-    v = ufl.TestFunction(space.V)
+    V, blocks = (space.V, slice(None)) if space.hierarchy is None else space.hierarchy.vertices
+    v = ufl.TestFunction(V)
     one = compat.assemble_vector(compat.compile_form(sum(v[c] for c in range(d)) * ds)).array_r.reshape(-1, d)
     normal = compat.assemble_vector(compat.compile_form(ufl.inner(ufl.FacetNormal(mesh), v) * ds)).array_r
-    return np.column_stack([one[:, 0], normal.reshape(-1, d)])
+    found = np.zeros((len(space.nodes), 1 + d))
+    found[blocks] = np.column_stack([one[:, 0], normal.reshape(-1, d)])
+    return found
 
 
 def split(space: FemSpace, around: Boundary, nodes: Nodes, angle: float) -> tuple[Nodes, Indices]:

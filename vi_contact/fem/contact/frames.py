@@ -35,12 +35,14 @@ class Facing:
 @dataclass(frozen=True, eq=False)
 class NodalConditions:
     """Hold this rank's conditions u·direction <= gap at nodes, u being relative to what they are ``facing`` if that
-    deforms too; ``slots``: their numbers among those of all ranks, ascending."""
+    deforms too, and less sum_k P_sk e_k of ``bubbles`` of edges where displacements have them (``.bubbles``);
+    ``slots``: their numbers among those of all ranks, ascending."""
 
     nodes: Nodes
     directions: Array
     slots: Indices
     facing: Facing | None = None
+    bubbles: Facing | None = None
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -137,10 +139,14 @@ def surface_of(space: NodalSpace, parts: Sequence[NodalConditions], **data: Any)
     index = space.free_index.reshape(-1, d)[space.blocks_of(frames.numbers)]
     place, column, count = frames.place, frames.column, len(slots)
     tangents = np.take_along_axis(index[place], tangential_columns(column, d), axis=1)
+    turn = _turn(space, frames.turns, index)
+    dual = _turn(space, frames.blocks, index) if largest(comm, frames.oblique) else None
+    if space.hierarchy is not None:
+        turn, dual = space.hierarchy.around(turn, turn if dual is None else dual)
     return FemSurface(
         comm=comm, points=frames.points, normals=frames.directions, owned=index[place, column], slots=slots,
-        tangents=np.where(frames.rubs, tangents, -1), basis=_turn(space, frames.turns, index),
-        dual=_turn(space, frames.blocks, index) if largest(comm, frames.oblique) else None, nodes=frames.numbers[place],
+        tangents=np.where(frames.rubs, tangents, -1), basis=turn, dual=dual,
+        nodes=frames.numbers[place],
         coupling=_coupling(space, parts, frames, index), space=space, parts=tuple(parts),
         **{"bilateral": np.zeros(count, dtype=bool), "compliance": np.zeros(count)} | data,
     )
@@ -163,11 +169,11 @@ def _turn(space: NodalSpace, blocks: Array, index: Indices) -> Matrix | None:
 def _coupling(
     space: NodalSpace, parts: Sequence[NodalConditions], frames: NodalFrames, index: Indices
 ) -> Matrix | None:
-    """R with û = R ǔ: to the unknowns of a node that faces others, q_c·u = ǔ_c + q_c·sum_j P_sj u_j.
+    """R with û = R ǔ: to the unknowns of a node that faces others, q_c·u = ǔ_c + q_c·(sum_j P_sj u_j + sum_k P_sk e_k).
 
     At nodes with several conditions each one's own vectors only are relative to what it faces.
     """
-    if all(part.facing is None for part in parts):
+    if all(part.facing is None and part.bubbles is None for part in parts):
         return None
     _refuse_chains(space, parts)
     algebra, n = space.algebra, len(space.ids)
@@ -177,14 +183,19 @@ def _coupling(
     for part in parts:
         slots = slice(start, start + len(part.nodes.numbers))
         start = slots.stop
-        if part.facing is None:
+        place, faced = frames.place[slots], []
+        if part.facing is not None:
+            faced.append((part.facing, _turns(space, frames, part.facing.nodes.numbers)))
+        if part.bubbles is not None:
+            faced.append((part.bubbles, np.tile(np.eye(space.dimension), (len(part.bubbles.nodes.numbers), 1, 1))))
+        if not faced:
             continue
-        place, turns = frames.place[slots], _turns(space, frames, part.facing.nodes.numbers)
         for c in range(space.dimension):
             rows = np.flatnonzero(relative[slots, c] & (index[place, c] >= 0))
             own.append(index[place[rows], c])
             diagonal = sp.csr_matrix((np.ones(len(rows)), (np.arange(len(rows)), first + own[-1])), (len(rows), total))
-            entries.append(diagonal + _faced(part.facing, rows, turns, frames.blocks[place[rows], :, c], total))
+            directions = frames.blocks[place[rows], :, c]
+            entries.append(sum((_faced(one, rows, turns, directions, total) for one, turns in faced), start=diagonal))
     return algebra.replaced_rows(n, np.concatenate(own), sp.csr_matrix(sp.vstack(entries)))
 
 
@@ -210,14 +221,16 @@ def _faced(facing: Facing, rows: Indices, turns: Array, directions: Array, total
 
 
 def _refuse_chains(space: NodalSpace, parts: Sequence[NodalConditions]) -> None:
-    """InputError for a node on side 1 of one pair and side 2 of another: R⁻¹ = 2 - R needs them apart. Collective."""
-    coupled = [(part.nodes, part.facing) for part in parts if part.facing is not None]
+    """InputError for a node on side 1 of a pair, or with bubbles, and on side 2 of another: R⁻¹ = 2 - R needs them
+    apart. Collective."""
+    coupled = [part.nodes.numbers for part in parts if part.facing is not None or part.bubbles is not None]
     first = np.zeros((len(space.nodes), 1))
-    first[space.blocks_of(np.concatenate([nodes.numbers for nodes, _ in coupled]))] = 1.0
-    for _, facing in coupled:
+    first[space.blocks_of(np.concatenate(coupled))] = 1.0
+    for facing in (part.facing for part in parts if part.facing is not None):
         used = np.zeros(len(facing.nodes.numbers))
         used[facing.P.indices] = 1.0
         both = np.flatnonzero(space.at_nodes(space.leaders(facing.nodes.numbers), first)[:, 0] * space.comm.max(used))
         if len(both):
             raise InputError(f"node {at(facing.nodes.points[both[0]])} is on side 1 of one contact pair and on side 2 "
-                             "of another: exchange the sides of one of them, or give it once if both are the same")
+                             "of another, or of P2 tetrahedra and on an obstacle too: exchange the sides of one of "
+                             "them, give it once if both are the same, or leave the node out (points=)")

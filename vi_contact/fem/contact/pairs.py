@@ -11,28 +11,29 @@ n is the outward normal of side 1, from side 1 to side 2. Displacements are smal
 """
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from ...core.algebra import Array, Mask, largest
+from ...core.algebra import Array, Mask
 from ...core.checks import at, optional, provides
-from ...core.corners import FEATURE_ANGLE, tangent_vectors
+from ...core.corners import FEATURE_ANGLE
 from ...core.errors import InputError
 from ...core.stages import stage
-from ...core.surfaces import ContactSurface, tangential_columns
+from ...core.surfaces import ContactSurface
 from ...core.system import SemiDiscreteSystem
 from ...meshes.rows import number_alike
 from ..mesh import Facets
 from ..space import FemSpace
+from .bubbles import averaged, bubbles_of
 from .faces import Boundary, boundary, checked_angle, split, tell_corners
-from .frames import Facing, NodalConditions, NodalFrames, given, snapped, surface_of
+from .frames import Facing, NodalConditions, snapped, surface_of
 from .matching import Matched, Matching, NodeToNode, Side
 from .nodes import Nodes, everywhere, joined_nodes
-from .surface import contact_space, listed, merged, nodes_on
+from .surface import averaged_bubbles, contact_space, listed, merged, nodes_on, prescribed_motion
 
 log = logging.getLogger(__name__)
 
@@ -64,6 +65,9 @@ def contact_pair(
     space = contact_space("contact_pair", system, {"facets1": facets1, "facets2": facets2}, points)
     optional(provides, "contact_pair", "matching", matching, ("match",), "give NodeToNode() or DualMortar(), or None")
     angle = checked_angle("contact_pair", feature_angle)
+    if space.hierarchy is not None and not isinstance(matching or NodeToNode(), NodeToNode):
+        raise InputError("contact_pair: sides of P2 tetrahedra are matched by matching=NodeToNode() only: mesh both "
+                         "sides alike, or use degree=1")
     one, two = side_of(space, facets1), side_of(space, facets2)
     shared = np.isin(one.nodes.numbers, two.nodes.numbers)
     if shared.all():
@@ -89,16 +93,25 @@ def contact_pair(
     slots = np.flatnonzero(space.blocks_of(nodes.numbers) >= 0)  # from here on every rank has its own nodes of side 1
     nodes = nodes.pick(slots)
     tell_corners(space, one.name, nodes, slots, angle)
-    conditions = NodalConditions(nodes, directions[slots], slots, Facing(two.nodes, P[slots]))
+    bubbles = _bubbles(space, facets1, facets2, nodes, two, P[slots])
+    conditions = NodalConditions(nodes, directions[slots], slots, Facing(two.nodes, P[slots]), bubbles)
     surface = surface_of(space, [conditions], gap0=gap[slots], weights=nodes.weights * space.forms.section.thickness)
-    moving: dict[str, Any] = _prescribed_motion(space, conditions)
-    return replace(surface, **moving)
+    return replace(surface, **prescribed_motion(space, conditions))
+
+
+def _bubbles(space: FemSpace, facets1: Facets, facets2: Facets, nodes: Nodes, two: Side, P: Any) -> Facing | None:
+    """What conditions contain besides displacements of nodes of side 1 and 2; None but in a hierarchy. Collective."""
+    own = averaged_bubbles(space, facets1, nodes)
+    if own is None or space.hierarchy is None:
+        return None
+    faced = averaged(space, bubbles_of(space, space.hierarchy, facets2, everywhere=True), two.nodes, 1.0)
+    return Facing(joined_nodes([own.nodes, faced.nodes]), sp.csr_matrix(sp.hstack([own.P, P @ faced.P])))
 
 
 def side_of(space: FemSpace, facets: Facets) -> Side:
     """Gather all nodes and facets of a boundary, on every rank, in the order of the mesh's numbers. Collective."""
     nodes = everywhere(space.comm, nodes_on(space, facets))
-    rows = np.concatenate(space.comm.bcast(space.comm.gather(space.nodes_of_facets(facets.indices))))
+    rows = np.concatenate(space.comm.bcast(space.comm.gather(space.corners_of_facets(facets.indices))))
     _, first = np.unique(np.sort(rows, axis=1), axis=0, return_index=True)
     return Side(facets.name, nodes, np.searchsorted(nodes.numbers, rows[first]))
 
@@ -201,23 +214,3 @@ def _gap(space: FemSpace, name: str, two: Side, nodes: Nodes, directions: Array,
     if gap.min() < -1e-12 * space.size and space.comm.rank == 0:
         log.warning("'%s' and '%s' overlap by up to %.3g m: taken as touching there", name, two.name, -gap.min())
     return np.maximum(gap, 0.0)
-
-
-def _prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str, Callable[[float], Array]]:
-    """``motion`` and ``slide`` of this rank's conditions where nodes of side 2 are moved, if any are. Collective."""
-    facing, held = conditions.facing, conditions.nodes.held
-    moves = any(condition.moves for condition in space.prescribed)
-    if facing is None or not moves or not largest(space.comm, facing.nodes.held[facing.P.indices].any()):
-        return {}
-    frames, numbers, P = NodalFrames(*given([conditions])), facing.nodes.numbers, facing.P
-    free = np.take_along_axis(~held, tangential_columns(frames.column, space.dimension), axis=1) & frames.rubs
-    tangents, directions = tangent_vectors(frames.directions, frames.place), frames.directions
-    nothing = np.zeros(len(space.ids))
-
-    def displacement(t: float) -> Array:
-        return np.asarray(P @ space.sample(nothing, numbers, t))
-
-    return {
-        "motion": lambda t: -np.sum(displacement(t) * directions, axis=1),
-        "slide": lambda t: np.einsum("ijk,ij->ik", tangents, displacement(t)) * free,
-    }

@@ -10,22 +10,21 @@ import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, from_each, largest, total
 from ...core.checks import array, at, optional, provides, several
-from ...core.corners import FEATURE_ANGLE, PARALLEL
+from ...core.corners import FEATURE_ANGLE, PARALLEL, tangent_vectors
 from ...core.errors import InputError
 from ...core.obstacles import Obstacle, Touching, admissible_gap, facing
 from ...core.stages import stage
-from ...core.surfaces import ContactSurface
+from ...core.surfaces import ContactSurface, tangential_columns
 from ...core.system import SemiDiscreteSystem
 from ..groups import facets_of
 from ..mesh import Facets
-from ..numbering import supports
 from ..space import FemSpace, space_of
 from .faces import boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
-from .frames import NodalConditions, snapped, surface_of
+from .bubbles import averaged, bubbles_of
+from .frames import Facing, NodalConditions, NodalFrames, given, snapped, surface_of
 from .nodes import Nodes, asked, everywhere, joined_nodes, slots_of
 
 log = logging.getLogger(__name__)
-TETRAHEDRON = 10  # nodes of one of degree 2
 
 
 @stage("contact")
@@ -68,7 +67,42 @@ def contact_surface(
     slots = slots_of(comm, _places(nodes, chosen))
     weights = nodes.weights * space.forms.section.thickness
     tell_corners(space, facets.name, nodes, slots, angle)
-    return surface_of(space, [NodalConditions(nodes, directions, slots)], gap0=gap, weights=weights)
+    conditions = NodalConditions(nodes, directions, slots, bubbles=averaged_bubbles(space, facets, nodes))
+    surface = surface_of(space, [conditions], gap0=gap, weights=weights)
+    return replace(surface, **prescribed_motion(space, conditions))
+
+
+def prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str, Any]:
+    """Return ``motion`` and ``slide`` of this rank's conditions where what they face, or bubbles are measured from, is
+    moved. Collective."""
+    parts = [part for part in (conditions.facing, conditions.bubbles) if part is not None]
+    moves = bool(parts) and any(condition.moves for condition in space.prescribed)
+    held = any(part.nodes.held[part.P.indices].any() for part in parts)
+    if not moves or not (space.hierarchy or largest(space.comm, held)):
+        return {}
+    frames, free = NodalFrames(*given([conditions])), ~conditions.nodes.held
+    free = np.take_along_axis(free, tangential_columns(frames.column, space.dimension), axis=1) & frames.rubs
+    tangents, directions = tangent_vectors(frames.directions, frames.place), frames.directions
+    numbers = np.unique(np.concatenate(from_each(space.comm, np.concatenate([part.nodes.numbers for part in parts]))))
+    places = [np.searchsorted(numbers, part.nodes.numbers) for part in parts]
+
+    def displacement(t: float) -> Array:
+        nodal = space.prescribed_values(t).reshape(-1, space.dimension)
+        found = space.at_nodes(numbers, nodal if space.hierarchy is None else space.hierarchy.bent(nodal))
+        return np.asarray(sum(part.P @ found[place] for part, place in zip(parts, places, strict=True)))
+
+    return {
+        "motion": lambda t: -np.sum(displacement(t) * directions, axis=1),
+        "slide": lambda t: np.einsum("ijk,ij->ik", tangents, displacement(t)) * free,
+    }
+
+
+def averaged_bubbles(space: FemSpace, facets: Facets, nodes: Nodes) -> Facing | None:
+    """Return what conditions at these nodes of this rank contain besides their own displacement; None but in a
+    hierarchy. Collective."""
+    if space.hierarchy is None:
+        return None
+    return averaged(space, bubbles_of(space, space.hierarchy, facets, everywhere=False), nodes, -1.0)
 
 
 def _obstacle(obstacle: Obstacle | None, size: float) -> Callable[[Array, Array], tuple[Array, Array]]:
@@ -126,9 +160,6 @@ def contact_space(owner: str, system: SemiDiscreteSystem, groups: Mapping[str, F
     space = space_of(owner, system)
     for meaning, group in groups.items():
         facets_of(owner, meaning, group, space.mesh)
-    if space.degree == 2 and space.dimension == 3 and len(supports(space.V)) == TETRAHEDRON:
-        raise InputError(f"{owner}: the vertices of P2 tetrahedra have no weight in a pressure, so conditions at nodes "
-                         "do not serve; use degree=1, or hexahedra")
     for point in () if points is None else several(owner, "points", points, "give a list of points, or None"):
         several(owner, "a point", point, f"give {space.dimension} coordinates")
         array(owner, "a point", point, (None,))
@@ -139,6 +170,8 @@ def nodes_on(space: FemSpace, facets: Facets) -> Nodes:
     """Return this rank's nodes of the facets, ordered by original node number. Collective."""
     values = integrals(space, facets.indices)
     blocks = space.facet_blocks(facets.indices)
+    if space.hierarchy is not None:
+        blocks = np.intersect1d(blocks, space.hierarchy.vertices[1])
     blocks = blocks[np.argsort(space.nodes[blocks])]
     weights, sums, held = values[blocks, 0], values[blocks, 1:], space.held[blocks]
     if not largest(space.comm, len(blocks)):
