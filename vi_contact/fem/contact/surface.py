@@ -19,8 +19,8 @@ from ...core.system import SemiDiscreteSystem
 from ..groups import facets_of
 from ..mesh import Facets
 from ..space import FemSpace, space_of
-from .faces import boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
 from .bubbles import averaged, bubbles_of
+from .faces import boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
 from .frames import Facing, NodalConditions, NodalFrames, given, snapped, surface_of
 from .nodes import Nodes, asked, everywhere, joined_nodes, slots_of
 
