@@ -124,9 +124,6 @@ def test_a_uniform_pressure_goes_through_the_nodes_between_two_bodies(name: str,
 
 
 def test_conditions_that_do_not_serve_are_refused() -> None:
-    mesh, tags = block(COMM, **BODIES["tetrahedra"])
-    with pytest.raises(InputError, match="vertices of P2 tetrahedra have no weight"):
-        contact_surface(assemble(mesh, SOFT, degree=2), tags["bottom"])
     both = blocks(2)
     mesh, tags = build_mesh(both, COMM)
     with pytest.raises(InputError, match=r"DualMortar joins facets of first order .* have mid-points"):

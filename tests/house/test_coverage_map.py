@@ -37,6 +37,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "engineering/test_resultants.py":
         "engineering.floor_spectra engineering.peak_values engineering.racking plots.maps",
     "fem/test_assembly.py": "fem.assembly_checks",
+    "fem/test_bubbles.py": "fem.hierarchical",
     "fem/test_corners.py": "core.corners laws.mass_transfer",
     "fem/test_forces_in_space.py": "fem.output.cut_cells",
     "fem/test_forms.py": "fem.form_checks fem.own_forms",

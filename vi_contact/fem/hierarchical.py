@@ -28,7 +28,7 @@ def needs_hierarchy(V: Any) -> bool:
 
 
 class Hierarchy:
-    """Know the edges of a space of P2 fields and the change of its unknowns. Collective, as all it does.
+    """Hold the edges of a space of P2 fields and the change of its unknowns. Collective, as all it does.
 
     Attributes:
         vertices: the P1 space, and the owned blocks of ``V`` that its own are; H, back: H and H⁻¹ = 2 - H.

@@ -72,6 +72,7 @@ class Redistributed:
             raise InputError(f"redistributed mass cannot lump negative row sums of M and {wrong} unknowns have such: "
                              "give the problem mass=Redistributed(lumping=0.0) or ConsistentMass()")
         nodal = own if wrong else np.maximum(nodal, 0.0)
+        inner = ~(contact | still)
         lumped = algebra.local(*lumped_entries(surface, nodal), system.rows)
         bulk = algebra.combine([(1.0 - self.lumping, system.M), (self.lumping, lumped)])
         levels = from_neighbours(system, massless, contact, nodal)
@@ -80,7 +81,7 @@ class Redistributed:
             moved, load = algebra.congruence(P, moved), load.handed_over(P)
             C = None if C is None else algebra.congruence(P, C)
         corrections = [
-            _inertia_correction(system, moved, body & ~contact, body, nodal) for body in _bodies(system, ~contact)
+            _inertia_correction(system, moved, body & inner, body, nodal) for body in _bodies(system, inner)
         ]
         M = algebra.combine([(1.0, moved), *((1.0, correction) for correction in corrections)])
         massless = massless if system.massless is None else massless | system.massless

@@ -231,6 +231,9 @@ def _refuse_chains(space: NodalSpace, parts: Sequence[NodalConditions]) -> None:
         used[facing.P.indices] = 1.0
         both = np.flatnonzero(space.at_nodes(space.leaders(facing.nodes.numbers), first)[:, 0] * space.comm.max(used))
         if len(both):
-            raise InputError(f"node {at(facing.nodes.points[both[0]])} is on side 1 of one contact pair and on side 2 "
-                             "of another, or of P2 tetrahedra and on an obstacle too: exchange the sides of one of "
-                             "them, give it once if both are the same, or leave the node out (points=)")
+            where = f"node {at(facing.nodes.points[both[0]])}"
+            if space.hierarchy is not None:
+                raise InputError(f"{where} of P2 tetrahedra is on side 2 of a contact pair and has a condition besides: "
+                                 "leave it out of the other surface (points=), or exchange the sides of the pair")
+            raise InputError(f"{where} is on side 1 of one contact pair and on side 2 of another: exchange the sides "
+                             "of one of them, or give it once if both are the same")

@@ -1,0 +1,264 @@
+"""Contact of tetrahedra of second order: conditions at vertices with the mean bubbles of edges in them.
+
+Shares of bubbles on flat and curved facets, patch tests with one body, at a corner and between two, sticking and
+sliding, turned bodies, moved supports, thrown bodies with friction, the same on any number of ranks.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("dolfinx")
+
+from curved_cells import Curved, mesh_of, wavy
+from fem_problems import max_over_ranks, nodal
+from mpi4py import MPI
+from two_bodies import SOFT, blocks, momenta, per_body, thrown
+
+import vi_contact as vc
+from vi_contact import fem
+from vi_contact.core.algebra import Array
+from vi_contact.core.errors import InputError
+from vi_contact.fem.contact.bubbles import OTHERS, _integrals
+from vi_contact.meshes.block import BlockMesh
+
+COMM = MPI.COMM_WORLD
+P, MU = 1.0e4, 0.3
+COARSE: dict[str, Any] = {"lengths": (2.0, 1.5, 1.2), "divisions": (2, 2, 2), "simplices": True}
+curved = pytest.mark.parametrize("curved", [False, True], ids=["straight", "curved"])
+
+
+def test_the_shares_of_bubbles_on_flat_and_curved_facets() -> None:
+    """A/5 for the edges at a vertex, -A/15 for the other; their sum over vertices is ∫ b_k on any facet."""
+    corners = np.array([[0.0, 0.0, 0.0], [2.0, 0.3, 0.1], [0.4, 1.0, -0.2]])
+    flat = np.concatenate([corners, corners[OTHERS].mean(axis=1)])[None]
+    area = 0.5 * np.linalg.norm(np.cross(corners[1] - corners[0], corners[2] - corners[0]))
+    sizes, shares = _integrals(flat)
+    assert np.allclose(sizes, area / 3.0, rtol=1e-14)
+    assert np.allclose(shares, area * (1.0 / 5.0 - np.eye(3) * 4.0 / 15.0), rtol=0.0, atol=1e-14 * area)
+    bent = flat + np.concatenate([np.zeros((3, 3)), [[0.0, 0.0, 0.3], [0.1, 0.0, 0.2], [0.0, -0.1, 0.1]]])
+    sizes, shares = _integrals(bent)
+    s, t = (one.ravel() for one in np.meshgrid(*[(np.arange(400) + 0.5) / 400] * 2, indexing="ij"))
+    s, t = np.where(s + t > 1.0, 1.0 - s, s), np.where(s + t > 1.0, 1.0 - t, t)  # midpoints of a square, folded
+    hats = np.stack([1.0 - s - t, s, t])
+    bubbles = 4.0 * hats[OTHERS].prod(axis=1)
+    slopes = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
+    rates = 4.0 * np.einsum("kaq,kag->kgq", hats[OTHERS], slopes[OTHERS[:, ::-1]])
+    e = bent[0, 3:] - bent[0, OTHERS].mean(axis=1)
+    along = np.einsum("ix,ig->gx", bent[0, :3], slopes)[:, None] + np.einsum("kx,kgq->gqx", e, rates)
+    density = 0.5 * np.linalg.norm(np.cross(along[0], along[1]), axis=1) / len(s)
+    assert np.allclose(sizes[0], hats @ density, rtol=1e-4)
+    assert np.allclose(shares[0].sum(axis=0), bubbles @ density, rtol=1e-4)
+
+
+def sheared(x: Array) -> Array:
+    """Displacements under sigma_yy = -P and sigma_xy = MU P without Poisson's effect, zero at y = 0."""
+    return np.column_stack([2.0 * MU * P / STIFF.E * x[:, 1], -P / STIFF.E * x[:, 1], np.zeros(len(x))])
+
+
+STIFF = vc.LinearElastic(E=1.0e6, nu=0.0, rho=1000.0)
+
+
+def side_loads(tags: Any, names: tuple[str, ...]) -> list[Any]:
+    """Shear on left and right sides that goes with sigma_xy = MU P."""
+    return [fem.Traction(tags[f"{name}{side}"], (0.0, sign * MU * P, 0.0))
+            for name in names for side, sign in (("left", -1.0), ("right", 1.0))]
+
+
+@curved
+def test_a_uniform_pressure_is_exact(curved: bool) -> None:
+    mesh, tags = fem.build_mesh(mesh_of("tetrahedra", curved), COMM)
+    rollers = [fem.Prescribed(tags[side], components=(c,)) for c, side in ((0, "left"), (2, "back"))]
+    system = fem.assemble(mesh, SOFT, prescribed=rollers, loads=fem.Traction(tags["top"], (0.0, -P, 0.0)), degree=2)
+    surface = fem.contact_surface(system, tags["bottom"])
+    problem = vc.ContactProblem(system, surface)
+    state = vc.static_equilibrium(problem)
+    assert surface.total == 9
+    assert np.all(surface.weights > 0.0)
+    assert np.allclose(state.r_n, P * surface.weights, rtol=1e-10, atol=0.0)
+    strain = P / SOFT.E * np.array([SOFT.nu, -1.0, SOFT.nu])
+    exact = nodal(system, lambda x: x * strain)
+    assert max_over_ranks(COMM, problem.cartesian(state.u) - exact) < 1e-10 * max_over_ranks(COMM, exact)
+
+
+@curved
+@pytest.mark.parametrize("limit", [2.0 * MU, MU], ids=["sticks", "slides"])
+def test_pressure_and_shear_are_exact_with_friction(curved: bool, limit: float) -> None:
+    """A block under uniform pressure and shear, its top moved along: below Coulomb's limit and just at it."""
+    slip = 0.0 if limit > MU else 0.01
+    mesh, tags = fem.build_mesh(mesh_of("tetrahedra", curved), COMM)
+    top = float(sheared(np.array([[0.0, 1.5, 0.0]]))[0, 0]) + slip
+    held = [fem.Prescribed(tags["back"], components=(2,)),
+            fem.Prescribed(tags["top"], displacement=(top, 0.0, 0.0), components=(0,))]
+    loads = [fem.Traction(tags["top"], (0.0, -P, 0.0)), *side_loads(tags, ("",))]
+    system = fem.assemble(mesh, STIFF, prescribed=held, loads=loads, degree=2)
+    surface = fem.contact_surface(system, tags["bottom"])
+    problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(limit))
+    state = vc.static_equilibrium(problem, tolerance=1e-13)
+    assert np.allclose(state.r_n, P * surface.weights, rtol=1e-10, atol=0.0)
+    assert state.r_t is not None
+    assert np.allclose(np.linalg.norm(state.r_t, axis=1), MU * P * surface.weights, rtol=1e-10, atol=0.0)
+    assert np.allclose(np.linalg.norm(surface.slip(state.u, 0.0), axis=1), slip, rtol=0.0, atol=1e-9 * top)
+    exact = nodal(system, lambda x: sheared(x) + np.array([slip, 0.0, 0.0]))
+    assert max_over_ranks(COMM, problem.cartesian(state.u) - exact) < 1e-9 * max_over_ranks(COMM, exact)
+
+
+def bent_bodies(x: Array) -> Array:
+    """Bend two blocks of heights 1 on one another inside, the sides and the interface stay where they are."""
+    bump = np.prod(np.sin(np.pi * x / np.array([1.5, 1.0, 1.2])), axis=1)
+    return x + 0.06 * bump[:, None] * np.array([1.0, -0.7, 0.5])
+
+
+@curved
+@pytest.mark.parametrize("limit", [2.0 * MU, MU], ids=["sticks", "slides"])
+def test_pressure_and_shear_go_through_two_bodies(curved: bool, limit: float) -> None:
+    both = blocks(3, upper=(2, 1, 2), lower=(2, 2, 2), simplices=True)
+    mesh, tags = fem.build_mesh(Curved(both, bent_bodies) if curved else both, COMM)
+    slip = 0.0 if limit > MU else 0.01
+    low = COMM.allreduce(np.min(mesh.geometry.x[:, 1]), op=MPI.MIN)
+    high = COMM.allreduce(np.max(mesh.geometry.x[:, 1]), op=MPI.MAX)
+    top = 2.0 * MU * P / STIFF.E * (high - low) + slip
+    held = [fem.Prescribed(tags["lower_bottom"], components=(0, 1)),
+            fem.Prescribed(tags["upper_top"], displacement=(top, 0.0, 0.0), components=(0,))]
+    held += [fem.Prescribed(tags[f"{name}_back"], components=(2,)) for name in ("lower", "upper")]
+    loads = [fem.Traction(tags["upper_top"], (0.0, -P, 0.0)), *side_loads(tags, ("lower_", "upper_"))]
+    system = fem.assemble(mesh, STIFF, prescribed=held, loads=loads, degree=2)
+    surface = fem.contact_pair(system, *(tags[side] for side in both.interface))
+    problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(limit))
+    state = vc.static_equilibrium(problem, tolerance=1e-13)
+    assert np.allclose(state.r_n, P * surface.weights, rtol=1e-10, atol=0.0)
+    assert state.r_t is not None
+    assert np.allclose(np.linalg.norm(state.r_t, axis=1), MU * P * surface.weights, rtol=1e-10, atol=0.0)
+    assert np.allclose(np.linalg.norm(surface.slip(state.u, 0.0), axis=1), slip, rtol=0.0, atol=1e-9 * top)
+
+    def moved(x: Array, way: float) -> Array:
+        return sheared(x - np.array([0.0, low, 0.0])) + np.array([way, 0.0, 0.0])
+
+    exact = per_body(system, lambda x: moved(x, 0.0), lambda x: moved(x, slip))  # the lower one is the first
+    assert max_over_ranks(COMM, problem.cartesian(state.u) - exact) < 1e-9 * top
+
+
+def test_a_corner_carries_the_pressure_of_both_faces() -> None:
+    """A parallelepiped pressed into a corner of oblique walls by a uniform pressure on all else."""
+    lean = np.array([[1.0, 0.3, 0.0], [0.0, 1.0, 0.0], [0.2, 0.1, 1.0]])
+    mesh, tags = fem.build_mesh(BlockMesh(**COARSE, deform=lambda x: wavy(x) @ lean), COMM)
+    outward = np.linalg.inv(lean)  # columns are normals of the faces
+    outward /= np.linalg.norm(outward, axis=0)
+    loads = [fem.Traction(tags[name], tuple(-sign * P * outward[:, axis]))
+             for name, axis, sign in (("right", 0, 1.0), ("top", 1, 1.0), ("front", 2, 1.0), ("back", 2, -1.0))]
+    both = fem.Facets("both", np.concatenate([tags["bottom"].indices, tags["left"].indices]), mesh)
+    system = fem.assemble(mesh, SOFT, loads=loads, degree=2)
+    surface = fem.contact_surface(system, both)
+    state = vc.static_equilibrium(vc.ContactProblem(system, surface))
+    assert surface.total == 18
+    assert np.allclose(state.r_n, P * surface.weights, rtol=1e-8, atol=0.0)
+
+
+def test_turning_everything_changes_nothing() -> None:
+    """A block pressed obliquely onto a half-space with friction, and the same turned in space: equal reactions."""
+    turn = np.linalg.qr(np.random.default_rng(5).standard_normal((3, 3)))[0]
+    turn *= np.linalg.det(turn)
+    reactions = []
+    for R in (np.eye(3), turn):
+        mesh, tags = fem.build_mesh(BlockMesh(**COARSE, deform=lambda x, R=R: wavy(x) @ R.T), COMM)
+        load = fem.Traction(tags["top"], tuple(R @ [0.2 * P, -P, 0.1 * P]))
+        system = fem.assemble(mesh, SOFT, loads=load, degree=2)
+        ground = vc.HalfSpace((0.0, 0.0, 0.0), tuple(R @ [0.0, 1.0, 0.0]))
+        surface = fem.contact_surface(system, tags["bottom"], obstacle=ground)
+        state = vc.static_equilibrium(vc.ContactProblem(system, surface, friction=vc.Coulomb(0.5)))
+        assert state.r_t is not None
+        reactions.append(surface.everywhere(np.column_stack([state.r_n, np.linalg.norm(state.r_t, axis=1)])))
+    assert np.allclose(*reactions, rtol=0.0, atol=1e-9 * P)
+
+
+def test_moved_supports_move_the_conditions_beside_them() -> None:
+    """A side that is moved along the ground takes the free body with it: every condition slips by as much."""
+    mesh, tags = fem.build_mesh(mesh_of("tetrahedra", False), COMM)
+    way = np.array([0.02, 0.01])
+    held = fem.Prescribed(tags["left"], displacement=(way[0], 0.0, way[1]), components=(0, 2))
+    rigid = vc.LinearElastic(E=1.0e12, nu=0.0, rho=1000.0)
+    system = fem.assemble(mesh, rigid, prescribed=held, loads=fem.BodyForce((0.0, -1.0, 0.0)), degree=2)
+    surface = fem.contact_surface(system, tags["bottom"])
+    state = vc.static_equilibrium(vc.ContactProblem(system, surface))
+    free = surface.tangents >= 0
+    assert np.all(free.sum(axis=1) != 1)
+    slips = np.abs(surface.slip(state.u, 0.0))[free].reshape(-1, 2)
+    assert np.allclose(np.sort(slips), np.sort(way), rtol=0.0, atol=1e-7)
+
+
+def thrown_block(comm: Any, lumping: float, curved: bool = False) -> vc.ContactProblem:
+    """A free block with spin, thrown obliquely onto a rough plane."""
+    finer = COARSE | {"divisions": (3, 3, 3)}
+    mesh, tags = fem.build_mesh(Curved(BlockMesh(**finer)) if curved else BlockMesh(**finer, deform=wavy), comm)
+    system = fem.assemble(mesh, SOFT, degree=2)
+    spin, speed = np.array([0.3, 0.2, -0.4]), np.array([0.5, -1.0, 0.2])
+    system = thrown(system, lambda x: speed + np.cross(spin, x - np.array([1.0, 0.75, 0.6])))
+    surface = fem.contact_surface(system, tags["bottom"], obstacle=vc.HalfSpace((0.0, -0.01, 0.0), (0.0, 1.0, 0.0)))
+    return vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3), mass=vc.Redistributed(lumping))
+
+
+@pytest.mark.parametrize("lumping", [0.4, 0.0])
+def test_a_thrown_block_keeps_its_energy_on_any_number_of_ranks(lumping: float) -> None:
+    found = []
+    for comm in (COMM, MPI.COMM_SELF):
+        problem = thrown_block(comm, lumping)
+        solution = vc.simulate(problem, dt=2e-3, steps=25, progress=False)
+        history = solution.history
+        found.append(np.column_stack([history["contact_resultant"], history["contact_active"]]))
+        energy = history["energy_kinetic"][0]
+        assert np.max(history["certificate"]) < 1e-9
+        assert np.max(np.abs(history["energy_defect"])) < 1e-9 * energy
+        assert -0.2 * energy < history["loss_friction"][-1] < 0.2 * energy
+        assert history["contact_resultant"].max() > 0.0
+    assert np.allclose(*found, rtol=0.0, atol=1e-8 * found[1].max())
+
+
+def test_mass_of_rigid_motions_is_kept() -> None:
+    """Redistributed mass has the total mass, centre and inertia of the body and none at the contact nodes."""
+    problem = thrown_block(COMM, 0.4)
+    system, equations = problem.system, problem.equations
+    x = system.space.points - np.array([1.0, 0.75, 0.6])
+    modes = [np.tile(axis, (len(x), 1)) for axis in np.eye(3)] + [np.cross(axis, x) for axis in np.eye(3)]
+    before, after = [], []
+    for one in modes:
+        u = system.space.restrict(one)
+        w = problem.surface.in_frames(u)
+        w = 2.0 * w - problem.surface.coupling @ w
+        before.append(system.kinetic_energy(u))
+        after.append(equations.kinetic_energy(w))
+    assert np.allclose(before, after, rtol=1e-9, atol=0.0)
+    assert not np.any(equations.M.diagonal()[problem.surface.owned])
+
+
+def test_two_thrown_blocks_keep_momentum_and_energy() -> None:
+    both = blocks(3, upper=(3, 3, 3), lower=(3, 3, 3), simplices=True, gap=0.01)
+    mesh, tags = fem.build_mesh(both, COMM)
+    speed = np.array([0.3, -1.0, 0.1])
+    system = thrown(fem.assemble(mesh, SOFT, degree=2), lambda x: 0.0 * x, lambda x: np.tile(speed, (len(x), 1)))
+    problem = vc.ContactProblem(system, fem.contact_pair(system, *(tags[side] for side in both.interface)),
+                                friction=vc.Coulomb(0.3))
+    solution = vc.simulate(problem, dt=2e-3, steps=25, progress=False)
+    history, before = solution.history, SOFT.rho * 1.5 * 1.0 * 1.2 * speed
+    assert np.max(history["certificate"]) < 1e-9
+    assert np.max(np.abs(history["energy_defect"])) < 1e-9 * history["energy_kinetic"][0]
+    assert history["contact_resultant"].max() > 0.0
+    after = momenta(solution.problem, solution.state.v)
+    assert np.allclose(after.sum(axis=0), before, rtol=0.0, atol=1e-9 * np.abs(before).max())
+    assert abs(after[0, 1]) > 0.01 * np.abs(before).max()
+
+
+def test_wrong_uses_are_refused() -> None:
+    both = blocks(3, upper=(2, 1, 2), lower=(2, 2, 2), simplices=True)
+    mesh, tags = fem.build_mesh(both, COMM)
+    system = fem.assemble(mesh, SOFT, degree=2)
+    one, two = (tags[side] for side in both.interface)
+    with pytest.raises(InputError, match="matched by matching=NodeToNode"):
+        fem.contact_pair(system, one, two, matching=fem.DualMortar())
+    wall = fem.contact_surface(system, tags["lower_right"])
+    with pytest.raises(InputError, match="is on side 2 of a contact pair and has a condition besides"):
+        fem.joined_surfaces(fem.contact_pair(system, one, two), wall)
+    joined = fem.joined_surfaces(fem.contact_pair(system, one, two), fem.contact_surface(system, tags["lower_bottom"]))
+    assert joined.total == 18
