@@ -233,7 +233,7 @@ def _refuse_chains(space: NodalSpace, parts: Sequence[NodalConditions]) -> None:
         if len(both):
             where = f"node {at(facing.nodes.points[both[0]])}"
             if space.hierarchy is not None:
-                raise InputError(f"{where} of P2 tetrahedra is on side 2 of a contact pair and has a condition besides: "
-                                 "leave it out of the other surface (points=), or exchange the sides of the pair")
-            raise InputError(f"{where} is on side 1 of one contact pair and on side 2 of another: exchange the sides "
-                             "of one of them, or give it once if both are the same")
+                raise InputError(f"{where} of P2 tetrahedra is on side 2 of a contact pair and has a condition "
+                                 "besides: leave it out of the other surface (points=), or exchange the sides")
+            raise InputError(f"{where} is on side 1 of one contact pair and on side 2 of another: exchange the "
+                             "sides of one of them, or give it once if both are the same")
