@@ -45,11 +45,8 @@ class Bubbles(Rows):
     integrals: Array
 
 
-def bubbles_of(space: FemSpace, hierarchy: Hierarchy, facets: Facets, *, everywhere: bool) -> Bubbles:
-    """Return the facets of a group that have a vertex of this rank, or all of them. Collective.
-
-    InputError for a mid-point that is held while an end of its edge is free.
-    """
+def _bubbles(space: FemSpace, hierarchy: Hierarchy, facets: Facets, everywhere: bool) -> Bubbles:
+    """The facets of a group that have a vertex of this rank, or all of them."""
     mesh, local = space.mesh, np.asarray(facets.indices)
     rows = facet_rows(space.V, local)
     cell_of = mesh.topology.connectivity(mesh.topology.dim - 1, mesh.topology.dim)
@@ -89,26 +86,34 @@ def _integrals(x: Array) -> tuple[Array, Array]:
     return areas, areas[:, :, None] * np.linalg.solve(gram, products)
 
 
-def averaged(space: FemSpace, facets: Bubbles, nodes: Nodes, sign: float) -> Facing:
-    """Return the bubbles that displacements of conditions at these nodes contain, and their shares c_ik times a sign.
+def averaged(
+    space: FemSpace, facets: Facets, nodes: Nodes, share: sp.csr_matrix | None = None
+) -> tuple[Facing, ...]:
+    """Return the bubbles that displacements of conditions contain, none but in a hierarchy: -c_ik of this rank's nodes
+    with conditions or, where these face ``nodes``, the same on every rank, with ``share``, share times c_ik.
 
-    Where a node has several conditions each facet belongs to the one with the normal nearest to its own.
+    Where a node has several conditions each facet belongs to the one with the normal nearest to its own. Collective.
+    InputError for a mid-point that is held while an end of its edge is free.
     """
+    if space.hierarchy is None:
+        return ()
+    found = _bubbles(space, space.hierarchy, facets, share is not None)
     order = np.argsort(nodes.numbers, kind="stable")
-    corner = facets.vertices.ravel()
+    corner = found.vertices.ravel()
     corner = np.where(np.isin(corner, nodes.numbers), corner, space.leaders(corner))
     starts, ends = (np.searchsorted(nodes.numbers, corner, side, sorter=order) for side in ("left", "right"))
     known = np.flatnonzero(ends > starts)
     best, row = np.full(len(known), -np.inf), np.zeros(len(known), dtype=np.int64)
     for k in range(int((ends - starts).max(initial=0))):
         candidate = order[np.minimum(starts[known] + k, ends[known] - 1)]
-        cosine = np.sum(facets.normals[known // 3] * nodes.normals[candidate], axis=1)
+        cosine = np.sum(found.normals[known // 3] * nodes.normals[candidate], axis=1)
         row, best = np.where(cosine > best, candidate, row), np.maximum(cosine, best)
-    numbers, first, column = np.unique(facets.middles, return_index=True, return_inverse=True)
-    sums = np.bincount(row, facets.areas.ravel()[known], minlength=len(nodes.numbers))
+    numbers, first, column = np.unique(found.middles, return_index=True, return_inverse=True)
+    sums = np.bincount(row, found.areas.ravel()[known], minlength=len(nodes.numbers))
     places = np.repeat(row, 3), column.reshape(-1, 3)[known // 3].ravel()
-    values = sign * facets.integrals.reshape(-1, 3)[known] / sums[row][:, None]
-    unknowns = facets.unknowns.reshape(-1, space.dimension)[first]
-    nothing = np.zeros((len(numbers), space.dimension))
+    values = found.integrals.reshape(-1, 3)[known] / sums[row][:, None]
+    unknowns = found.unknowns.reshape(-1, space.dimension)[first]
+    nothing = np.zeros(unknowns.shape)
     middles = Nodes(numbers, nothing, nothing, nothing[:, 0], unknowns < 0, unknowns)
-    return Facing(middles, sp.csr_matrix((values.ravel(), places), shape=(len(nodes.numbers), len(numbers))))
+    c = sp.csr_matrix((values.ravel(), places), shape=(len(nodes.numbers), len(numbers)))
+    return (Facing(middles, -c if share is None else sp.csr_matrix(share @ c)),)

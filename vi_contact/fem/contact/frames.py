@@ -35,14 +35,14 @@ class Facing:
 @dataclass(frozen=True, eq=False)
 class NodalConditions:
     """Hold this rank's conditions u·direction <= gap at nodes, u being relative to what they are ``facing`` if that
-    deforms too, and less sum_k P_sk e_k of ``bubbles`` of edges where displacements have them (``.bubbles``);
+    deforms too, and less what the ``bubbles`` of edges add where displacements have them (``.bubbles``);
     ``slots``: their numbers among those of all ranks, ascending."""
 
     nodes: Nodes
     directions: Array
     slots: Indices
     facing: Facing | None = None
-    bubbles: Facing | None = None
+    bubbles: tuple[Facing, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -173,7 +173,7 @@ def _coupling(
 
     At nodes with several conditions each one's own vectors only are relative to what it faces.
     """
-    if all(part.facing is None and part.bubbles is None for part in parts):
+    if all(part.facing is None and not part.bubbles for part in parts):
         return None
     _refuse_chains(space, parts)
     algebra, n = space.algebra, len(space.ids)
@@ -186,8 +186,7 @@ def _coupling(
         place, faced = frames.place[slots], []
         if part.facing is not None:
             faced.append((part.facing, _turns(space, frames, part.facing.nodes.numbers)))
-        if part.bubbles is not None:
-            faced.append((part.bubbles, np.tile(np.eye(space.dimension), (len(part.bubbles.nodes.numbers), 1, 1))))
+        faced += [(one, np.tile(np.eye(space.dimension), (len(one.nodes.numbers), 1, 1))) for one in part.bubbles]
         if not faced:
             continue
         for c in range(space.dimension):
@@ -223,7 +222,7 @@ def _faced(facing: Facing, rows: Indices, turns: Array, directions: Array, total
 def _refuse_chains(space: NodalSpace, parts: Sequence[NodalConditions]) -> None:
     """InputError for a node on side 1 of a pair, or with bubbles, and on side 2 of another: R⁻¹ = 2 - R needs them
     apart. Collective."""
-    coupled = [part.nodes.numbers for part in parts if part.facing is not None or part.bubbles is not None]
+    coupled = [part.nodes.numbers for part in parts if part.facing is not None or part.bubbles]
     first = np.zeros((len(space.nodes), 1))
     first[space.blocks_of(np.concatenate(coupled))] = 1.0
     for facing in (part.facing for part in parts if part.facing is not None):

@@ -13,7 +13,6 @@ n is the outward normal of side 1, from side 1 to side 2. Displacements are smal
 import logging
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -28,12 +27,12 @@ from ...core.system import SemiDiscreteSystem
 from ...meshes.rows import number_alike
 from ..mesh import Facets
 from ..space import FemSpace
-from .bubbles import averaged, bubbles_of
+from .bubbles import averaged
 from .faces import Boundary, boundary, checked_angle, split, tell_corners
 from .frames import Facing, NodalConditions, snapped, surface_of
 from .matching import Matched, Matching, NodeToNode, Side
 from .nodes import Nodes, everywhere, joined_nodes
-from .surface import averaged_bubbles, contact_space, listed, merged, nodes_on, prescribed_motion
+from .surface import contact_space, listed, merged, nodes_on, prescribed_motion
 
 log = logging.getLogger(__name__)
 
@@ -93,19 +92,10 @@ def contact_pair(
     slots = np.flatnonzero(space.blocks_of(nodes.numbers) >= 0)  # from here on every rank has its own nodes of side 1
     nodes = nodes.pick(slots)
     tell_corners(space, one.name, nodes, slots, angle)
-    bubbles = _bubbles(space, facets1, facets2, nodes, two, P[slots])
+    bubbles = averaged(space, facets1, nodes) + averaged(space, facets2, two.nodes, P[slots])
     conditions = NodalConditions(nodes, directions[slots], slots, Facing(two.nodes, P[slots]), bubbles)
     surface = surface_of(space, [conditions], gap0=gap[slots], weights=nodes.weights * space.forms.section.thickness)
     return replace(surface, **prescribed_motion(space, conditions))
-
-
-def _bubbles(space: FemSpace, facets1: Facets, facets2: Facets, nodes: Nodes, two: Side, P: Any) -> Facing | None:
-    """What conditions contain besides displacements of nodes of side 1 and 2; None but in a hierarchy. Collective."""
-    own = averaged_bubbles(space, facets1, nodes)
-    if own is None or space.hierarchy is None:
-        return None
-    faced = averaged(space, bubbles_of(space, space.hierarchy, facets2, everywhere=True), two.nodes, 1.0)
-    return Facing(joined_nodes([own.nodes, faced.nodes]), sp.csr_matrix(sp.hstack([own.P, P @ faced.P])))
 
 
 def side_of(space: FemSpace, facets: Facets) -> Side:

@@ -19,9 +19,9 @@ from ...core.system import SemiDiscreteSystem
 from ..groups import facets_of
 from ..mesh import Facets
 from ..space import FemSpace, space_of
-from .bubbles import averaged, bubbles_of
+from .bubbles import averaged
 from .faces import boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
-from .frames import Facing, NodalConditions, NodalFrames, given, snapped, surface_of
+from .frames import NodalConditions, NodalFrames, given, snapped, surface_of
 from .nodes import Nodes, asked, everywhere, joined_nodes, slots_of
 
 log = logging.getLogger(__name__)
@@ -67,7 +67,7 @@ def contact_surface(
     slots = slots_of(comm, _places(nodes, chosen))
     weights = nodes.weights * space.forms.section.thickness
     tell_corners(space, facets.name, nodes, slots, angle)
-    conditions = NodalConditions(nodes, directions, slots, bubbles=averaged_bubbles(space, facets, nodes))
+    conditions = NodalConditions(nodes, directions, slots, bubbles=averaged(space, facets, nodes))
     surface = surface_of(space, [conditions], gap0=gap, weights=weights)
     return replace(surface, **prescribed_motion(space, conditions))
 
@@ -75,7 +75,7 @@ def contact_surface(
 def prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str, Any]:
     """Return ``motion`` and ``slide`` of this rank's conditions where what they face, or bubbles are measured from, is
     moved. Collective."""
-    parts = [part for part in (conditions.facing, conditions.bubbles) if part is not None]
+    parts = [part for part in (conditions.facing, *conditions.bubbles) if part is not None]
     moves = bool(parts) and any(condition.moves for condition in space.prescribed)
     held = any(part.nodes.held[part.P.indices].any() for part in parts)
     if not moves or not (space.hierarchy or largest(space.comm, held)):
@@ -95,14 +95,6 @@ def prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str,
         "motion": lambda t: -np.sum(displacement(t) * directions, axis=1),
         "slide": lambda t: np.einsum("ijk,ij->ik", tangents, displacement(t)) * free,
     }
-
-
-def averaged_bubbles(space: FemSpace, facets: Facets, nodes: Nodes) -> Facing | None:
-    """Return what conditions at these nodes of this rank contain besides their own displacement; None but in a
-    hierarchy. Collective."""
-    if space.hierarchy is None:
-        return None
-    return averaged(space, bubbles_of(space, space.hierarchy, facets, everywhere=False), nodes, -1.0)
 
 
 def _obstacle(obstacle: Obstacle | None, size: float) -> Callable[[Array, Array], tuple[Array, Array]]:
