@@ -196,7 +196,8 @@ for scheme in (vc.ZienkiewiczWoodTaylor(), vc.SS22(), vc.LinearMultistep.newmark
         for state, report in vc.march(problem, scheme=scheme, solver=vc.Condensed(method), dt=5e-3, steps=9):
             pass
         assert report.new.active.all() and report.certificate.worst < 1e-12
-system = vc.system_from_arrays([1.0, 2.0], None, [[2.0, -1.0], [-1.0, 1.0]], coordinates=[[0.0], [1.0]], load=[0.0, 1.0])
+K, points = [[2.0, -1.0], [-1.0, 1.0]], [[0.0], [1.0]]
+system = vc.system_from_arrays([1.0, 2.0], None, K, coordinates=points, load=[0.0, 1.0])
 problem = vc.ContactProblem(system, vc.contact_points(system, [1], [1.0]), mass=vc.ConsistentMass())
 *_, (state, _) = vc.march(problem, scheme=vc.MoreauJean(), dt=1e-2, steps=9)
 assert state.r_n[0] > 0.0

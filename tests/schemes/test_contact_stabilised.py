@@ -194,9 +194,9 @@ def test_bilateral_points_are_brought_to_the_obstacle_and_stay():
 @pytest.mark.parametrize("held", [False, True])
 def test_nan_stops_the_step(held):
     """In the data, and where an obstacle goes."""
-    with pytest.raises(InputError, match="v0 contains NaN"):
-        chain(gap=0.0, v0=np.array([1.0, 1.0, 1.0, 1.0, 1.0, np.nan]))
     problem = chain(gap=0.0)
+    with pytest.raises(InputError, match="v0 contains NaN"):
+        replace(problem, system=problem.system.changed(v0=np.full(6, np.nan)))
     surface = problem.surface.moving(lambda t: np.nan if t else 0.0)
     problem = replace(problem, surface=surface.bilateral_everywhere() if held else surface)
     with pytest.raises(InputError, match=r"moving obstacle: towards\(0.01 s\) is nan; return finite metres"):

@@ -88,8 +88,8 @@ def test_nothing_is_made_without_friction() -> None:
 
 
 def test_the_order_of_conditions_has_no_effect() -> None:
-    one = rough()
-    other = replace(one, surface=replace(rough((0, 1, 2)).surface, compliance=np.array([0.0, 0.0, 0.25])))
+    one, other = rough(), rough((0, 1, 2))
+    other = replace(other, surface=replace(other.surface, compliance=np.array([0.0, 0.0, 0.25])))
     for a, b in zip(reports(one), reports(other), strict=True):
         np.testing.assert_allclose(b.new.u, a.new.u, rtol=0.0, atol=1e-13)
         np.testing.assert_allclose(b.new.r_t, a.new.r_t[[1, 0, 2]], rtol=0.0, atol=1e-11)

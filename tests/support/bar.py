@@ -12,13 +12,11 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from chain import ChainSpace
 
-from vi_contact.core.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
+import vi_contact as vc
+from vi_contact.core.algebra import Array
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import Report, State
-from vi_contact.core.surfaces import ContactSurface
-from vi_contact.core.system import Load, SemiDiscreteSystem
 from vi_contact.laws.mass import ConsistentMass
 from vi_contact.run.march import march
 from vi_contact.solvers.condensed import Condensed
@@ -53,42 +51,13 @@ def bar(
     """The bar over its wall, by default that of V1.1; C = damping * K [s]; consistent mass unless told
     otherwise; other keywords go to ContactProblem."""
     M, K = bar_matrices(n, length=length, E=E, rho=rho, lumped=lumped)
-    rows = n if clamped else n + 1
-    x = np.linspace(0.0, length, n + 1)[:rows]
-    weight = -gravity * np.asarray(M.sum(axis=1)).ravel()
-    M, K = M[:rows, :rows], K[:rows, :rows]
-    system = SemiDiscreteSystem(
-        algebra=SerialAlgebra(),
-        M=SerialMatrix(M),
-        C=SerialMatrix(damping * K) if damping else None,
-        K=SerialMatrix(K),
-        load=Load(weight[:rows]),
-        influence=np.ones((rows, 1)),
-        u0=u0(x),
-        v0=v0(x),
-        space=ChainSpace(rows),
-        floating=not clamped,
+    x = np.linspace(0.0, length, n + 1)
+    system = vc.system_from_arrays(
+        M, damping * K if damping else None, K, coordinates=x[:, None], clamped=[n] if clamped else (),
+        load=-gravity * np.asarray(M.sum(axis=1)).ravel(), u0=u0(x), v0=v0(x),
     )
-    return ContactProblem(system, foot(rows, gap), **({"mass": ConsistentMass()} | problem))
-
-
-def foot(rows: int, gap: float) -> ContactSurface:
-    """One contact condition: u_n = -u_0 <= gap."""
-    direction = np.ones(rows)
-    direction[0] = -1.0
-    return ContactSurface(
-        comm=SerialComm(),
-        points=np.zeros((1, 1)),
-        normals=np.array([[-1.0]]),
-        weights=np.ones(1),
-        gap0=np.array([gap]),
-        bilateral=np.zeros(1, dtype=bool),
-        compliance=np.zeros(1),
-        owned=np.array([0]),
-        slots=np.array([0]),
-        tangents=np.zeros((1, 0), dtype=np.int64),
-        basis=SerialMatrix(sp.diags(direction)),
-    )
+    foot = vc.contact_points(system, [0], [-1.0], gap0=gap)
+    return ContactProblem(system, foot, **({"mass": ConsistentMass()} | problem))
 
 
 def thrown(n: int = 100, **more: Any) -> ContactProblem:

@@ -7,47 +7,17 @@ its contact direction is -1 and the change of basis is not the identity. It runs
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from vi_contact.core.algebra import Array, SerialAlgebra, SerialComm, SerialMatrix
-from vi_contact.core.errors import InputError
+import vi_contact as vc
+from vi_contact.core.algebra import Array, SerialComm, SerialMatrix
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.surfaces import ContactSurface
-from vi_contact.core.system import Load, SemiDiscreteSystem
+from vi_contact.core.system import SemiDiscreteSystem
 from vi_contact.laws.mass import ConsistentMass
-
-
-@dataclass(frozen=True)
-class ChainSpace:
-    """Unknown i is the displacement of mass i at X = i + 1."""
-
-    unknowns: int
-    dimension: int = 1
-
-    @property
-    def ids(self) -> Any:
-        return np.arange(self.unknowns)
-
-    @property
-    def coordinates(self) -> Array:
-        return np.arange(1.0, self.unknowns + 1.0)[:, None]
-
-    @property
-    def bodies(self) -> Any:
-        return np.zeros(self.unknowns, dtype=np.int64)
-
-    def find_nodes(self, points: Array) -> Any:
-        nodes = np.rint(np.asarray(points, dtype=float)[:, 0]).astype(int) - 1
-        if np.any((nodes < 0) | (nodes >= self.unknowns)):
-            raise InputError(f"points {points} are not all on the chain: give a point of the body")
-        return nodes
-
-    def sample(self, u: Array, nodes: Any, t: float, derivative: int = 0) -> Array:
-        return np.asarray(u)[nodes][:, None]
 
 
 def chain_system(
@@ -77,18 +47,8 @@ def chain_system(
     M = sp.diags(spread, [-1, 0, 1]) if consistent else sp.diags([np.full(n, mass)], [0])
     force = np.zeros(n)
     force[-1] = constant
-    return SemiDiscreteSystem(
-        algebra=SerialAlgebra(),
-        M=SerialMatrix(M),
-        C=SerialMatrix(damping * K) if damping else None,
-        K=SerialMatrix(K),
-        load=Load(force),
-        influence=np.ones((n, 1)),
-        u0=np.zeros(n) if u0 is None else np.asarray(u0, dtype=float),
-        v0=np.zeros(n) if v0 is None else np.asarray(v0, dtype=float),
-        space=ChainSpace(n),
-        floating=floating,
-    )
+    points = np.arange(1.0, n + 1.0)[:, None]
+    return vc.system_from_arrays(M, damping * K if damping else None, K, coordinates=points, load=force, u0=u0, v0=v0)
 
 
 def chain_surface(n: int, *, gap: float = 0.0, left_gap: float | None = None, weight: float = 0.5) -> ContactSurface:
