@@ -79,7 +79,8 @@ def test_acceleration_with_springs_and_held_points() -> None:
     springs = replace(problem, surface=problem.surface.on_springs(5e3))
     assert acceleration(springs, u, np.zeros(11))[1][0] == pytest.approx(50.0, rel=1e-13)
     assert not acceleration(springs, -u, np.zeros(11))[1].any()
-    held = replace(bar(10, gravity=-10.0), surface=problem.surface.bilateral_everywhere())
+    drawn = bar(10, gravity=-10.0)
+    held = replace(drawn, surface=drawn.surface.bilateral_everywhere())
     for v in (np.zeros(11), np.ones(11)):  # also while a bad start still moves it
         a, reaction = acceleration(held, np.zeros(11), v)
         assert a[0] == 0.0 and reaction[0] < -1.0
