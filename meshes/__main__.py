@@ -1,1 +1,51 @@
-../vi_contact/meshes/__main__.py
+"""Write a mesh to a file: ``python3 meshes wall --height 9 --size 0.5 -o wall.msh``."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from dataclasses import MISSING, fields
+from pathlib import Path
+
+if not __package__:  # run as a folder of the source tree, maybe not installed
+    sys.path[0] = str(Path(__file__).resolve().parents[1])
+
+from meshes.ball import BallMesh
+from meshes.disk import DiskMesh
+from vi_contact import meshes as room
+from vi_contact.core.errors import InputError
+from vi_contact.meshes.gmsh_session import write
+
+NAMED = {name: getattr(room, name) for name in room.__all__ if name.endswith("Mesh")}
+SHAPES = {"ball": BallMesh, "disk": DiskMesh} | {name.removesuffix("Mesh").lower(): one for name, one in NAMED.items()}
+
+
+def parser() -> argparse.ArgumentParser:
+    """Build the parser: a command for every shape, an option for each of its numbers, which its docstring explains."""
+    top = argparse.ArgumentParser(prog="meshes", description=__doc__)
+    commands = top.add_subparsers(dest="shape", required=True, metavar=f"{{{','.join(SHAPES)}}}")
+    for shape, mesh in SHAPES.items():
+        one = commands.add_parser(shape, description=mesh.__doc__, argument_default=argparse.SUPPRESS)
+        for field in fields(mesh):
+            option = f"--{field.name.replace('_', '-')}"
+            kind = field.type.__name__ if isinstance(field.type, type) else str(field.type)
+            if kind == "bool":
+                one.add_argument(option, action="store_true")
+            elif kind.startswith(("float", "tuple")):
+                one.add_argument(option, type=int if "int" in kind else float, required=field.default is MISSING,
+                                 nargs="+" if kind.startswith("tuple") else None)
+        one.add_argument("-o", "--output", default=f"{shape}.msh")
+    return top
+
+
+def main(words: Sequence[str]) -> None:
+    """Write the mesh that the words of a command ask for, or end with a sentence."""
+    given = vars(parser().parse_args(words))
+    mesh, output = SHAPES[given.pop("shape")], given.pop("output")
+    try:
+        write(mesh(**{name: tuple(x) if isinstance(x, list) else x for name, x in given.items()}), output)
+    except InputError as error:
+        sys.exit(str(error))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -5,16 +5,11 @@ arc within an angle of the lowest point: the contact side) and "rest". Symmetric
 """
 
 import math
-import sys
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-
-if __name__ == "__main__":  # run as a file of the source tree, maybe not installed
-    sys.path[0] = str(Path(__file__).resolve().parents[1])
 
 from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
@@ -91,9 +86,3 @@ def _mirrored(model: Any, dimension: int, entity: int, kind: int, image: npt.NDA
 
 def _name(model: Any, dimension: int, name: str, entities: list[int]) -> None:
     model.setPhysicalName(dimension, model.addPhysicalGroup(dimension, entities), name)
-
-
-if __name__ == "__main__":
-    from vi_contact.meshes.__main__ import main
-
-    main(["disk", *sys.argv[1:]], {"disk": DiskMesh})

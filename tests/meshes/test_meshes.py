@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from meshes.__main__ import parser
 from vi_contact import meshes
 from vi_contact.core.errors import InputError
-from vi_contact.meshes.__main__ import parser
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.extract import arrays_from_file, arrays_from_script
 from vi_contact.meshes.gmsh_session import session, write
@@ -218,9 +218,9 @@ def test_the_folder_of_the_source_tree_writes_meshes_without_installation(tmp_pa
     assert np.array_equal(wall.points.max(axis=0), [2.0, 4.0])
 
 
-def test_the_room_writes_meshes_as_a_module(tmp_path):
+def test_it_runs_as_a_module(tmp_path):
     options = ["--lengths", 1, 2, 3, "--divisions", 1, 2, 3, "--simplices", "--angle", 0.1, "-o", tmp_path / "it.msh"]
-    done = run("-m", "vi_contact.meshes", "block", *options, cwd=SOURCE_TREE)
+    done = run("-m", "meshes", "block", *options, cwd=SOURCE_TREE)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     assert len(arrays_from_file(tmp_path / "it.msh").cells) == 36
 
@@ -239,8 +239,8 @@ def test_every_number_of_a_shape_is_an_option(shape: str, capsys):
     [("wall", "--divisions 2 4", "quadrilateral"), ("disk", "--radius 1 --size 0.5 --foot 0.5", "triangle"),
      ("ball", "--radius 1 --size 0.25 --foot 0.5", "tetrahedron")],
 )
-def test_a_script_of_the_source_tree_is_the_command_of_its_shape(shape: str, words: str, kind: str, tmp_path):
-    done = run(SOURCE_TREE / "meshes" / f"{shape}.py", *words.split(), "-o", "it.msh", cwd=tmp_path)
+def test_every_shape_is_a_command(shape: str, words: str, kind: str, tmp_path):
+    done = run(SOURCE_TREE / "meshes", shape, *words.split(), "-o", "it.msh", cwd=tmp_path)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     assert arrays_from_file(tmp_path / "it.msh").cell == kind
 

@@ -7,9 +7,9 @@ import pytest
 from fem_problems import block
 from mpi4py import MPI
 
+from demos.problems.boundary_curve import boundary_curve
 from vi_contact.core.errors import InputError
 from vi_contact.fem.mesh import node_numbers
-from vi_contact.models.boundary_curve import boundary_curve
 
 COMM = MPI.COMM_WORLD
 

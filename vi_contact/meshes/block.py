@@ -5,16 +5,11 @@ front towards the viewer). A bar has the first two, a rectangle four, a box six.
 """
 
 import math
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-if not __package__:  # run as a file of the source tree, maybe not installed
-    sys.path[0] = str(Path(__file__).resolve().parents[2])
 
 from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
@@ -75,9 +70,3 @@ def check_box(lengths: Sequence[float], divisions: Sequence[int]) -> None:
     if not all(n == n // 1 and n >= 1 for n in divisions):
         raise InputError(f"divisions {tuple(divisions)} must be whole numbers of cells, at least 1")
     counted("mesh", f"divisions {tuple(divisions)}", math.prod(divisions), "cells", most=MOST_CELLS)
-
-
-if __name__ == "__main__":  # python3 meshes/block.py is python3 meshes block
-    from vi_contact.meshes.__main__ import main
-
-    main([Path(__file__).stem, *sys.argv[1:]])

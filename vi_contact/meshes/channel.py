@@ -7,17 +7,12 @@ walls, which end at the surface). Of two nodes at one place the channel's comes 
 """
 
 import math
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-if not __package__:  # run as a file of the source tree, maybe not installed
-    sys.path[0] = str(Path(__file__).resolve().parents[2])
 
 from vi_contact.core.checks import MOST_CELLS, attributes, counted
 from vi_contact.core.errors import InputError
@@ -158,9 +153,3 @@ def _along(xs: Array, ys: Array, number: Rows, x: Sequence[float], y: Sequence[f
     i, j = (np.flatnonzero((line >= ends[0]) & (line <= ends[-1])) for line, ends in ((xs, x), (ys, y)))
     nodes = number[np.ix_(i, j)].reshape(-1)
     return np.column_stack([nodes[:-1], nodes[1:]])
-
-
-if __name__ == "__main__":  # python3 meshes/channel.py is python3 meshes channel
-    from vi_contact.meshes.__main__ import main
-
-    main([Path(__file__).stem, *sys.argv[1:]])

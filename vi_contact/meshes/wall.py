@@ -4,13 +4,8 @@ Physical groups: cells "wall"; boundary "base" (y = 0), "face" (x = width: the c
 defaults are the mesh of the published example: 8 x 12 cells, 40 boundary nodes 0.75 m apart.
 """
 
-import sys
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
-
-if not __package__:  # run as a file of the source tree, maybe not installed
-    sys.path[0] = str(Path(__file__).resolve().parents[2])
 
 from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
@@ -61,9 +56,3 @@ class WallMesh:
         nodes = lattice((self.width, self.height), self.divisions or _PUBLISHED)
         grid = Grid(nodes, self.triangles, "wall", (("back", "face"), ("base", "top")))
         return [grid] if self.size is None else []
-
-
-if __name__ == "__main__":  # python3 meshes/wall.py is python3 meshes wall
-    from vi_contact.meshes.__main__ import main
-
-    main([Path(__file__).stem, *sys.argv[1:]])

@@ -1,6 +1,6 @@
 """Hold problems ready to run, one a module: a value that describes one, and ``build``, which assembles it.
 
-``boundary_curve`` has none, it serves the room ``bem``. Problems of single demos stand in ``demos/problems``.
+Problems of single demos stand in ``demos/problems``.
 >>> from mpi4py import MPI
 >>> import vi_contact as vc
 >>> from vi_contact import models
@@ -11,5 +11,5 @@
 
 from ..core.lazy import lazy
 
-_CONTENTS = {"boundary_curve": (), "channel": (), "wall": ()}  # modules that are handed on whole
+_CONTENTS = {"channel": (), "wall": ()}  # modules that are handed on whole
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

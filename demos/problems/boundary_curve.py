@@ -3,11 +3,11 @@
 import numpy as np
 import numpy.typing as npt
 
-from ..bem.boundary_mesh import BoundaryMesh, from_segments
-from ..core.errors import InputError
-from ..fem import compat
-from ..fem.groups import facets_of
-from ..fem.mesh import Facets, node_numbers
+from vi_contact.bem.boundary_mesh import BoundaryMesh, from_segments
+from vi_contact.core.errors import InputError
+from vi_contact.fem import compat
+from vi_contact.fem.groups import facets_of
+from vi_contact.fem.mesh import Facets, node_numbers
 
 
 def boundary_curve(*facets: Facets) -> tuple[BoundaryMesh, npt.NDArray[np.int64]]:

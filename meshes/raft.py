@@ -1,1 +1,0 @@
-../vi_contact/meshes/raft.py
