@@ -17,6 +17,7 @@ from chain import chain_problem
 from frame_elements import frame, line
 
 import vi_contact as vc
+from vi_contact import fem, plots
 from vi_contact.core.errors import InputError
 from vi_contact.core.system import Load
 
@@ -217,6 +218,29 @@ def test_restart_is_the_straight_run(tmp_path):
     assert np.array_equal(again.state.u, straight.state.u) and np.array_equal(again.state.r_n, straight.state.r_n)
     for name, values in straight.history.items():
         np.testing.assert_array_equal(again.history[name], values)
+
+
+def test_frames_for_paraview(tmp_path):
+    """A vertex for each node, clamped ones too; u, v, a, pressure and status; a restart goes on with them."""
+    h5py = pytest.importorskip("h5py")
+    system = beam(v0=np.tile([0.1, -1.0, 0.0], 7))
+    surface = vc.contact_points(system, [6], [0.3, -1.0], gap0=0.002, weights=0.01)
+    problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.4), mass=vc.ConsistentMass())
+    run = partial(vc.simulate, problem, scheme=vc.MoreauJean(), dt=2e-4, out=tmp_path, fields=fem.XDMF(every=5))
+    run(steps=10)
+    found = run(steps=20, restart=True)
+    assert sorted(path.name for path in (tmp_path / "fields").iterdir())[-2:] == ["frame_000020.h5", "mesh.h5"]
+    assert (tmp_path / "fields.xdmf").read_text().count('TopologyType="Polyvertex" NumberOfElements="7"') == 5
+    with h5py.File(tmp_path / "fields/mesh.h5") as mesh, h5py.File(tmp_path / "fields/frame_000020.h5") as frame:
+        assert np.array_equal(mesh["points"][:, :2], system.space.points)
+        assert mesh["cells"][:, 0].tolist() == [*range(7)]
+        u = np.zeros((7, 3))
+        u[1:, :2] = problem.cartesian(found.state.u).reshape(-1, 3)[:, :2]
+        assert np.array_equal(frame["u"][:], u) and frame["v"].shape == frame["a"].shape == (7, 3)
+        assert frame["contact_pressure"][6] == found.state.r_n[0] / 0.01 and not frame["contact_pressure"][:6].any()
+        assert frame["contact_status"][:6].tolist() == [0] * 6 and frame["contact_status"][6] in (1, 2, 3)
+    with pytest.raises(InputError, match="or of points: there is nothing to deform"):
+        plots.plot_deformed(vc.read_run(tmp_path), tmp_path / "deformed.png")
 
 
 # Bad input ------------------------------------------------------------------------------------------------------------

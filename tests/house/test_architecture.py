@@ -187,6 +187,7 @@ def test_files_and_functions_are_small():
 
 SMALL_RUN = """
 import sys
+import vi_contact.fem
 import vi_contact as vc
 sys.path.insert(0, SUPPORT)
 from shaken import shaken
@@ -200,7 +201,7 @@ K, points = [[2.0, -1.0], [-1.0, 1.0]], [[0.0], [1.0]]
 system = vc.system_from_arrays([1.0, 2.0], None, K, coordinates=points, load=[0.0, 1.0])
 problem = vc.ContactProblem(system, vc.contact_points(system, [1], [1.0]), mass=vc.ConsistentMass())
 *_, (state, _) = vc.march(problem, scheme=vc.MoreauJean(), dt=1e-2, steps=9)
-assert state.r_n[0] > 0.0
+assert state.r_n[0] > 0.0 and vi_contact.fem.XDMF(every=2).every == 2
 print(sorted({"petsc4py", "dolfinx", "ufl", "basix", "mpi4py", "gmsh", "matplotlib", "h5py"} & set(sys.modules)))
 """
 METHODS = """from vi_contact.solvers.normal.active_set import ActiveSet

@@ -49,7 +49,7 @@ class Scene:
         """Read the frames next to ``times``; ``magnified``: a round number that shows the displacements when None."""
         frames, history = read_frames(run), run.history
         if frames.cells.shape[1] < 3:
-            raise InputError(f"the run in '{run.folder}' is of bars in one dimension: there is nothing to deform")
+            raise InputError(f"the run in '{run.folder}' is of bars or of points: there is nothing to deform")
         optional(number, "pictures of a run", "magnified", magnified, positive=True)
         found = frames.t[np.unique(nearest(frames.t, times))]
         plane = frames.points.shape[1] == 2

@@ -14,15 +14,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import ufl
 
 from ...core.algebra import Array, Indices, Mask, on_first
 from ...core.checks import attributes
 from ...core.files import FIELDS, FIELDS_INDEX, frames_of, hdf5_atomically, on_root, open_hdf5, write_atomically
 from ...core.problem import ContactProblem
 from ...core.step import Report, State
-from .. import compat
-from ..space import FemSpace, known_matrices, space_of
+from ..matrix_space import MatrixSpace
+from ..nodal_space import NodalSpace
 
 log = logging.getLogger(__name__)
 
@@ -35,7 +34,11 @@ class VonMises:
 
     def __init__(self, forms: Any) -> None:
         """``forms``: the ElasticForms of a system, whose constants carry the thickness as a factor."""
-        space = forms.space
+        import ufl  # late, as compat: frames of own matrices need no DOLFINx
+
+        from .. import compat
+
+        space, self._assembled = forms.space, compat.assemble_vector
         self._u = compat.function(space.V)
         sigma = forms.stress(self._u) / forms.section.thickness
         across = forms.stress_across(self._u) / forms.section.thickness
@@ -51,7 +54,7 @@ class VonMises:
         """Return the stresses of nodal displacements (owned nodes, d); collective."""
         self._u.x.array[: nodal.size] = nodal.ravel()
         self._u.x.scatter_forward()
-        return np.asarray(compat.assemble_vector(self._form).array_r / self._volume)
+        return np.asarray(self._assembled(self._form).array_r / self._volume)
 
 
 _CELLS = {
@@ -80,29 +83,38 @@ class XDMF:
 
     def open(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]) -> "FrameWriter":
         """Write the mesh; go on after the frames of ``kept`` (step -> time) that are in the folder. Collective."""
-        space = space_of("XDMF", problem.system)
-        if space.forms.tells_stress:
-            known_matrices("XDMF, von_mises", problem.system, "K")
-        elif space.comm.rank == 0:
-            log.info("XDMF: forms=… tell no stress, so that frames have no von_mises: give fem.Forms(…, stress=)")
-        return FrameWriter(problem, folder, kept, self.frames_per_file)
+        space = problem.system.space
+        if isinstance(space, MatrixSpace):
+            cells = Cells("Polyvertex", space.nodes[:, None], space.nodes)
+        else:
+            cells = _cells_of_body(problem)
+        return FrameWriter(problem, folder, kept, self.frames_per_file, cells)
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Hold the cells of a frame: XDMF's name of them, nodes of the owned ones, their numbers, and their stress."""
+
+    kind: str
+    nodes: Indices
+    numbers: Indices
+    von_mises: VonMises | None = None
 
 
 class FrameWriter:
     """Write the frames of a run, so many in an HDF5 file."""
 
-    def __init__(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float], per_file: int) -> None:
-        space = problem.system.space
-        assert isinstance(space, FemSpace)
+    def __init__(
+        self, problem: ContactProblem, folder: Path, kept: Mapping[int, float], per_file: int, shown: Cells
+    ) -> None:
+        space: Any = problem.system.space
         self._problem, self._space, self._folder, self._per_file = problem, space, folder, per_file
         self._names = _VECTORS + (_RUBBING if problem.frictional else ())
-        self._von_mises = VonMises(space.forms) if space.forms.tells_stress else None
+        self._type, self._cell_numbers, self._von_mises = shown.kind, shown.numbers, shown.von_mises
         owned, slots = problem.surface.owned, problem.surface.slots
         self._contact_nodes = on_first(space.comm, slots, space.ids[owned] // space.dimension)
-        self._type, mine = _cells(space)
-        self._cell_numbers = compat.cell_numbers(space.mesh)
         points = on_first(space.comm, space.nodes, _three(space.points))
-        cells = on_first(space.comm, self._cell_numbers, mine)
+        cells = on_first(space.comm, self._cell_numbers, shown.nodes)
         self._shape = (len(points), *cells.shape)
         on_root(space.comm, partial(self._start, points, cells, kept))
 
@@ -172,9 +184,8 @@ class FrameWriter:
         """Components (m, d - 1) in nodal tangents as vectors at the owned nodes."""
         space, surface = self._space, self._problem.surface
         turned = surface.reaction_load(np.zeros(surface.count), len(space.ids), tangential)
-        full = np.zeros(space.free.shape)
-        full[space.free] = surface.along_axes(turned)  # tangents are at right angles to all that is oblique
-        return full.reshape(-1, space.dimension)
+        along = surface.along_axes(turned)  # tangents are at right angles to all that is oblique
+        return NodalSpace.expand(space, along, 0.0)  # not what is prescribed or follows
 
     def _write(self, state: State, vectors: Array, stress: Array | None, contact: Array) -> None:
         pressure, status = self._contact(*contact.T)
@@ -254,9 +265,18 @@ def _three(nodal: Array) -> Array:
     return np.pad(nodal, ((0, 0), (0, 3 - nodal.shape[1])))
 
 
-def _cells(space: FemSpace) -> tuple[str, Indices]:
-    """XDMF's name of the cells, and the nodes of the owned ones by their numbers, in the order of VTK."""
-    mesh = space.mesh
+def _cells_of_body(problem: ContactProblem) -> Cells:
+    """The cells of a mesh by the numbers of their nodes, in the order of VTK. Collective."""
+    from .. import compat
+    from ..space import known_matrices, space_of
+
+    space = space_of("XDMF", problem.system)
+    if space.forms.tells_stress:
+        known_matrices("XDMF, von_mises", problem.system, "K")
+    elif space.comm.rank == 0:
+        log.info("XDMF: forms=… tell no stress, so that frames have no von_mises: give fem.Forms(…, stress=)")
+    mesh, stress = space.mesh, VonMises(space.forms) if space.forms.tells_stress else None
     dim = mesh.topology.dim
     rows = space.node_of_block[compat.cell_blocks(space.V)[: mesh.topology.index_map(dim).size_local]]
-    return _CELLS[dim, rows.shape[1]], rows[:, compat.vtk_order(mesh, rows.shape[1])]
+    order = compat.vtk_order(mesh, rows.shape[1])
+    return Cells(_CELLS[dim, rows.shape[1]], rows[:, order], compat.cell_numbers(mesh), stress)
