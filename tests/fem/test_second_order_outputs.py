@@ -25,6 +25,7 @@ from vi_contact.core.errors import InputError
 from vi_contact.fem import compat
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.cut import CutOpen
+from vi_contact.plots.bodies import Scene, plot_deformed
 from vi_contact.plots.deformed import read_frames
 from vi_contact.soil.free_field import FreeField
 
@@ -141,6 +142,18 @@ def test_two_bodies_strike_and_rub_alike_on_any_ranks(name: str) -> None:
     runs = [run(one, dt=2e-4, steps=40, scheme=vc.Trapezoidal()) for one in (problem, alone)]
     assert np.abs(runs[0].u - runs[1].u).max() <= 1e-8 * np.abs(runs[1].u).max()
     assert np.abs(runs[0].r_n - runs[1].r_n).max() <= 1e-6 * np.abs(runs[1].r_n).max() and runs[0].r_n.max() > 0.0
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("name", ["triangles", "hexahedra"])
+def test_pictures_have_the_contact_of_mid_points_too(name: str, tmp_path: Path) -> None:
+    vc.simulate(thrown(COMM, name), dt=2e-4, steps=2, out=tmp_path / "run", fields=fem.XDMF(every=1), progress=False,
+                record=[vc.Contact()])
+    run = vc.read_run(tmp_path / "run")
+    scene = Scene.of(run, [0.0], None)
+    assert scene.contact is not None and len(scene.nodes) == (25 if name == "hexahedra" else 5)
+    assert np.abs(scene.points[scene.nodes] - scene.contact.points).max() < 1e-14
+    assert plot_deformed(run, tmp_path / "bodies.png").stat().st_size > 1000
 
 
 @curved

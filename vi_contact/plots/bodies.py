@@ -54,13 +54,13 @@ class Scene:
         found = frames.t[np.unique(nearest(frames.t, times))]
         plane = frames.points.shape[1] == 2
         corners, cells = (frames.cells, np.arange(len(frames.cells))) if plane else frames.boundary
-        seen, places = np.unique(corners, return_inverse=True)
+        contact = run.contact if "pressure" in history else None
+        sides, nodes = (corners[:0], corners[:0, 0]) if contact is None else frames.facing(contact)
+        seen = np.union1d(corners, nodes)  # of degree 2 contact is at mid-points too
         u, stress = map(np.array, zip(*((u[seen], s[cells]) for _, u, s in map(frames.at, found)), strict=True))
         size, largest = float(np.ptp(frames.points[seen], axis=0).max()), float(np.linalg.norm(u, axis=2).max())
-        contact = run.contact if "pressure" in history else None
-        sides, nodes = (corners[:0], seen[:0]) if contact is None else frames.facing(contact)
         pressure = np.zeros((len(found), 0)) if contact is None else history["pressure"][nearest(history["t"], found)]
-        return cls(found, frames.points[seen], places.reshape(corners.shape), frames.bodies[cells], u, stress,
+        return cls(found, frames.points[seen], np.searchsorted(seen, corners), frames.bodies[cells], u, stress,
                    magnified or _round_down(DRAWN * size / (largest or np.inf)), contact, sides,
                    np.searchsorted(seen, nodes), pressure)
 
