@@ -71,7 +71,7 @@ def test_functions_constant_on_cells_are_pairs_of_cells_and_materials(comm: Any,
 
 
 def test_linear_E_on_simplices_is_its_mean_on_every_cell(comm: Any) -> None:
-    """P1 strains are constant, so that ∫ E over a cell is all that counts; as function of points and as P1 Function."""
+    """P1 strains are constant, so that ∫ E over a cell is all that counts; by points, a P1 Function, UFL."""
     mesh, tags = block(comm, **BODIES["triangles"])
     cellwise = compat.function(compat.cell_space(mesh))
 
@@ -81,12 +81,14 @@ def test_linear_E_on_simplices_is_its_mean_on_every_cell(comm: Any) -> None:
     cellwise.x.array[:] = E(middles(mesh).T)
     nodal = compat.function(fem.assemble(mesh, CONCRETE).space.V.sub(0).collapse()[0])
     nodal.interpolate(E)
+    x = ufl.SpatialCoordinate(mesh)
     K = [
         fem.assemble(mesh, Heterogeneous(one, 0.25, 2000.0), clamped=tags["bottom"], section=PlaneStress(0.3))
-        for one in (cellwise, E, nodal)
+        for one in (cellwise, E, nodal, 1e9 * (1.0 + 0.3 * x[0] + 0.7 * x[1]))
     ]
     same(comm, K[1], K[0])
-    same(comm, K[2], K[0])
+    for one in K[2:]:
+        same(comm, one, K[0])
 
 
 def test_a_bar_of_linear_modulus_against_its_closed_form(comm: Any) -> None:
@@ -284,9 +286,11 @@ def test_functions_of_no_material_are_refused_with_their_place(comm: Any) -> Non
             fem.assemble(mesh, Heterogeneous(**{"E": 1e9, "nu": 0.2, "rho": 1e3, **values}))
     other, _ = block(comm, **BODIES["triangles"])
     away = compat.function(compat.cell_space(other))
-    with pytest.raises(InputError, match="is a Function on another mesh"):
+    with pytest.raises(InputError, match="Young.s modulus .* is of another mesh"):
         fem.assemble(mesh, Heterogeneous(away, 0.2, 1e3))
-    with pytest.raises(InputError, match="is a Function of shape \\(2,\\)"):
+    with pytest.raises(InputError, match="rho .* is of another mesh"):
+        fem.assemble(mesh, Heterogeneous(1e9, 0.2, 1e3 + ufl.SpatialCoordinate(other)[0]))
+    with pytest.raises(InputError, match="has values of shape \\(2,\\)"):
         Heterogeneous(compat.function(compat.vector_space(mesh)), 0.2, 1e3)
     with pytest.raises(InputError, match="give a LinearElastic, Orthotropic or Heterogeneous"):
         fem.assemble(mesh, "concrete")

@@ -233,6 +233,12 @@ def cell_dofs(space: Any) -> Indices:
     return rows if isinstance(rows, np.ndarray) else rows.array.reshape(-1, space.dofmap.dof_layout.num_dofs)
 
 
+def expression(expr: Any, space: Any) -> Any:
+    """Make what ``Function.interpolate`` takes of an expression of UFL; the points became a property in 0.10."""
+    points = space.element.interpolation_points
+    return fem.Expression(expr, points() if callable(points) else points)
+
+
 def constant(mesh: Mesh, value: float) -> Any:
     """Make a number that is no part of the compiled code of a form."""
     return fem.Constant(mesh, PETSc.ScalarType(value))

@@ -6,6 +6,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from ufl.core.expr import Expr
+from ufl.domain import extract_domains
 
 from ..core.algebra import Array, Indices, Mask
 from ..core.checks import at, on_all, refuse, shown
@@ -27,8 +29,8 @@ RANGES: dict[str, tuple[str, float, float, str]] = {
 class Heterogeneous:
     """Describe isotropic elasticity with E(x) [Pa], nu(x) and rho(x) [kg/m³].
 
-    Each is a number, a scalar DOLFINx Function on the mesh of the body, or a function of points x (3, k) [m] that
-    returns values (k,), as ``Function.interpolate`` takes it (an expression of UFL: interpolate it into a Function).
+    Each is a number, a scalar DOLFINx Function on the mesh of the body, an expression of UFL there, or a function of
+    points x (3, k) [m] that returns values (k,), as ``Function.interpolate`` takes it.
 
     A Function that is constant on every cell is taken as it is. Of all others the Lamé constants and rho are taken at
     the vertices of every cell and are linear in it (DG1), so that E and rho may be linear exactly. Where the material
@@ -37,7 +39,7 @@ class Heterogeneous:
     section forces through elements take means over cells.
 
     Raises InputError: neither number nor function; and when a body is assembled, values outside E > 0, -1 < nu < 1/2,
-    rho > 0, with the first place of them, and Functions of another mesh.
+    rho > 0, with the first place of them, and Functions or expressions of another mesh.
     """
 
     E: Values
@@ -47,10 +49,10 @@ class Heterogeneous:
     def __post_init__(self) -> None:
         for name, (words, low, high, remedy) in RANGES.items():
             value = getattr(self, name)
-            if _is_function(value):
+            if isinstance(value, Expr):
                 if value.ufl_shape:
-                    raise InputError(f"Heterogeneous: {words} is a Function of shape {value.ufl_shape}; give a scalar "
-                                     "one")
+                    raise InputError(f"Heterogeneous: {words} has values of shape {value.ufl_shape}; give one that is "
+                                     "scalar")
                 continue
             given = callable(value) and not isinstance(value, type)
             if not given and not low < number_given("Heterogeneous", words, value) < high:
@@ -73,7 +75,7 @@ class Heterogeneous:
 
 
 def _is_function(value: Any) -> bool:
-    return hasattr(value, "function_space") and hasattr(value, "x")
+    return isinstance(value, Expr) and hasattr(value, "function_space")
 
 
 def _on_cells(value: Any) -> bool:
@@ -86,8 +88,10 @@ def _values(words: str, value: Values, space: Any, comm: MpiComm) -> Array:
     if not callable(value):
         found.x.array[:] = value
         return np.array(found.x.array)
-    if _is_function(value) and value.function_space.mesh is not space.mesh:
-        raise InputError(f"Heterogeneous: {words} is a Function on another mesh; give one on the mesh of the body")
+    if isinstance(value, Expr):
+        if any(one.ufl_id() != space.mesh.ufl_domain().ufl_id() for one in extract_domains(value)):
+            raise InputError(f"Heterogeneous: {words} is of another mesh; give it on the mesh of the body")
+        value = value if _is_function(value) else compat.expression(value, space)
     on_all(comm, f"Heterogeneous: {words}", partial(found.interpolate, value))
     return np.array(found.x.array)
 

@@ -27,7 +27,8 @@ class Forms:
 
     With E, a stiffness, a prestress, … in Functions, Constants and expressions of the user's own. The forms are
     integrated as they are, ``ufl.dx`` and other measures included: where a section has a thickness other than 1 m it
-    belongs into them, for contact weights, loads and dashpots are multiplied by that of the section.
+    belongs into them, for contact weights, loads and dashpots are multiplied by that of the section. What they hold
+    must keep its values while the system is used: reactions and section forces integrate them again.
 
     Args:
         stiffness: the form of K [N/m]. One that is not symmetric is for solver=Volume() alone, and has no energy.

@@ -1,7 +1,7 @@
 """Read and run case files: a contact problem and its run in TOML, table by table the calls of the Python interface.
 
     [mesh]            fem.build_mesh, fem.read_mesh        [scheme] [solver] [[escalation]]
-    [material.NAME]   LinearElastic                        [[record]] [fields]
+    [material.NAME]   LinearElastic, Orthotropic           [[record]] [fields]
     [system]          fem.assemble                         [run]      the other arguments of simulate
     [[contact]]       fem.contact_surface, .contact_pair   [gravity]  with_weight, then static_equilibrium
     [friction] [impact] [mass] [[excitation]]              [model]    instead of mesh, material, system, contact
@@ -28,6 +28,7 @@ from ...fem.contact.joined import joined_surfaces
 from ...fem.mesh import Tags, build_mesh, read_mesh
 from ...fem.released_supports import release
 from ...laws.materials import LinearElastic
+from ...laws.orthotropic import Orthotropic
 from ...laws.weight import with_weight
 from ...meshes.gmsh_session import MeshScript
 from ...run.cross_check import CrossChecked
@@ -49,7 +50,7 @@ _TABLES: dict[str, Any] = {  # in the order in which they are read: type of what
     "title": str,
     "model": Parts,
     "mesh": MeshScript | MeshFile,
-    "material": Mapping[str, LinearElastic],
+    "material": Mapping[str, LinearElastic | Orthotropic],
     "system": callee(assemble),
     "contact": ContactSurface | Sequence[ContactSurface],
     "gravity": callee(with_weight),

@@ -22,6 +22,7 @@ from ...fem.contact.matching import Matching
 from ...ground_motion.record import LARGEST_PEAK, Record
 from ...laws.impact import VelocityUpdate
 from ...laws.materials import Damping, LinearElastic, Section
+from ...laws.orthotropic import Orthotropic
 from ...meshes.gmsh_session import MeshScript
 from ...models import channel, wall
 from ...run import HalvedAtImpact, Schedule
@@ -38,7 +39,7 @@ from .table_calls import Callee, callee
 
 _KINDS: Mapping[ModuleType, tuple[Any, ...]] = {  # room -> the kinds of things it lists
     core: (Obstacle, FrictionLaw),
-    laws: (LinearElastic, Section, Damping, FrictionLaw, ImpactLaw, VelocityUpdate, MassLaw, Excitation),
+    laws: (LinearElastic, Orthotropic, Section, Damping, FrictionLaw, ImpactLaw, VelocityUpdate, MassLaw, Excitation),
     ground_motion: (Excitation,),
     meshes: (MeshScript,),
     fem: (Prescribed, Traction, BodyForce, Dashpots, Matching, Recorder, FieldWriter),
