@@ -14,7 +14,7 @@ N = 40
 
 
 def found(**matrices):
-    given = {name: None if A is None else SerialMatrix(A) for name, A in matrices.items()}
+    given = {name: SerialMatrix(A) for name, A in ({"M": sp.identity(N)} | matrices).items()}
     return list(matrix_defects("mine", SerialComm(), np.arange(N), **given))
 
 
@@ -29,14 +29,14 @@ def test_one_entry_is_found_whatever_its_units(K):
     K[7, 8] *= 1.0 + 1e-6
     for A in (K, units @ K @ units):
         assert 1e-9 < asymmetry(SerialMatrix(A), SerialComm(), np.arange(N)) < 1e-5
-        assert "K is not symmetric" in found(K=A)[0]
+        assert "M is not symmetric" in found(M=A)[0]
 
 
 def test_round_off_is_no_asymmetry(K):
     noise = 1.0 + 1e-13 * np.random.default_rng(1).standard_normal(K.nnz)
     A = K.tocsr()
     A.data *= noise
-    assert found(M=sp.identity(N), C=None, K=A) == []
+    assert found(M=A, K=A) == []
     assert found(M=sp.csr_matrix((N, N)), K=sp.csr_matrix((N, N))) == []  # nothing is symmetric
 
 

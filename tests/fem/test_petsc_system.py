@@ -136,6 +136,23 @@ def test_bodies_and_node_against_node_on_ranks():
     assert same(*runs, 1e-11)
 
 
+def test_stiffness_that_is_not_symmetric_on_ranks():
+    """By Volume() on any number of ranks the serial run; other solvers refuse it."""
+    M, K = bar_matrices(12, length=1.0, E=1e6, rho=1000.0)
+    K = sp.csr_matrix(K + sp.diags([np.full(12, 1e6)], [1]))
+    points, v0 = line([0.0], [1.0], 12), np.full(13, 1.0)
+    alone = vc.system_from_arrays(M, None, K, coordinates=points, v0=v0)
+    (mass, here), (stiffness, _) = shared(M, 1), shared(K, 1)
+    system = fem.system_from_matrices(mass, None, stiffness, coordinates=points[here], v0=v0[here])
+    runs = []
+    for one in (alone, system):
+        problem = vc.ContactProblem(one, vc.contact_points(one, [12], [1.0]), mass=vc.ConsistentMass())
+        runs.append(history(problem, np.arange(13), scheme=vc.MoreauJean(), solver=vc.Volume()))
+        with pytest.raises(InputError, match="needs symmetric matrices"):
+            history(problem, np.arange(13), scheme=vc.MoreauJean())
+    assert same(*runs, 1e-9)
+
+
 def test_function_space_in_place_of_coordinates():
     """Nodes of any degree: the block of a space is a node. Numbers are found by points."""
     system, _ = block(2)
@@ -161,7 +178,7 @@ def test_bad_matrices():
     for matrices, given, said in (
         ((M, C, "K"), {}, "K is 'K'; give a PETSc.Mat, or scipy matrices to vc.system_from_arrays"),
         ((M, 1.0, K), {}, "C is 1.0; give a PETSc.Mat"),
-        ((M, C, skew), {}, "K is not symmetric"),
+        ((skew, C, K), {}, "M is not symmetric"),
         ((few, C, K), {}, "M has .* rows and columns on this rank"),
         ((np.ones(3), C, K), {}, r"M has shape \(3,\)"),
         ((M, dense, K), {}, "C is of type .*dense; give AIJ"),

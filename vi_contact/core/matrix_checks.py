@@ -32,21 +32,16 @@ def asymmetry(A: Matrix, comm: Comm, numbers: Indices) -> float:
         return float(np.float64(error) / scale) if scale else error
 
 
-def matrix_defects(owner: str, comm: Comm, numbers: Indices, **matrices: Matrix | None) -> Iterator[str]:
-    """Yield a sentence for each matrix that is not finite or not symmetric, and for masses below zero. Collective: take
-    all of them on every rank."""
+def matrix_defects(owner: str, comm: Comm, numbers: Indices, **matrices: Matrix) -> Iterator[str]:
+    """Yield a sentence for each matrix that is not finite, and for M that is not symmetric or has masses below zero.
+    Collective: take all of them on every rank."""
     for name, A in matrices.items():
-        if A is None:
-            continue
         found = asymmetry(A, comm, numbers)
         if not np.isfinite(found):
             yield f"{owner}: {name} has NaN or infinite entries; give finite numbers"
-        elif found > SYMMETRIC:
-            yield (f"{owner}: {name} is not symmetric, A w and Aᵀ w differ by {found:.1g} of their size; give a "
-                   "symmetric matrix")
-    M = matrices.get("M")
-    if M is None:
-        return
+        elif found > SYMMETRIC and name == "M":
+            yield f"{owner}: M is not symmetric, M w and Mᵀ w differ by {found:.1g} of their size; give a symmetric one"
+    M = matrices["M"]
     own = M.diagonal()
     if largest(comm, -np.min(own, initial=0.0)) > 0.0:
         yield f"{owner}: M has a diagonal entry below zero; give masses that are positive, or zero"

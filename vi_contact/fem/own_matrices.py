@@ -1,6 +1,6 @@
 """Make the system of matrices that come from anywhere: a user's own elements, another program, beams and frames.
 
-    M u'' + C u' + K u = f(t),   M, C, K symmetric, M positive (semi)definite
+    M u'' + C u' + K u = f(t),   M symmetric and positive (semi)definite
 
 Rows that stand still are eliminated here, so that weight and ground motion count the mass that they share with others.
 """
@@ -14,12 +14,18 @@ import scipy.sparse as sp
 from ..core.algebra import Algebra, Array, Indices, Mask, Matrix, SerialAlgebra, SerialMatrix, largest
 from ..core.checks import array, integers, on_all, refuse
 from ..core.errors import InputError
-from ..core.matrix_checks import matrix_defects
+from ..core.matrix_checks import SYMMETRIC, asymmetry, matrix_defects
 from ..core.system import Load, SemiDiscreteSystem
 from ..laws.free_motions import floating
 from .matrix_space import MatrixSpace
 
 OWNER = "system_from_arrays"
+
+
+class UnsymmetricSerial(SerialAlgebra):
+    """Combine matrices on one process of which some is not symmetric: solvers that need that refuse them."""
+
+    symmetric = False
 
 
 def system_from_arrays(
@@ -32,7 +38,8 @@ def system_from_arrays(
     solvers, static stages, ``Energy``, ``Contact``, ``Probe``, checkpoints, ``fem.XDMF``. Bodies are what K joins.
 
     Args:
-        M, C, K: (n, n), symmetric: mass [kg], M also (n,) where lumped; damping [N s/m] or None; stiffness [N/m].
+        M, C, K: (n, n), symmetric: mass [kg], M also (n,) where lumped; damping [N s/m] or None; stiffness [N/m]. C and
+            K that are not symmetric are for ``solver=Volume()`` alone.
         coordinates: (nodes, d) [m], d = 1, 2 or 3.
         unknowns: (n, 2) node and component 0, …, d - 1 of each row, component -1 for what is no displacement of a point
             (a rotation); None: row node * d + c is component c of the node. Components without a row stand still.
@@ -41,8 +48,8 @@ def system_from_arrays(
             unit translation of all displacements.
         u0, v0: (n,) initial displacement [m] and velocity [m/s], zero when None.
     Raises:
-        InputError: matrices that are not real, finite, square, of one size and symmetric; masses below zero;
-            coordinates, unknowns or vectors that do not fit them.
+        InputError: matrices that are not real, finite, square and of one size, M that is not symmetric or has masses
+            below zero; coordinates, unknowns or vectors that do not fit them.
     """
     matrices = {name: _serial(name, A) for name, A in (("M", M), ("C", C), ("K", K)) if name != "C" or A is not None}
     n = matrices["K"].csr.shape[0]
@@ -51,7 +58,7 @@ def system_from_arrays(
             raise InputError(f"{OWNER}: {name} has shape {one.csr.shape} and K has {n} rows; give square matrices of "
                              "one size")
     given = {"coordinates": coordinates, "unknowns": unknowns, "clamped": clamped, "load": load, "u0": u0, "v0": v0}
-    return own_system(OWNER, SerialAlgebra(), matrices, given)
+    return own_system(OWNER, SerialAlgebra(), UnsymmetricSerial(), matrices, given)
 
 
 def _serial(name: str, value: Any) -> SerialMatrix:
@@ -66,10 +73,10 @@ def _serial(name: str, value: Any) -> SerialMatrix:
 
 
 def own_system(
-    owner: str, algebra: Algebra, matrices: Mapping[str, Matrix], given: Mapping[str, Any]
+    owner: str, algebra: Algebra, unsymmetric: Algebra, matrices: Mapping[str, Matrix], given: Mapping[str, Any]
 ) -> SemiDiscreteSystem:
     """Return the system of matrices M, K and perhaps C of one size and of what is given of this rank's rows and nodes,
-    which is checked here. Collective."""
+    which is checked here. ``unsymmetric``: the algebra for C or K that are not symmetric. Collective."""
     comm, n = algebra.comm, matrices["K"].rows
     points, block, component, free = on_all(comm, owner, lambda: _meaning(owner, n, given))
     load, u0, v0 = on_all(comm, owner, lambda: _vectors(owner, n, given))
@@ -77,6 +84,8 @@ def own_system(
     refuse([f"{owner}: nodes of one rank have {d} coordinates, others more" if d < largest(comm, d) else ""], comm)
     numbers = algebra.first(n) + np.arange(n)
     refuse(list(matrix_defects(owner, comm, numbers, **matrices)), comm)
+    skew = [name for name, A in matrices.items() if asymmetry(A, comm, numbers) > SYMMETRIC]
+    algebra = unsymmetric if skew else algebra
     every = matrices["M"]
     influence = (component[:, None] == np.arange(d)).astype(float)
     if largest(comm, not free.all()):
@@ -90,6 +99,7 @@ def own_system(
         algebra=algebra, M=M, C=matrices.get("C"), K=K, load=load, influence=influence[free], u0=u0[free],
         v0=v0[free], space=space, base_mass=np.column_stack(momenta),
         massless=massless if largest(comm, massless.any()) else None,
+        notes=tuple(f"{name} not symmetric: only Volume() solves it, and ½ uᵀKu is no energy" for name in skew),
     ))
 
 

@@ -14,7 +14,7 @@ from ..core.errors import InputError
 from ..core.system import Load, SemiDiscreteSystem
 from .communicators import MpiComm, kept
 from .own_matrices import own_system
-from .petsc_algebra import PetscAlgebra, PetscMatrix
+from .petsc_algebra import PetscAlgebra, PetscMatrix, UnsymmetricAlgebra
 from .petsc_rows import aij_of, rows_of
 
 OWNER = "system_from_matrices"
@@ -48,7 +48,7 @@ def system_from_matrices(
     if hasattr(coordinates, "tabulate_dof_coordinates"):
         count, d = coordinates.dofmap.index_map.size_local, coordinates.mesh.geometry.dim
         given["coordinates"] = coordinates.tabulate_dof_coordinates()[:count, :d]
-    return own_system(OWNER, PetscAlgebra(comm), matrices, given)
+    return own_system(OWNER, PetscAlgebra(comm), UnsymmetricAlgebra(comm), matrices, given)
 
 
 def _rows(name: str, A: Any, K: Any) -> sp.csr_matrix:
