@@ -309,6 +309,32 @@ def states() -> Wrong:
     return wrong
 
 
+def own_matrices() -> Table:
+    """Systems of own matrices, and their contact points."""
+    right = {"M": np.eye(2), "C": None, "K": np.eye(2), "coordinates": [[0.0, 0.0]]}
+    system, K = vc.system_from_arrays(**right), body().system.K.mat
+    points = body().system.space.points
+    points = points[points[:, 1] > 0.0]
+    matrix = NEEDED | {"cube": np.ones((2, 2, 2)), "oblong": np.ones((2, 3)), "complex": 1j * np.eye(2),
+                       "texts": [["a", "b"], ["c", "d"]], "nan": np.full((2, 2), nan), "petsc": K}
+    numbers = {"text": "all", "half": [0.5], "nan": [nan], "far": [9], "negative": [-1], "table": [[0]], "class": dict}
+    vector = but(VECTOR, "none") | {"long": np.ones(3)}
+    given = {"unknowns": THING | {"flat": [0, 1], "half": [[0, 0], [0, 0.5]]}, "load": vector, "u0": vector,
+             "v0": vector, "coordinates": NEEDED | {"flat": np.ones(2), "four": np.ones((1, 4)), "nan": [[nan, 0.0]]}}
+    return [
+        (vc.system_from_arrays, right,
+         given | {"M": matrix, "C": but(matrix, "none"), "K": matrix, "clamped": numbers}),
+        (fem.system_from_matrices, {"M": K, "C": None, "K": K, "coordinates": points}, given | {
+            "M": but(matrix, "petsc"), "C": but(matrix, "none", "petsc"), "K": but(matrix, "petsc"),
+            "clamped": but(numbers, "far") | {"far": [10**6]}}),
+        (vc.contact_points, {"system": system, "nodes": [0], "normals": [1.0, 0.0]}, {
+            "system": NEEDED | {"of elements": body().system}, "nodes": numbers | {"none": None, "empty": []},
+            "normals": VECTOR | {"zero": (0.0, 0.0), "longer": (1.0, 0.0, 0.0)},
+            "weights": {"text": "a", "nan": nan, "list": [1.0, 2.0]}, "opposite": numbers | {"itself": [0]},
+            "gap0": {"text": "a", "nan": nan, "list": [1.0, 2.0]}, "obstacle": THING}),
+    ]
+
+
 def runs() -> Table:
     """Problems, and what marches them."""
     b = body()
@@ -405,7 +431,7 @@ EXTRA: dict[str, Callable[[], object]] = {
     "joined_surfaces: systems": lambda: fem.joined_surfaces(body().surface, chain_surface(3)),
     "joined_surfaces: texts": lambda: fem.joined_surfaces("a"),  # type: ignore[arg-type]
 }
-TABLES = [values(), of_the_mesh(), runs()]
+TABLES = [values(), of_the_mesh(), own_matrices(), runs()]
 MISUSES = dict(one for table in TABLES for one in calls(table)) | EXTRA
 RIGHT = [one for table in TABLES for one in rights(table)]
 """What the misuses were made of: these calls are right."""
