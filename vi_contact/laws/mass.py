@@ -46,9 +46,10 @@ class Redistributed:
 
     ``lumping`` 0.4 balances the dispersion of mesh and time step: consistent mass sends high frequencies ahead of
     the wave, lumped mass leaves them behind (table in docs/guide/schemes.md). Row sums of P2 are zero at the vertices
-    of plane triangles, which does no harm, and may be negative on curved ones: those want lumping 0. InputError for
-    lumping outside [0, 1] or above 0 with negative row sums, a contact node with no material behind it, or a mesh too
-    coarse to hold the inertia.
+    of plane triangles, which does no harm, and may be negative on curved ones: those want lumping 0. P2 tetrahedra are
+    not lumped: their vertices would bear it all, and frequencies fall by per cents. InputError for lumping outside
+    [0, 1] or above 0 with negative row sums, a contact node with no material behind it, or a mesh too coarse to hold
+    the inertia.
     """
 
     lumping: float = 0.4
@@ -62,19 +63,20 @@ class Redistributed:
         massless, contact = _contact_unknowns(system, surface, tangential)
         algebra, nodal, own = system.algebra, _row_sums(system), system.M.diagonal()
         still = (own > 0.0) & ~system.influence.any(axis=1)  # no translation moves them
+        lumping = self.lumping
         if getattr(system.space, "hierarchy", None) is not None:
-            nodal[still] = own[still]
+            lumping = 0.0
         elif largest(algebra.comm, still.any()):
             raise InputError("redistributed mass has no place for the inertia of rotations, or of what else is no "
                              "displacement: give the problem mass=ConsistentMass()")
         wrong = int(total(algebra.comm, np.sum(nodal < -LIGHT * own)))  # as of elements of higher order
-        if wrong and self.lumping:
+        if wrong and lumping:
             raise InputError(f"redistributed mass cannot lump negative row sums of M and {wrong} unknowns have such: "
                              "give the problem mass=Redistributed(lumping=0.0) or ConsistentMass()")
         nodal = own if wrong else np.maximum(nodal, 0.0)
         inner = ~(contact | still)
         lumped = algebra.local(*lumped_entries(surface, nodal), system.rows)
-        bulk = algebra.combine([(1.0 - self.lumping, system.M), (self.lumping, lumped)])
+        bulk = algebra.combine([(1.0 - lumping, system.M), (lumping, lumped)])
         levels = from_neighbours(system, massless, contact, nodal)
         moved, C, load = bulk, system.C, system.load
         for P in levels:  # the last one is applied to velocities first
