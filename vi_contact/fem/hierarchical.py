@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
-from ..core.algebra import Array, Matrix
+from ..core.algebra import Array, Mask, Matrix
 from . import compat
 from .numbering import supports
 from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
@@ -48,16 +48,23 @@ class Hierarchy:
         self.H, self.back = self._shares(0.5), self._shares(-0.5)
 
     def with_ghosts(self, values: Any) -> Array:
-        """Return owned nodal values (k, d), followed by those of the ghosts."""
+        """Return owned nodal values (k, c), c <= d, followed by those of the ghosts."""
         found = compat.function(self._space.V)
-        found.x.array[: values.size] = values.ravel()
+        rows = found.x.array.reshape(-1, self._space.dimension)[:, : values.shape[1]]
+        rows[: len(values)] = values
         found.x.scatter_forward()
-        return np.array(found.x.array.reshape(-1, values.shape[1]))
+        return rows.copy()
 
     def bent(self, nodal: Array) -> Array:
         """Return owned nodal displacements (k, d) with e in the place of those of mid-points."""
         every = self.with_ghosts(nodal)
         every[self._mids] -= every[self._ends].mean(axis=1)
+        return every[: len(nodal)]
+
+    def between(self, nodal: Array, known: Mask, mean: Any) -> Array:
+        """Return owned nodal values (k, c), with a ``mean`` at mid-points of edges with two known ends."""
+        every, both = self.with_ghosts(nodal), self.with_ghosts(known[:, None])[self._ends, 0].all(axis=1)
+        every[self._mids[both]] = mean(every[self._ends[both]], axis=1)
         return every[: len(nodal)]
 
     def around(self, turn: Matrix | None, dual: Matrix | None) -> tuple[Matrix, Matrix]:

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -111,8 +111,6 @@ class FrameWriter:
         self._problem, self._space, self._folder, self._per_file = problem, space, folder, per_file
         self._names = _VECTORS + (_RUBBING if problem.frictional else ())
         self._type, self._cell_numbers, self._von_mises = shown.kind, shown.numbers, shown.von_mises
-        owned, slots = problem.surface.owned, problem.surface.slots
-        self._contact_nodes = on_first(space.comm, slots, space.ids[owned] // space.dimension)
         points = on_first(space.comm, space.nodes, _three(space.points))
         cells = on_first(space.comm, self._cell_numbers, shown.nodes)
         self._shape = (len(points), *cells.shape)
@@ -165,13 +163,14 @@ class FrameWriter:
         von_mises = self._von_mises
         stress = None if von_mises is None else on_first(space.comm, self._cell_numbers, von_mises(moving[0]))
         slipping = np.zeros(problem.surface.count, dtype=bool)
+        if problem.frictional and report is not None:
+            slipping = slipped(report)
+        pressure, status = nodal_contact(problem, state, np.where(state.active, np.where(slipping, 3, 2), 1))
         if problem.frictional:
-            moving += self._rubbing(state)
-            slipping = slipping if report is None else slipped(report)
-        vectors = on_first(space.comm, space.nodes, np.hstack([_three(nodal) for nodal in moving]))
-        surface = problem.surface
-        each = surface.on_first(np.column_stack([state.r_n / surface.weights, state.active, slipping]))
-        on_root(space.comm, partial(self._write, state, vectors, stress, each))
+            known = status[:, 0] > 0
+            moving += [between(space, nodal, known) for nodal in self._rubbing(state)]
+        rows = np.hstack([*(_three(nodal) for nodal in moving), pressure, status])
+        on_root(space.comm, partial(self._write, state, on_first(space.comm, space.nodes, rows), stress))
 
     def _rubbing(self, state: State) -> list[Array]:
         """Tangential traction and slip at the owned nodes, (k, d) each."""
@@ -187,13 +186,11 @@ class FrameWriter:
         along = surface.along_axes(turned)  # tangents are at right angles to all that is oblique
         return NodalSpace.expand(space, along, 0.0)  # not what is prescribed or follows
 
-    def _write(self, state: State, vectors: Array, stress: Array | None, contact: Array) -> None:
-        pressure, status = self._contact(*contact.T)
-
+    def _write(self, state: State, nodal: Array, stress: Array | None) -> None:
         def fill(file: Any) -> None:
             for i, name in enumerate(self._names):
-                file[name] = vectors[:, 3 * i : 3 * i + 3]
-            file["contact_pressure"], file["contact_status"] = pressure, status
+                file[name] = nodal[:, 3 * i : 3 * i + 3]
+            file["contact_pressure"], file["contact_status"] = nodal[:, -2], nodal[:, -1].astype(np.int32)
             if stress is not None:
                 file["von_mises"] = stress
 
@@ -207,14 +204,6 @@ class FrameWriter:
         self._write_index()
         if full:
             self._remove_others()
-
-    def _contact(self, each: Array, active: Array, slipping: Array) -> tuple[Array, Any]:
-        """Contact pressure and status of all nodes."""
-        pressure, status = np.zeros(self._shape[0]), np.zeros(self._shape[0], dtype=np.int32)
-        order = np.argsort(np.abs(each), kind="stable")  # of several faces of a node, the one that is pressed most
-        pressure[self._contact_nodes[order]] = each[order]
-        np.maximum.at(status, self._contact_nodes, np.where(active > 0.0, np.where(slipping > 0.0, 3, 2), 1))
-        return pressure, status
 
     def _write_index(self) -> None:
         """fields.xdmf with all complete frames."""
@@ -246,6 +235,26 @@ class FrameWriter:
             f'<Geometry GeometryType="XYZ">{_item((nodes, 3), f"{mesh}:/points")}</Geometry>\n'
             f'{"".join(attributes)}</Grid>\n'
         )
+
+
+def nodal_contact(problem: ContactProblem, state: State, status: Array) -> tuple[Array, Array]:
+    """Return (contact pressure, status), (k, 1) at the owned nodes, of those of the conditions: of several faces of a
+    node the pressure of the one that is pressed most, and the highest status. Collective."""
+    space, surface = cast(NodalSpace, problem.system.space), problem.surface
+    blocks = space.blocks_of(space.ids[surface.owned] // space.dimension)
+    pressure, highest = np.zeros((2, len(space.nodes), 1))
+    each = state.r_n / surface.weights
+    order = np.argsort(np.abs(each), kind="stable")
+    pressure[blocks[order], 0] = each[order]
+    np.maximum.at(highest[:, 0], blocks, status)
+    known = highest[:, 0] > 0
+    return between(space, pressure, known), between(space, highest, known, np.min)
+
+
+def between(space: NodalSpace, nodal: Array, known: Mask, mean: Any = np.mean) -> Array:
+    """Return nodal values (k, c), those of mid-points from the known ends of their edges where conditions are those of
+    vertices only. Collective."""
+    return nodal if space.hierarchy is None else space.hierarchy.between(nodal, known, mean)
 
 
 def slipped(report: Report) -> Mask:

@@ -24,6 +24,7 @@ from ...core.state_checks import check_problem_given, check_sizes
 from ...core.step import State
 from .. import compat
 from ..space import FemSpace, known_matrices, space_of
+from .fields import nodal_contact
 
 NAMES = ("u", "v", "stress", "contact_pressure")
 ACCURACY = 1e-13  # of a projection, in its residual
@@ -42,11 +43,7 @@ def as_function(problem: ContactProblem, state: State, name: str, *, continuous:
     if name != "contact_pressure":
         x, derivative = (state.v, 1) if name == "v" else (state.u, 0)
         return _function(problem, name, space.expand(problem.cartesian(x), state.t, derivative), continuous)
-    surface, pressure = problem.surface, np.zeros(len(space.nodes))
-    each = state.r_n / surface.weights
-    order = np.argsort(np.abs(each), kind="stable")
-    pressure[np.flatnonzero(space.free)[surface.owned[order]] // space.dimension] = each[order]
-    return _function(problem, name, pressure)
+    return _function(problem, name, nodal_contact(problem, state, np.ones(len(state.r_n)))[0][:, 0])
 
 
 def read_function(
