@@ -9,6 +9,7 @@ The sides of the soil are tied, as level ground moves. Data, figures, mesh and t
     bash demos/run.sh -n 2 raft --size 1e5          # on two ranks
     bash demos/run.sh raft --size 3e5 --steps 50    # 7 GB, six minutes until the first step
     bash demos/run.sh raft --size 1e6 --steps 4     # without a factor: minutes a step, and hours for the gravity stage
+    python3 meshes raft --size 2.4 --soil-size 1.6 --far 8 -o demos/cases/raft.msh
     vi-contact run demos/cases/raft.toml --out results/raft_case    # gravity, then the frame of the ground: no release
 """
 
@@ -27,9 +28,9 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from demos.pictures import raft as pictures
+from meshes.raft import RaftMesh
 from vi_contact import engineering, fem, ground_motion, soil
 from vi_contact.cli import status_of
-from vi_contact.meshes.raft import RaftMesh
 from vi_contact.plots.bodies import film, plot_deformed
 from vi_contact.plots.faces import plot_faces
 from vi_contact.plots.histories import plot_certificate, plot_energy

@@ -11,12 +11,14 @@ if not __package__:  # run as a folder of the source tree, maybe not installed
 
 from meshes.ball import BallMesh
 from meshes.disk import DiskMesh
+from meshes.raft import RaftMesh
 from vi_contact import meshes as room
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.gmsh_session import write
 
 NAMED = {name: getattr(room, name) for name in room.__all__ if name.endswith("Mesh")}
-SHAPES = {"ball": BallMesh, "disk": DiskMesh} | {name.removesuffix("Mesh").lower(): one for name, one in NAMED.items()}
+OWN = {"ball": BallMesh, "disk": DiskMesh, "raft": RaftMesh}
+SHAPES = OWN | {name.removesuffix("Mesh").lower(): one for name, one in NAMED.items()}
 
 
 def parser() -> argparse.ArgumentParser:

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from meshes.raft import RaftMesh
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.extract import arrays_from_script
-from vi_contact.meshes.raft import RaftMesh
 
 gmsh = pytest.importorskip("gmsh")
 pytestmark = pytest.mark.serial

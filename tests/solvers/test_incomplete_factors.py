@@ -5,9 +5,9 @@ import logging
 import numpy as np
 import pytest
 
+from meshes.raft import RaftMesh
 from vi_contact import Condensed, ContactProblem, Coulomb, Iterative, LinearElastic, StepFailure, fem, march
 from vi_contact.laws.weight import with_weight
-from vi_contact.meshes.raft import RaftMesh
 
 pytest.importorskip("gmsh")
 

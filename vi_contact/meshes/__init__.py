@@ -12,7 +12,6 @@ _CONTENTS = {
     "block": ("BlockMesh",),
     "channel": ("ChannelMesh",),
     "cut": ("CutOpen", "Welded"),
-    "raft": ("RaftMesh",),
     "two_blocks": ("Blocks", "TwoBlocks"),
     "wall": ("WallMesh",),
 }

@@ -4,9 +4,8 @@ from .block import BlockMesh as BlockMesh
 from .channel import ChannelMesh as ChannelMesh
 from .cut import CutOpen as CutOpen
 from .cut import Welded as Welded
-from .raft import RaftMesh as RaftMesh
 from .two_blocks import Blocks as Blocks
 from .two_blocks import TwoBlocks as TwoBlocks
 from .wall import WallMesh as WallMesh
 
-__all__: list[str] = ['BlockMesh', 'Blocks', 'ChannelMesh', 'CutOpen', 'RaftMesh', 'TwoBlocks', 'WallMesh', 'Welded']
+__all__: list[str] = ['BlockMesh', 'Blocks', 'ChannelMesh', 'CutOpen', 'TwoBlocks', 'WallMesh', 'Welded']
