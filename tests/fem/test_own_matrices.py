@@ -121,6 +121,17 @@ def test_cantilever_on_a_stop():
     assert vc.static_equilibrium(vc.ContactProblem(system, high)).r_n == 0.0
 
 
+def test_load_steps_of_a_cantilever():
+    """A tip load that grows with t, above a stop: P t - 3 EI g/L³, nothing before it touches."""
+    tip = np.zeros(21)
+    tip[-2] = -1000.0
+    system = beam(load=Load(np.zeros(21), ((tip, float),)))
+    problem = vc.ContactProblem(system, vc.contact_points(system, [6], [0.0, -1.0], gap0=0.1))
+    times, touch = np.linspace(0.0, 1.0, 11), 3 * EI * 0.1 / L**3
+    found = [state.r_n[0] for state in vc.quasi_static(problem, times)]
+    assert found == pytest.approx(np.maximum(1000.0 * times - touch, 0.0), rel=1e-9, abs=1e-9 * touch)
+
+
 @pytest.mark.parametrize("normal", [(0.0, -1.0), (0.6, -0.8)])
 def test_plane_frame_on_a_stop(normal):
     """A column of height H with an arm B, loaded at its end: r = (n·F p - g)/(n·F n), F the end's flexibility."""

@@ -117,6 +117,24 @@ def test_frame_on_ranks():
     assert weight == pytest.approx(vc.with_weight(alone).load.constant @ alone.influence[:, 1], rel=1e-13)
 
 
+def test_restart_on_ranks(shared_tmp):
+    """The straight run, with a ledger that closes and frames whose nodes are all there."""
+    M, K = bar_matrices(12, length=1.0, E=1e6, rho=1000.0)
+    (mass, here), (stiffness, _) = shared(M, 1), shared(K, 1)
+    points = line([0.0], [1.0], 12)[here]
+    system = fem.system_from_matrices(mass, None, stiffness, coordinates=points, v0=np.ones(len(points)))
+    problem = vc.ContactProblem(system, vc.contact_points(system, [12], [1.0], gap0=1e-3))
+    given = {"dt": 2e-4, "progress": False, "record": [vc.Energy(), vc.Contact(), vc.Probe({"end": (0.0,)})]}
+    straight = vc.simulate(problem, steps=40, **given)
+    vc.simulate(problem, steps=20, out=shared_tmp, fields=fem.XDMF(every=20), **given)
+    again = vc.simulate(problem, steps=40, out=shared_tmp, fields=fem.XDMF(every=20), restart=True, **given)
+    assert straight.facts["energy_defect"] <= 1e-10 and np.max(straight.history["contact_resultant"]) > 0.0
+    for name in ("u_x_end", "contact_resultant", "energy_strain"):
+        size = np.max(np.abs(straight.history[name]))
+        assert again.history[name] == pytest.approx(straight.history[name], rel=1e-9, abs=1e-9 * size)
+    assert (shared_tmp / "fields.xdmf").read_text().count('NumberOfElements="13"') == 3
+
+
 def test_bodies_and_node_against_node_on_ranks():
     """Two bars in a row, lumped: two bodies wherever the ranks part them, and the serial run."""
     M, K = bar_matrices(12, length=1.0, E=1e6, rho=1000.0, lumped=True)
@@ -188,6 +206,8 @@ def test_bad_matrices():
     ):
         with pytest.raises(InputError, match=said):
             fem.system_from_matrices(*matrices, **({"coordinates": points} | given))
+    with pytest.raises(InputError, match="clamped goes from 1000000 to 1000000"):  # of one rank, told on all
+        fem.system_from_matrices(M, C, K, coordinates=points, clamped=[10**6] if COMM.rank == COMM.size - 1 else ())
     if COMM.size > 1:
         alone = aij_of(sp.identity(K.getLocalSize()[0], format="csr"), MPI.COMM_SELF)
         with pytest.raises(InputError, match="C and K are on different communicators"):
