@@ -5,17 +5,17 @@ from typing import Any
 
 import numpy as np
 
-from ..core.algebra import Indices
-from ..core.errors import InputError
-from ..run.files.reading import RunFolder
-from .bodies import Scene
+from vi_contact.core.algebra import Indices
+from vi_contact.core.errors import InputError
+from vi_contact.plots.bodies import Scene
+from vi_contact.run.files.reading import RunFolder
 
 
 def render_deformed(run: RunFolder, path: str | Path, *, t: float, magnified: float | None = None) -> Path:
     """Render the bodies of a run with fields in space, translucent, in the frame next to ``t`` [s], coloured by von
     Mises stress, and opaque the contact faces between them by their pressure, both displaced as by ``plot_deformed``.
 
-    InputError without pyvista (pip install vi-contact[render]), and for a run in the plane or without fields.
+    InputError without pyvista (pip install pyvista), and for a run in the plane or without fields.
     """
     try:
         import pyvista

@@ -72,7 +72,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
         "models.channel.ends models.channel.model models.channel.sides "
         "studies.cases.short_settings",
     "models/test_wall.py": "core.units",
-    "plots/test_faces.py": "plots.bodies plots.rendered",
+    "plots/test_faces.py": "plots.bodies",
     "plots/test_report.py": "cli.report run.files.reading",
     "run/test_folder.py": "core.files run.files.history run.files.stored_rows run.files.table",
     "run/test_fuzz_folders.py": "run.files.writer run.session",

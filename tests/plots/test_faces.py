@@ -22,6 +22,7 @@ from mpi4py import MPI
 from two_bodies import SOFT, two_blocks
 
 import vi_contact as vc
+from demos.pictures.rendered import render_deformed
 from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.core.files import open_hdf5
@@ -31,7 +32,6 @@ from vi_contact.plots import bodies, faces, run_pictures
 from vi_contact.plots.bodies import film, plot_deformed
 from vi_contact.plots.deformed import OPEN, SLIP, STICK, contact_states, read_frames
 from vi_contact.plots.faces import Painter, faces_of, leading, moments, plot_faces
-from vi_contact.plots.rendered import render_deformed
 from vi_contact.run.files.reading import RunFolder, read_run
 
 pytestmark = pytest.mark.serial

@@ -13,7 +13,6 @@ _CONTENTS = {
     "maps": ("plot_contact",),
     "overview": ("plot_overview",),
     "records": ("plot_loop", "plot_motion", "plot_spectra", "plot_transfer"),
-    "rendered": ("render_deformed",),
     "report": ("plot_report",),
     "run_pictures": ("draw_run",),
     "studies": ("plot_ida",),

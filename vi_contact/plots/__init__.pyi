@@ -14,9 +14,8 @@ from .records import plot_loop as plot_loop
 from .records import plot_motion as plot_motion
 from .records import plot_spectra as plot_spectra
 from .records import plot_transfer as plot_transfer
-from .rendered import render_deformed as render_deformed
 from .report import plot_report as plot_report
 from .run_pictures import draw_run as draw_run
 from .studies import plot_ida as plot_ida
 
-__all__: list[str] = ['draw_run', 'film', 'plot_certificate', 'plot_contact', 'plot_deformed', 'plot_energy', 'plot_excitation', 'plot_faces', 'plot_ida', 'plot_loop', 'plot_motion', 'plot_overview', 'plot_points', 'plot_report', 'plot_spectra', 'plot_transfer', 'read_frames', 'render_deformed']
+__all__: list[str] = ['draw_run', 'film', 'plot_certificate', 'plot_contact', 'plot_deformed', 'plot_energy', 'plot_excitation', 'plot_faces', 'plot_ida', 'plot_loop', 'plot_motion', 'plot_overview', 'plot_points', 'plot_report', 'plot_spectra', 'plot_transfer', 'read_frames']
