@@ -6,6 +6,7 @@ sliding, turned bodies, moved supports, thrown bodies with friction, the same on
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,9 +14,11 @@ import pytest
 
 pytest.importorskip("dolfinx")
 
+from caps import Cap, CapMesh, Caps
 from curved_cells import Curved, mesh_of, wavy
 from fem_problems import max_over_ranks, nodal
 from mpi4py import MPI
+from spheres import RADIUS, SLOPE, STEEL
 from two_bodies import SOFT, blocks, momenta, per_body, thrown
 
 import vi_contact as vc
@@ -24,6 +27,7 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.fem.contact.bubbles import OTHERS, _integrals
 from vi_contact.meshes.block import BlockMesh
+from vi_contact.meshes.extract import arrays_from_script
 
 COMM = MPI.COMM_WORLD
 P, MU = 1.0e4, 0.3
@@ -248,6 +252,33 @@ def test_two_thrown_blocks_keep_momentum_and_energy() -> None:
     after = momenta(solution.problem, solution.state.v)
     assert np.allclose(after.sum(axis=0), before, rtol=0.0, atol=1e-9 * np.abs(before).max())
     assert abs(after[0, 1]) > 0.01 * np.abs(before).max()
+
+
+@pytest.mark.slow
+def test_a_sphere_of_curved_cells_on_a_plane() -> None:
+    """Hertz: P2 tetrahedra with their mid-points on the sphere, 2 and 3 cells across the contact's half-width; in the
+    mean over three approaches the force is 7 % and 4 % too small, the pressures are 20 % and 13 % off in L2."""
+    errors = []
+    for cells in (2.0, 3.0):
+        caps = Caps([Cap(RADIUS, STEEL, cells)], SLOPE * RADIUS, simplices=True, pressed=lambda t: 0.9 + 0.1 * t)
+        flat = arrays_from_script(CapMesh([replace(caps.caps[0], radius=np.inf)], caps.a, (), simplices=True))
+        curved = Curved(flat, lambda x, cap=caps.caps[0]: x + np.outer(cap.sagitta(x), [0.0, 1.0, 0.0]))
+        mesh, tags = fem.build_mesh(curved, COMM)
+        held = [fem.Prescribed(tags["upper_far"], displacement=caps._far(0))]
+        held += [fem.Prescribed(tags[f"upper_{axis}"], components=(c,)) for c, axis in ((0, "x"), (2, "z"))]
+        system = fem.assemble(mesh, STEEL, prescribed=held, degree=2)
+        plane = vc.HalfSpace((0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+        surface = fem.contact_surface(system, tags["upper_foot"], obstacle=plane)
+        weights, points = surface.everywhere(surface.weights), surface.everywhere(surface.points)
+        rows = []
+        for state in vc.quasi_static(vc.ContactProblem(system, surface), range(3), solver=vc.Condensed()):
+            exact, r_n = caps.exact_at(caps.a * caps.pressed(state.t)), surface.everywhere(state.r_n)
+            p = exact.pressure(np.hypot(points[:, 0], points[:, 2]))
+            off = np.sqrt(weights @ (r_n / weights - p) ** 2 / (weights @ p**2))
+            rows.append((abs(r_n.sum() / caps.share / exact.force - 1.0), off))
+        errors.append(np.mean(rows, axis=0))
+    assert np.all(errors[1] < (0.06, 0.2))
+    assert np.all(errors[1] < 0.8 * errors[0])
 
 
 def test_wrong_uses_are_refused() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from vi_contact.core.algebra import Array
 from vi_contact.meshes.block import BlockMesh
-from vi_contact.meshes.extract import arrays_from_script
+from vi_contact.meshes.extract import MeshArrays, arrays_from_script
 
 
 def wavy(x: Array) -> Array:
@@ -33,13 +33,14 @@ MIDDLES = {  # Gmsh's number of a type of second order, and the vertices whose m
 
 @dataclass(frozen=True)
 class Curved:
-    """A mesh of grids with mid-points, all of whose nodes are moved by a smooth map: cells with curved sides."""
+    """A mesh of grids, or arrays, with mid-points, all of whose nodes are moved by a smooth map: cells with curved
+    sides."""
 
     mesh: Any
     move: Any = wavy
 
     def build(self, gmsh: Any) -> None:
-        arrays = arrays_from_script(self.mesh)
+        arrays = self.mesh if isinstance(self.mesh, MeshArrays) else arrays_from_script(self.mesh)
         d, known, points = arrays.points.shape[1], {}, list(arrays.points)
         side = {"tetrahedron": "triangle", "hexahedron": "quadrilateral"}.get(arrays.cell, "interval")
 
