@@ -37,7 +37,8 @@ def contact_surface(
     Nodal weights are ∫ phi_i times the section's thickness (so that r_n / weights is in Pa), nodal normals the
     direction of ∫ phi_i n over the facets, on rollers (a symmetry plane) without the component held there. Nodes of
     the facets that are clamped in every component (where the boundary meets a clamped part) are left out. Nodes that
-    move as one (``fem.Tied`` in all components) have one condition, with the weights of all.
+    move as one (``fem.Tied`` in all components) have one condition, with the weights of all. P2 tetrahedra have theirs
+    at the vertices, for means of the gap round them (``fem.contact.bubbles``).
 
     Where the facets turn by more than the feature angle the boundary has faces, and a node on several of them has one
     condition for each, with the normal and the weight of this face, at any angle between them (``fem.contact.faces``).
