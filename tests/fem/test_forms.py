@@ -335,7 +335,7 @@ def test_forms_that_cannot_be_a_body(comm: Any) -> None:
     good, away = isotropic(mesh), compat.function(compat.cell_space(other))
     nan = compat.constant(mesh, float("nan"))
     for wrong, words in (
-        ({"stiffness": lambda u, v: ufl.inner(eps(u), eps(v))}, "what stiffness returns .*; return an integral"),
+        ({"stiffness": lambda u, v: ufl.inner(eps(u), eps(v))}, "stiffness: what it returns .*; return an integral"),
         ({"stiffness": lambda u, v: ufl.inner(u, u) * ufl.inner(u, v) * ufl.dx}, "is not linear in u or in v"),
         ({"stiffness": lambda u, v: v[0] * ufl.dx}, "stiffness is no form in the trial and test functions"),
         ({"stiffness": lambda u, v: u[5] * v[0] * ufl.dx}, "Forms: stiffness ended in"),

@@ -40,14 +40,14 @@ def takes(name: str, call: Any, *arguments: str) -> None:
         return
 
 
-def form_of(name: str, call: Callable[[Any, Any], Any], u: Any, v: Any, space: FemSpace) -> Any:
-    """Return call(u, v), a form in both on the mesh of the space; InputError on all ranks otherwise. Collective."""
-    said = f"Forms: {name}"
-    form = on_all(space.comm, said, lambda: call(u, v))
-    instance("Forms", f"what {name} returns", form, ufl.Form, "return an integral, such as ufl.inner(…, …) * ufl.dx")
-    if set(on_all(space.comm, said, form.arguments)) != {u, v}:
-        raise InputError(f"{said} is no form in the trial and test functions it is given; return one that is linear in "
-                         "u and in v")
+def form_of(said: str, call: Callable[..., Any], space: FemSpace, *arguments: Any) -> Any:
+    """Return call(*arguments), a form linear in all of them on the mesh of the space; InputError, which begins with
+    ``said``, on all ranks otherwise. Collective."""
+    form = on_all(space.comm, said, lambda: call(*arguments))
+    instance(said, "what it returns", form, ufl.Form, "return an integral, such as ufl.inner(…, …) * ufl.dx")
+    if set(on_all(space.comm, said, form.arguments)) != set(arguments):
+        raise InputError(f"{said} is no form in the trial and test functions it is given; return one that is not zero "
+                         "and linear in each of them")
     on_all(space.comm, said, lambda: _refuse_not_linear(said, form))
     own = space.mesh.ufl_domain().ufl_id()
     functions = (getattr(one, "function_space", space.V) for one in form.coefficients())

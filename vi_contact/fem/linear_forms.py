@@ -6,13 +6,12 @@ from typing import Any
 
 import numpy as np
 import ufl
-from ufl.algorithms import compute_form_data
-from ufl.algorithms.check_arities import ArityMismatch
 
 from ..core.algebra import Array
-from ..core.checks import function, on_all, optional, refuse, shown
+from ..core.checks import function, on_all, optional, refuse
 from ..core.errors import InputError
 from . import compat
+from .form_checks import form_of
 from .loads import BodyForce, Traction
 from .quadrature import compiled
 from .space import FemSpace
@@ -57,13 +56,15 @@ class LinearForm:
 
     def full(self, space: FemSpace, thickness: float) -> Callable[[float], Array]:
         """Return t -> the forces (owned full,) on all components, less the history. Collective."""
-        form = on_all(space.comm, f"the form of {NAME}", lambda: compiled(space, self._checked(space)))
+        name, v = f"{NAME}: form", ufl.TestFunction(space.V)
+        form = form_of(name, self.form, space, v)
+        vector_of = on_all(space.comm, name, lambda: compiled(space, form))
         update = self.update
 
         def at(t: float) -> Array:
             if update is not None:
                 on_all(space.comm, f"{NAME}: update({t:g})", lambda: update(t))
-            vector = compat.assemble_vector(form)
+            vector = compat.assemble_vector(vector_of)
             forces = thickness * vector.array_r
             vector.destroy()
             defect = f"{NAME} gives NaN or infinite forces at t = {t:g} s: check its Functions, Constants and numbers"
@@ -76,26 +77,6 @@ class LinearForm:
         """Return t -> the forces on the free unknowns, less the history."""
         full = self.full(space, thickness)
         return lambda t: space.pull(full(t))
-
-    def _checked(self, space: FemSpace) -> Any:
-        """The form in v; InputError unless it is one, linear, and of this mesh."""
-        v, mesh = ufl.TestFunction(space.V), space.mesh
-        form = self.form(v)
-        if not isinstance(form, ufl.Form):
-            raise InputError(f"{NAME}: form returned {shown(form)}; return a UFL form with its measure, such as "
-                             "ufl.inner(f, v) * ufl.dx")
-        if form.arguments() != (v,):
-            raise InputError(f"{NAME}: the form has other arguments than v, or is zero; return one that is linear in "
-                             "v, without other test or trial functions")
-        spaces = (one.ufl_function_space() for one in form.coefficients())
-        if {*form.ufl_domains(), *(one.ufl_domain() for one in spaces)} != {mesh.ufl_domain()}:
-            raise InputError(f"{NAME}: the form integrates over another mesh, or has Functions of one; use this one")
-        try:  # before compilers do, which leave the other ranks waiting
-            compute_form_data(form)
-        except (Exception, ArityMismatch) as error:
-            raise InputError(f"{NAME}: UFL has no form data, {type(error).__name__}: {shown(str(error))}; return a "
-                             "form that is linear in v") from error
-        return form
 
 
 AnyLoad = Traction | BodyForce | LinearForm

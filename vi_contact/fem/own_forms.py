@@ -89,7 +89,7 @@ class OwnForms(ElasticForms):
     def _own(self, name: str) -> Any:
         """The form that was given for a matrix, or None."""
         call = getattr(self._given, ROLES[name])
-        return None if call is None else form_of(ROLES[name], call, self.u, self.v, self.space)
+        return None if call is None else form_of(f"Forms: {ROLES[name]}", call, self.space, self.u, self.v)
 
     def _notes(self, material: bool) -> tuple[str, ...]:
         mass = "the density of the material" if self._given.mass is None else "a form"
