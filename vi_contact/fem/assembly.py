@@ -24,6 +24,7 @@ from .assembly_checks import check_body, check_boundaries, check_initial
 from .communicators import give_back
 from .compact import algebra_for
 from .dashpots import DashpotMatrix, Dashpots, describe_boundaries
+from .dirichlet import GivenValues, refuse_contradictions, taken, taken_space
 from .forms import ElasticForms, Materials, cell_materials
 from .linear_forms import AnyLoad, LinearForm, Loads
 from .loads import Prescribed, as_tuple, evaluate
@@ -43,10 +44,10 @@ Initial = Field | Sequence[tuple[Cells, Field]] | None
 def assemble(
     mesh: Any, material: Materials | None = None, *, forms: Forms | None = None, section: Section | None = None,
     clamped: Facets | Sequence[Facets] = (), prescribed: Prescribed | Sequence[Prescribed] = (),
-    tied: Tied | Sequence[Tied] = (), dashpots: Dashpots | Sequence[Dashpots] = (),
-    loads: Loads = (),
+    tied: Tied | Sequence[Tied] = (), dashpots: Dashpots | Sequence[Dashpots] = (), loads: Loads = (),
     damping: Damping | None = None, initial_displacement: Initial = None, initial_velocity: Initial = None,
     base_inertia: bool = True, degree: int = 1, quadrature_degree: int | None = None, integration: str = "full",
+    space: Any = None, bcs: Any = (),
 ) -> SemiDiscreteSystem:
     """Assemble the system of a body, on the free unknowns.
 
@@ -57,6 +58,8 @@ def assemble(
         forms: the user's own weak forms, ``fem.Forms``; a material beside them gives the density where they have no
             mass, and the wave speeds that dashpots and free fields ask for.
         section: PlaneStrain() by default in 2D (Solid() in 3D); PlaneStress(thickness) for panels.
+        space: the user's own DOLFINx space V of the displacement; its degree counts. bcs: ``dirichletbc`` objects on V,
+            a space like it, or V.sub(i), at rest with the values they have now; where conditions meet the last counts.
         clamped: facets with u = 0; prescribed: facets that move (eq. 3) or are held in some components.
         dashpots: absorbing boundaries: Dashpots, CompliantBase, soil.FreeField. Their loss counts as damping.
         tied: boundaries whose opposite nodes move together; loads: tractions (eqs. 4, 6), body forces, LinearForm.
@@ -67,18 +70,18 @@ def assemble(
             takes tr eps as its mean (``fem.dilatation``).
         initial_displacement, initial_velocity: constant or points (k, d) -> (k, d) (eqs. 10, 10a), or (cells, value)
             pairs for several bodies; the later pair counts where cells meet, zero where there are none.
-        quadrature_degree: of all integrals over cells and facets; as UFL estimates it when None, which is exact on
-            cells with parallel sides.
+        quadrature_degree: of all integrals; None is UFL's estimate, which is exact on cells with parallel sides.
     Raises:
         InputError: cells without material, of an order that the degree does not suit, or folded; NaN in data,
             components that do not exist, dashpots on what is held, groups of another mesh or kind, contradictions.
     """
+    V, degree = taken_space(mesh, space, as_tuple(bcs), degree)
     section, damping = check_body(mesh, material, forms, section, damping, base_inertia, degree, integration)
     held, moved, boundaries = as_tuple(clamped), as_tuple(prescribed), as_tuple(dashpots)
     check_boundaries(mesh, held, moved, as_tuple(tied), boundaries, as_tuple(loads))
     check_initial(mesh, displacement=initial_displacement, velocity=initial_velocity)
-    conditions = tuple(Prescribed(facets) for facets in held) + moved
-    space = _space(mesh, conditions, as_tuple(tied), degree, quadrature_degree)
+    given = (*(Prescribed(facets) for facets in held), *moved, *taken(mesh, V, as_tuple(bcs)))
+    space = _space(mesh, given, as_tuple(tied), degree, quadrature_degree, V)
     body = _stated(space, material, forms, section, damping, boundaries, selective=integration == "selective")
     algebra = algebra_for(space.comm.mpi, space.dimension, space.unknowns, symmetric=body.symmetric)
     absorbers = [DashpotMatrix(space, body, one) for one in boundaries]
@@ -88,15 +91,14 @@ def assemble(
     K, pull = _reduced(body.matrix("K"), space, algebra, 0)  # one after the other: each is large before it is reduced
     damper = _damper(body, absorbers)
     C, viscous = _reduced(damper, space, algebra, 1) if damper is not None else (None, ())
-    mass = body.matrix("M")
-    # less M r, what accelerated prescribed nodes pull on the free ones
+    mass = body.matrix("M")  # momenta, less M r: what accelerated prescribed nodes pull on the free ones
     momenta = [space.pull(PetscMatrix(mass) @ one) for one in space.translations] if base_inertia else []
     M, inertial = _reduced(mass, space, algebra, 2)
     load = replace(
         load, inertial=inertial, general=(*load.general, *pull, *(one for part in acting for one in part.elastic)),
         viscous=(*viscous, *(one for part in acting for one in part.viscous)),
     )
-    system = SemiDiscreteSystem(
+    system = floating(SemiDiscreteSystem(
         algebra=algebra, M=M, C=C, K=K, load=load, influence=rigid,
         base_mass=np.column_stack([one - M @ r for one, r in zip(momenta, rigid.T, strict=True)]) if momenta else None,
         u0=_initial(space, "initial displacement", initial_displacement),
@@ -104,8 +106,7 @@ def assemble(
         space=space, tied=space.tied_unknowns, notes=describe_boundaries(boundaries, mesh.comm.rank, body.notes),
         absolute=any(one.lets_waves_in for one in boundaries),
         companions=tuple(one for part in (*moved, *acting) for one in part.companions),
-    )
-    system = floating(system)
+    ))
     body.own(system)
     del absorbers, damper, mass
     give_back(mesh.comm)
@@ -113,11 +114,13 @@ def assemble(
 
 
 def _space(
-    mesh: Any, prescribed: tuple[Prescribed, ...], tied: tuple[Tied, ...], degree: int, quadrature_degree: int | None
+    mesh: Any, given: tuple[Prescribed | GivenValues, ...], tied: tuple[Tied, ...], degree: int,
+    quadrature_degree: int | None, V: Any,
 ) -> FemSpace:
     """The space of the displacements."""
     optional(whole, "assemble", "quadrature_degree", quadrature_degree)
-    space = FemSpace(mesh, prescribed, tied, degree)
+    space = FemSpace(mesh, given, tied, degree, V)
+    refuse_contradictions(space)
     space.quadrature_degree = quadrature_degree
     return space
 

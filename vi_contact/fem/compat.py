@@ -125,6 +125,11 @@ def _bare(wrapped: Any) -> Any:
     return getattr(wrapped, "_cpp_object", getattr(wrapped, "_mesh", wrapped))
 
 
+def is_on(space: Any, mesh: Mesh) -> bool:
+    """Return whether a function space, or what a ``dirichletbc`` knows of one, is on this mesh."""
+    return _bare(space.mesh) is _bare(mesh)
+
+
 def entities_where(mesh: Mesh, dim: int, marker: Callable[[Any], Any]) -> Indices:
     """Return the local cells, or facets of the boundary, whose vertices ``marker`` (x (3, n) -> (n,)) all marks."""
     mesh.topology.create_entities(dim)
@@ -188,6 +193,21 @@ def dof_to_node(space: Any) -> Indices:
 def cell_blocks(space: Any) -> Indices:
     """Return the local blocks of unknowns of each cell (owned, then ghosts), (n_cells, n_nodes), vertices first."""
     return _as_table(space.dofmap.list, space.dofmap.dof_layout)
+
+
+def blocks_of_cells(space: Any) -> Indices:
+    """Return the same of the space of a ``dirichletbc``, of V or of V.sub(i): in C++ up to 0.11, in Python since."""
+    rows = getattr(space.dofmap, "map", None) or space.dofmap.list
+    table = _as_table(rows() if callable(rows) else rows, space.dofmap.dof_layout)
+    return table if space.dofmap.bs == space.dofmap.index_map_bs else table // space.dofmap.index_map_bs
+
+
+def bc_values(bc: Any, count: int) -> tuple[Indices, npt.NDArray[np.float64]]:
+    """Return (local unknowns that a ``dirichletbc`` holds, ghosts too; their values) on a space with so many."""
+    values = np.zeros(count)
+    bc.set(values, None, 1.0) if hasattr(bc, "set") else fem.set_bc(values, [bc])
+    dofs = bc.dof_indices()[0]
+    return dofs, values[dofs]
 
 
 def _as_table(rows: Any, layout: Any) -> Indices:

@@ -26,7 +26,7 @@ from ..core.checks import attributes, function, instance, optional
 from ..core.errors import InputError
 from ..laws.materials import LinearElastic, Section
 from . import compat
-from .groups import components_of, facets_of
+from .groups import facets_of
 from .mesh import Facets
 from .petsc_algebra import PetscMatrix
 from .quadrature import compiled
@@ -144,14 +144,14 @@ class DashpotMatrix:
             raise InputError(f"dashpots on '{name}' resist nothing: choose facets of the outer boundary and a positive "
                              "factor")
         for condition in self.space.prescribed:
-            both = np.intersect1d(self.dashpots.facets.indices, condition.facets.indices)
-            if not largest(self.space.comm, len(both)):
-                continue
-            resisted = self._resistance(self._matrix(both)) > NO_RESISTANCE * total
-            if any(resisted[c] for c in components_of("prescribed", condition.components, self.space.dimension)):
-                raise InputError(f"boundary '{name}' has dashpots in a direction that is prescribed on "
-                                 f"'{condition.facets.name}': never hold and damp one component, leave out the one or "
-                                 "the other")
+            for both, held in condition.on_facets(self.space, self.dashpots.facets.indices):
+                if not largest(self.space.comm, len(both)):
+                    continue
+                resisted = self._resistance(self._matrix(both)) > NO_RESISTANCE * total
+                if any(resisted[c] for c in held):
+                    raise InputError(f"boundary '{name}' has dashpots in a direction that is prescribed on "
+                                     f"'{condition.name}': never hold and damp one component, leave out the one or "
+                                     "the other")
 
     def moved_by(self, motion: Callable[[float], Array], factor: float) -> Callable[[float], Array]:
         """Return the load factor Pᵀ D v(t), v the same at all nodes."""

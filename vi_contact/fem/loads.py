@@ -15,7 +15,7 @@ from dolfinx.mesh import Mesh
 from ..core.algebra import Array, Comm
 from ..core.checks import ended, function, optional, refuse, shown
 from . import compat
-from .groups import components_given, facets_of, field_given
+from .groups import components_given, components_of, facets_of, field_given
 from .mesh import Facets
 
 Field = Callable[[Array, float], Array]
@@ -75,6 +75,11 @@ class Prescribed:
         components_given("Prescribed", self.components)
 
     @property
+    def name(self) -> str:
+        """Return the name of the facets."""
+        return self.facets.name
+
+    @property
     def motions(self) -> tuple[Value, Value, Value]:
         """Return the motion and its rates (U, U', U'')."""
         return self.displacement, self.velocity, self.acceleration
@@ -83,6 +88,22 @@ class Prescribed:
     def moves(self) -> bool:
         """Return whether it moves: False for a clamped part."""
         return any(value is not _zero for value in self.motions)
+
+    def places(self, space: Any) -> tuple[Any, Any]:
+        """Return (owned blocks, components) of a FemSpace that are held, as indices of an array of nodal values."""
+        held = components_of("prescribed", self.components, space.dimension)
+        return space.facet_blocks(self.facets.indices)[:, None], held
+
+    def at(self, space: Any, places: tuple[Any, Any], t: float, derivative: int) -> tuple[Any, str]:
+        """Return (values of the motion or a rate at the places, what is wrong with them or an empty text)."""
+        name = f"prescribed motion on '{self.facets.name}'"
+        motion, defect = evaluate_here(name, self.motions[derivative], space.points[places[0][:, 0]], t)
+        return motion[:, places[1]], defect
+
+    def on_facets(self, space: Any, facets: Any) -> list[tuple[Any, Any]]:
+        """Return which of the facets are held, in which components."""
+        held = components_of("prescribed", self.components, space.dimension)
+        return [(np.intersect1d(facets, self.facets.indices), held)]
 
     @property
     def companions(self) -> tuple[Any, ...]:

@@ -15,9 +15,9 @@ from ..core.errors import InputError
 from ..core.system import SemiDiscreteSystem
 from . import compat
 from .communicators import MpiComm, kept
-from .groups import components_of
+from .dirichlet import GivenValues
 from .hierarchical import Hierarchy, needs_hierarchy
-from .loads import Prescribed, evaluate_here
+from .loads import Prescribed
 from .mesh import Facets, node_numbers
 from .nodal_space import NodalSpace, bounding_box, parts_of
 from .numbering import facet_rows, numbered
@@ -63,7 +63,7 @@ class FemSpace(NodalSpace):
     "Full" vectors hold every owned component (bs*i + c); "free" vectors only those the equations solve for.
 
     Attributes:
-        V: the DOLFINx function space; dimension d; free: (owned full,) mask of free components.
+        V: the DOLFINx function space, the user's if given; dimension d; free: (owned full,) mask of free components.
         held, tied: (owned nodes, d) masks of components that are prescribed, or follow those of another node;
             tied_nodes: numbers of all nodes that move together with another, on every rank.
         numbers: (owned nodes, d) which unknown of all ranks a component is, also one that follows; -1 where held.
@@ -75,10 +75,11 @@ class FemSpace(NodalSpace):
     """
 
     def __init__(
-        self, mesh: Any, prescribed: tuple[Prescribed, ...], tied: Sequence[Tied] = (), degree: int = 1
+        self, mesh: Any, prescribed: Sequence[Prescribed | GivenValues], tied: Sequence[Tied] = (), degree: int = 1,
+        V: Any = None,
     ) -> None:
         self.mesh, self.degree = mesh, degree
-        self.V = compat.vector_space(mesh, degree)
+        self.V = compat.vector_space(mesh, degree) if V is None else V
         self.comm: MpiComm = MpiComm(kept(mesh.comm))
         self.algebra = PetscAlgebra(self.comm.mpi)
         self.dimension: int = mesh.geometry.dim
@@ -89,12 +90,10 @@ class FemSpace(NodalSpace):
         self.points: Array = points[:owned]
         self.size = bounding_box(self.comm, self.points)  # tolerances are relative to it
         self.prescribed = prescribed
-        self._where_held: list[tuple[Indices, tuple[int, ...]]] = []
         self.held = np.zeros((owned, self.dimension), dtype=bool)
-        for one in prescribed:
-            components = components_of("prescribed", one.components, self.dimension)
-            self._where_held.append((self.facet_blocks(one.facets.indices)[:, None], components))
-            self.held[self._where_held[-1]] = True
+        self._where_held = [one.places(self) for one in prescribed]
+        for places in self._where_held:
+            self.held[places] = True
         links = linked(tied, self.dimension, PLACE_TOLERANCE * self.size, self._everywhere)
         self.tied_nodes: Indices = np.union1d(links.followers, links.leaders) // self.dimension
         self._leader = links.of_nodes(self.dimension)
@@ -216,12 +215,10 @@ class FemSpace(NodalSpace):
         """
         values = np.zeros((len(self.nodes), self.dimension))
         defects = []
-        for condition, (blocks, components) in zip(self.prescribed, self._where_held, strict=True):
-            values[blocks, components] = 0.0
+        for condition, places in zip(self.prescribed, self._where_held, strict=True):
+            values[places] = 0.0
             if condition.moves:
-                name = f"prescribed motion on '{condition.facets.name}'"
-                motion, defect = evaluate_here(name, condition.motions[derivative], self.points[blocks[:, 0]], t)
-                values[blocks, components] = motion[:, components]
+                values[places], defect = condition.at(self, places, t, derivative)
                 defects.append(defect)
         if defects:
             refuse(defects, self.comm)

@@ -1,0 +1,116 @@
+"""Take Dirichlet data as a user of DOLFINx has them: ``dirichletbc`` objects on the displacement's space, or parts."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from ..core.algebra import Array, Indices, Mask, largest, max_abs
+from ..core.checks import provides, refuse
+from ..core.errors import InputError
+from . import compat
+from .communicators import MpiComm
+from .numbering import facet_rows
+
+REMEDY = "give dirichletbc(value, dofs, V) on the vector-valued Lagrange space V of this mesh, or on V.sub(i)"
+
+
+@dataclass(frozen=True, eq=False)
+class GivenValues:
+    """Hold components of nodes as a ``Prescribed`` at rest does: those of a ``dirichletbc``, as they were when given.
+
+    mask, values: (local blocks of V, d), ghosts too; moves: whether some value, of any rank, is not zero.
+    """
+
+    name: str
+    mask: Mask
+    values: Array
+    moves: bool
+
+    def places(self, space: Any) -> tuple[Indices, Indices]:
+        """Return (owned blocks, components) of what is held."""
+        blocks, components = np.nonzero(self.mask[: len(space.nodes)])
+        return blocks, components
+
+    def at(self, space: Any, places: tuple[Any, Any], t: float, derivative: int) -> tuple[Any, str]:
+        """Return (the values, or zero rates, at the places; no defect)."""
+        return (0.0 if derivative else self.values[places]), ""
+
+    def on_facets(self, space: Any, facets: Any) -> list[tuple[Any, tuple[int, ...]]]:
+        """Return, for each component, the facets of which every node is held in it."""
+        held = self.mask[facet_rows(space.V, facets)].all(axis=1)
+        return [(facets[held[:, c]], (c,)) for c in range(space.dimension)]
+
+
+def taken_space(mesh: Any, V: Any, bcs: Sequence[Any], degree: int) -> tuple[Any, int]:
+    """Return (the user's space, or that of the conditions without one; its degree); (None, degree) without both."""
+    for bc in bcs:
+        provides("assemble", "bcs", bc, ("dof_indices", "function_space", "g"), REMEDY)
+        if not compat.is_on(bc.function_space, mesh):
+            raise InputError(f"assemble: a dirichletbc of bcs is on another mesh; {REMEDY}")
+    if V is None:
+        made = (compat.vector_space(mesh, one) for one in (1, 2)) if bcs else ()
+        found = [(one, k) for k, one in enumerate(made, 1) if _block_of(one, bcs[0].function_space) is not None]
+        if bcs and not found:
+            raise InputError(f"assemble: a dirichletbc of bcs is on a space of another kind; {REMEDY}")
+        return found[0] if found else (None, degree)
+    provides("assemble", "space", V, ("dofmap", "ufl_element", "component"), "give a DOLFINx function space, or None")
+    if not compat.is_on(V, mesh):
+        raise InputError("assemble: space is on another mesh; give a space on this one")
+    for k in (1, 2):
+        known = compat.vector_space(mesh, k)
+        if V.ufl_element() == known.ufl_element() and _block_of(known, V) is not None and not len(V.component()):
+            return V, k
+    raise InputError(f"assemble: space is one of {V.ufl_element()}; give the Lagrange space of degree 1 or 2 with "
+                     f"{mesh.geometry.dim} components, not a part of another one")
+
+
+def taken(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[GivenValues, ...]:
+    """Return what conditions hold of a displacement's space. InputError, on all ranks, for one of another space, one
+    that holds nothing, and values that are not finite. Collective."""
+    comm, d, found = MpiComm(mesh.comm), mesh.geometry.dim, []
+    for k, bc in enumerate(bcs):
+        name, block = f"bcs[{k}]", _block_of(V, bc.function_space)
+        if block is None:
+            raise InputError(f"assemble: {name} is on another space than the displacement's; {REMEDY}")
+        dofs, values = compat.bc_values(bc, d * len(block))
+        known = block[dofs // d] >= 0
+        where = block[dofs[known] // d], dofs[known] % d
+        mask, given = np.zeros((2, V.dofmap.index_map.size_local + V.dofmap.index_map.num_ghosts, d))
+        mask[where], given[where] = 1.0, values[known]
+        defect = "" if np.all(np.isfinite(values)) else f"assemble: {name} contains NaN or infinite values"
+        refuse([defect], comm)
+        if not largest(comm, len(dofs)):
+            raise InputError(f"assemble: {name} holds no unknown on any rank; look how its dofs were located")
+        found.append(GivenValues(name, mask > 0.0, given, bool(largest(comm, max_abs(values)))))
+    return tuple(found)
+
+
+def refuse_contradictions(space: Any) -> None:
+    """Raise InputError, on all ranks, where a dirichletbc and a ``Prescribed`` hold the same components of nodes, or
+    one those of the other and more, at different values. Conditions that only meet do not contradict. Collective."""
+    given = np.array([isinstance(one, GivenValues) for one in space.prescribed], dtype=bool)
+    held = [np.full(space.held.shape, np.nan) for _ in given if given.any()]
+    for values, one in zip(held, space.prescribed, strict=False):
+        places = one.places(space)
+        values[places] = one.at(space, places, 0.0, 0)[0]
+    for i, j in product(np.flatnonzero(~given), np.flatnonzero(given)):
+        apart = np.abs(held[i] - held[j])
+        both, *each = space.comm.sum(np.array([np.isfinite(one).sum() for one in (apart, held[i], held[j])]))
+        if both and both in each and largest(space.comm, np.nanmax(apart, initial=0.0)):
+            raise InputError(f"assemble: {space.prescribed[j].name} and what is prescribed on "
+                             f"'{space.prescribed[i].name}' hold the same at different values: leave one of them out")
+
+
+def _block_of(V: Any, S: Any) -> Indices | None:
+    """The block of V that each block of a space is, of S = V or V.sub(i), -1 without cells; None, on all ranks, where
+    S is of another kind. Spaces made twice may be numbered differently. Collective."""
+    d, theirs, mine, rows = V.mesh.geometry.dim, S.dofmap.index_map, compat.cell_blocks(V), compat.blocks_of_cells(S)
+    fits = S.dofmap.index_map_bs == d and S.dofmap.bs == (1 if len(S.component()) else d) and rows.shape == mine.shape
+    block = np.full(theirs.size_local + theirs.num_ghosts, -1, dtype=np.int64)
+    if fits:
+        block[rows] = mine
+        fits = np.array_equal(block[rows], mine) and V.dofmap.index_map.size_global == theirs.size_global
+    return None if largest(MpiComm(V.mesh.comm), not fits) else block
