@@ -72,38 +72,48 @@ def same(comm: Any, one: Any, other: Any) -> None:
             assert np.abs(a - b).max() <= 1e-13 * np.abs(b).max(), matrix
 
 
+def both(comm: Any, name: str, section: str) -> tuple[Any, Forms, Any, Any, dict[str, Any]]:
+    """(mesh, forms, the body stated by them and by its material, what else is given), damped, pushed and moved."""
+    name, _, degree = name.partition(", degree ")
+    mesh, tags = block(comm, **BODIES[name])
+    pushed = fem.Prescribed(tags["top"], lambda x, t: (1 + t) * 1e-3 * x, components=(1,))
+    data: dict[str, Any] = {
+        "section": SECTIONS[section], "clamped": tags["bottom"], "prescribed": pushed, "damping": Rayleigh(0.3, 1e-3),
+        "loads": fem.Traction(tags["right"], (1e6, 0.0, 0.0)[: mesh.geometry.dim]), "degree": int(degree or 1),
+    }
+    given = isotropic(mesh, section=SECTIONS[section])
+    return mesh, given, fem.assemble(mesh, forms=given, **data), fem.assemble(mesh, CONCRETE, **data), data
+
+
 @pytest.mark.parametrize("name, section", [
     ("quadrilaterals", "strain"), ("triangles", "stress"), ("hexahedra", "solid"), ("tetrahedra", "solid"),
     ("triangles, degree 2", "strain"),
 ])
 def test_own_isotropic_forms_are_those_of_the_material(comm: Any, name: str, section: str) -> None:
-    """M, K, C (Rayleigh, viscous, own), what held nodes pull, weight, geometric stiffness, stresses, reactions and
-    section forces: to round-off."""
-    name, _, degree = name.partition(", degree ")
-    mesh, tags = block(comm, **BODIES[name])
-    cut, d = SECTIONS[section], mesh.geometry.dim
-    pushed = fem.Prescribed(tags["top"], lambda x, t: (1 + t) * 1e-3 * x, components=(1,))
-    data: dict[str, Any] = {
-        "section": cut, "clamped": tags["bottom"], "prescribed": pushed, "damping": Rayleigh(0.3, 1e-3),
-        "loads": fem.Traction(tags["right"], (1e6,) + (0.0,) * (d - 1)), "degree": int(degree or 1),
-    }
-    given = isotropic(mesh, section=cut)
-    ours, theirs = fem.assemble(mesh, forms=given, **data), fem.assemble(mesh, CONCRETE, **data)
+    """M, K, C, what held nodes pull, weight: to round-off."""
+    _, _, ours, theirs, _ = both(comm, name, section)
     same(comm, ours, theirs)
     for vector in (lambda s: s.base_mass, lambda s: s.load(0.5), lambda s: vc.with_weight(s).load(0.0)):
         assert max_over_ranks(comm, vector(ours) - vector(theirs)) < 1e-12 * max_over_ranks(comm, vector(theirs))
-    without = replace(given, mass=None)
-    same(comm, fem.assemble(mesh, CONCRETE, forms=without, **data), theirs)
+
+
+def test_mass_of_a_material_and_damping_of_ones_own(comm: Any) -> None:
+    mesh, given, _, theirs, data = both(comm, "quadrilaterals", "strain")
+    same(comm, fem.assemble(mesh, CONCRETE, forms=replace(given, mass=None), **data), theirs)
     own = replace(given, damping=lambda u, v: 0.3 * given.mass(u, v) + 1e-3 * given.stiffness(u, v))  # type: ignore[misc]
     same(comm, fem.assemble(mesh, forms=own, **{**data, "damping": None}), theirs)
+
+
+def test_outputs_of_own_isotropic_forms_are_those_of_the_material(comm: Any) -> None:
+    """Stresses, with sigma_zz of plane strain, reactions, section forces, geometric stiffness: to round-off."""
+    _, _, ours, theirs, data = both(comm, "quadrilaterals", "strain")
     stresses, numbers = [], []
     for system in (ours, theirs):
         problem = linear(system)
         state = vc.static_equilibrium(problem)
         stresses.append(VonMises(system.space.forms)(system.space.expand(state.u, 0.0)))
-        shaped = [fem.Reactions("base", tags["bottom"], (0.0,) * d, loads=data["loads"])]
-        if d == 2 and not BODIES[name].get("angle"):
-            shaped.append(fem.SectionForces({"middle": ((0.0, 0.75), (2.0, 0.75))}, loads=data["loads"]))
+        shaped = (fem.Reactions("base", data["clamped"], (0.0, 0.0), loads=data["loads"]),
+                  fem.SectionForces({"middle": ((0.0, 0.75), (2.0, 0.75))}, loads=data["loads"]))
         row = [value for one in shaped for value in one.start(problem, state).values()]
         stiffer = fem.geometric_stiffness(problem, state)
         numbers.append([*row, stiffer.strain_energy(state.u)])
