@@ -23,7 +23,7 @@ from vi_contact.fem.contact.mortar import DualMortar
 from vi_contact.fem.contact.pairs import contact_pair
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import Prescribed, Traction
-from vi_contact.fem.mesh import build_mesh
+from vi_contact.fem.mesh import Facets, build_mesh
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.extract import arrays_from_script
 from vi_contact.run.static import static_equilibrium
@@ -164,3 +164,28 @@ def test_an_even_pressure_from_all_sides_goes_through_a_curved_interface(name: s
     assert np.allclose(problem.cartesian(state.u), exact, rtol=0.0, atol=1e-10 * 2.0 * PRESSURE / SOFT.E)
     assert np.abs(state.r_n / surface.weights / PRESSURE - 1.0).max(initial=0.0) < 0.03
     assert surface.total == (25 if name == "hexahedra" else 9)
+
+
+def rounded(x: Array) -> Array:
+    """Map a square of side 2 (a cube) onto a disk of radius 1 (a ball), at even angles."""
+    y = np.tan(0.25 * np.pi * (x - 1.0))
+    reach, length = np.abs(y).max(axis=1), np.maximum(np.linalg.norm(y, axis=1), 1e-9)
+    return y * (reach / length)[:, None]
+
+
+@pytest.mark.parametrize("name", ["triangles", "quadrilaterals", "hexahedra"])
+def test_few_curved_sides_are_a_smooth_face(name: str) -> None:
+    """A disk and a ball of 8 curved sides round, whose planes turn by 45°: all nodes have one condition, along the
+    radius. Those of a box keep two at its corners."""
+    d = 3 if name == "hexahedra" else 2
+    spec = {"lengths": (2.0,) * d, "divisions": (2,) * d, "simplices": name == "triangles"}
+    mesh, tags = build_mesh(Curved(BlockMesh(**spec), rounded), COMM)
+    sides = [group for group in tags.values() if isinstance(group, Facets)]
+    outside = Facets("outside", np.concatenate([side.indices for side in sides]), mesh)
+    surface = contact_surface(assemble(mesh, SOFT, degree=2), outside).whole()
+    assert len(surface.nodes) == len(np.unique(surface.nodes)) == (98 if d == 3 else 16)
+    assert np.linalg.norm(surface.normals - surface.points, axis=1).max() < 0.06
+    mesh, tags = build_mesh(Curved(BlockMesh(**spec), lambda x: x), COMM)
+    both = Facets("both", np.union1d(tags["bottom"].indices, tags["right"].indices), mesh)
+    surface = contact_surface(assemble(mesh, SOFT, degree=2), both).whole()
+    assert len(surface.nodes) - len(np.unique(surface.nodes)) == (5 if d == 3 else 1)

@@ -19,11 +19,15 @@ from ...core.errors import InputError
 from ...meshes.rows import number_alike
 from .. import compat
 from ..mesh import Facets
+from ..numbering import facet_rows, is_curved
 from ..space import FemSpace
 from .nodes import Nodes
 
 log = logging.getLogger(__name__)
 LEANING = 0.9  # cosine of the angle (26°) up to which a normal counts as lying in a symmetry plane
+MID_POINTS = {  # the vertices around those of a facet of second order, by its number of nodes
+    3: [[0, 1]], 6: [[1, 2], [0, 2], [0, 1]], 9: [[0, 1], [0, 2], [1, 3], [2, 3], [0, 1, 2, 3]],
+}
 NAMED = 4  # corners that the log names
 
 
@@ -32,8 +36,7 @@ class Boundary:
     """Hold facets of a group, the same on every rank in the order of the numbers of their nodes.
 
     Attributes:
-        vertices: (k, v) numbers of their nodes, mid-points too, ascending; normals: (k, d) outward, of length one, on
-            curved facets of the plane through the corners.
+        vertices: (k, v) numbers of their nodes, mid-points too, ascending; normals: (k, v, d) outward there, unit ones.
         local: this rank's facets of the group; place: their numbers among the k.
     """
 
@@ -45,14 +48,14 @@ class Boundary:
     def corner_faces(self, angle: float) -> Indices:
         """Number the faces (k, v) that each facet belongs to round each of its nodes, all nodes apart."""
         node = self.vertices.ravel()
-        facet = np.repeat(np.arange(len(self.vertices)), self.vertices.shape[1])
+        normals = self.normals.reshape(-1, self.normals.shape[2])
         order = np.argsort(node, kind="stable")
         links = []
         for apart in range(1, int(np.unique(node, return_counts=True)[1].max(initial=1))):
             one, other = order[:-apart], order[apart:]
             same = node[one] == node[other]
             one, other = one[same], other[same]
-            turn = _turn(self.normals[facet[one]], self.normals[facet[other]])
+            turn = _turn(normals[one], normals[other])
             close = turn <= angle * (1.0 + 1e-9)
             links.append(np.stack([one[close], other[close]]))
         return components(len(node), links).reshape(self.vertices.shape)
@@ -77,7 +80,10 @@ def boundary(space: FemSpace, facets: Facets, *, beyond: float | None = None) ->
     it from others: of a smooth boundary none. Collective."""
     mesh, local = space.mesh, np.asarray(facets.indices)
     geometry = compat.entities_to_geometry(mesh, mesh.topology.dim - 1, local)
-    vertices, normals = space.corners_of_facets(local), outward(mesh, local, geometry)
+    vertices, plane = space.corners_of_facets(local), outward(mesh, local, geometry)
+    normals = np.repeat(plane[:, None], vertices.shape[1], axis=1)
+    if is_curved(mesh) and space.dimension > 1:
+        normals = _curved(space, local, plane)[:, : vertices.shape[1]]
     if beyond is not None:
         kept = np.isin(vertices, _turning(space, vertices, normals, beyond)).any(axis=1)
         local, vertices, normals = local[kept], vertices[kept], normals[kept]
@@ -85,7 +91,9 @@ def boundary(space: FemSpace, facets: Facets, *, beyond: float | None = None) ->
     rows, normals = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
     if not len(rows):
         return Boundary(rows, normals, local, np.zeros(0, dtype=np.int64))
-    unique, first = np.unique(np.sort(rows, axis=1), axis=0, return_index=True)
+    order = np.argsort(rows, axis=1)
+    normals = np.take_along_axis(normals, order[:, :, None], axis=1)
+    unique, first = np.unique(np.take_along_axis(rows, order, axis=1), axis=0, return_index=True)
     known, own = number_alike(unique, vertices)
     order = np.argsort(known)
     return Boundary(unique, normals[first], local, order[np.searchsorted(known[order], own)])
@@ -94,8 +102,8 @@ def boundary(space: FemSpace, facets: Facets, *, beyond: float | None = None) ->
 def _turning(space: FemSpace, vertices: Indices, normals: Array, angle: float) -> Indices:
     """Numbers of the nodes, the same on every rank, whose facets have normals in too large a box for all to be within
     the angle of one another. Of nodes that other ranks own every rank tells the box of those facets that it holds."""
-    facet = np.repeat(np.arange(len(vertices)), vertices.shape[1])
-    numbers, low, high = _boxes(vertices.ravel(), normals[facet], normals[facet])
+    every = normals.reshape(-1, normals.shape[2])
+    numbers, low, high = _boxes(vertices.ravel(), every, every)
     away = ~np.isin(numbers, space.nodes)
     parts = [(numbers, low, high), *from_each(space.comm, (numbers[away], low[away], high[away]))]
     numbers, low, high = _boxes(*(np.concatenate([part[i] for part in parts]) for i in range(3)))
@@ -122,6 +130,25 @@ def outward(mesh: Any, facets: Any, geometry: Any) -> Array:
     cells = cell_of.array[cell_of.offsets[facets]]  # the first cell of each
     inside = mesh.geometry.x[compat.geometry_dofmap(mesh)[cells]][:, :, :d].mean(axis=1)
     return np.asarray(np.where(np.sum((middle - inside) * normals, axis=1)[:, None] < 0.0, -normals, normals))
+
+
+def _curved(space: FemSpace, facets: Any, plane: Array) -> Array:
+    """Outward unit normals (k, n, d) at the nodes of curved facets; ``plane``: those of the planes of their vertices.
+
+    At a vertex that of the tangents of its edges, at mid-points the mean of those of the vertices around.
+    """
+    x = space.mesh.geometry.x[compat.dof_to_node(space.V)[facet_rows(space.V, facets)]][:, :, : space.dimension]
+    around = MID_POINTS[x.shape[1]]
+    corners = x.shape[1] - len(around)
+    normals = np.empty_like(x)
+    for p in range(corners):
+        ends = [(corners + i, sum(one) - p) for i, one in enumerate(around) if p in one and len(one) == 2]
+        along = np.stack([4.0 * x[:, middle] - 3.0 * x[:, p] - x[:, end] for middle, end in ends], axis=1)
+        normal = np.linalg.svd(along)[2][:, -1]
+        normals[:, p] = np.where(np.sum(normal * plane, axis=1)[:, None] < 0.0, -normal, normal)
+    for i, one in enumerate(around):
+        normals[:, corners + i] = normals[:, one].mean(axis=1)
+    return np.asarray(normals / np.linalg.norm(normals, axis=2)[:, :, None])
 
 
 def _turn(one: Array, other: Array) -> Array:
