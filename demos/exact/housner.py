@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.algebra import Array
-from ..core.checks import attributes
-from ..core.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.checks import attributes
+from vi_contact.core.errors import InputError
 
 REST = 1e-30  # phi below which the rest of the motion lasts less than round-off of what has passed
 

@@ -180,5 +180,5 @@ def test_the_table_is_true():
 
 
 def test_a_false_row_is_found():
-    assert not mentions("core/test_algebra.py", "exact.housner")
-    assert mentions("exact/test_housner.py", "exact.housner")
+    assert not mentions("core/test_algebra.py", "soil.free_field")
+    assert mentions("soil/test_free_field.py", "soil.free_field")

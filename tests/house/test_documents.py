@@ -161,7 +161,7 @@ def test_import_needs_numpy_and_scipy_only(package: str) -> None:
     assert done.returncode == 0, done.stderr
 
 
-ROOMS = ["core", "fem", "solvers", "schemes", "soil", "engineering", "ground_motion", "exact", "bem", "beam",
+ROOMS = ["core", "fem", "solvers", "schemes", "soil", "engineering", "ground_motion", "bem", "beam",
          "boundary_layer", "studies", "plots"]
 
 
