@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import dolfinx.fem as dfem
+import dolfinx.mesh
 import numpy as np
 import pytest
 import ufl
@@ -207,3 +208,36 @@ def test_own_forms_beside_own_conditions():
                           loads=fem.LinearForm(lambda v: ufl.inner(f, v) * ufl.dx))
     base = fem.Facets.where("base", mesh, at(0, 0.0))
     same(system, fem.assemble(mesh, CONCRETE, clamped=base, loads=fem.BodyForce((0.0, -2e4))))
+
+
+def test_stages_and_functions_beside_them():
+    """Supports released after a static stage, stiffness of its stresses, u on the user's own space; a unit square."""
+    mesh = dolfinx.mesh.create_unit_square(COMM, 4, 3)
+    V, push = compat.vector_space(mesh), np.array([1e-5, 0.0])
+    side = fem.Facets.where("left", mesh, at(0, 0.0))
+    part = V.sub(0)
+    both = dfem.dirichletbc(push, on(V, at(0, 0.0)), V)
+    one = dfem.dirichletbc(compat.PETSc.ScalarType(push[0]), on(part, at(0, 0.0)), part)
+
+    def stages(held: dict[str, Any], free: dict[str, Any]) -> tuple[Any, Any, Any]:
+        problems = []
+        for data in (held, free):
+            system = fem.assemble(mesh, CONCRETE, loads=fem.BodyForce((1e4, -1e4)), **data)
+            wall = HalfSpace(point=(1.000005, 0.0), normal=(-1.0, 0.0))
+            surface = fem.contact_surface(system, fem.Facets.where("right", mesh, at(0, 1.0)), obstacle=wall)
+            problems.append(ContactProblem(system, surface))
+        state = static_equilibrium(problems[0], tolerance=1e-9)
+        assert problems[0].surface.everywhere(state.r_n).max() > 0.0
+        u = fem.as_function(problems[0], state, "u")
+        stiffer = fem.geometric_stiffness(problems[0], state)
+        return fem.release(problems[0], state, problems[1])[0].system.load(0.0), stiffer.load(0.0), u
+
+    def moved(*components: int) -> fem.Prescribed:
+        return fem.Prescribed(side, lambda x, t: 0.0 * x + push, components=components or None)
+
+    expected = stages({"prescribed": moved()}, {"prescribed": moved(0)})
+    found = stages({"bcs": both, "space": V}, {"bcs": one, "space": V})
+    for mine, theirs in zip(found[:2], expected[:2], strict=True):
+        assert max_over_ranks(COMM, mine - theirs) < 1e-11 * max_over_ranks(COMM, theirs)
+    assert found[2].function_space == V
+    assert max_over_ranks(COMM, found[2].x.array - expected[2].x.array) < 1e-12 * max_over_ranks(COMM, found[2].x.array)
