@@ -164,12 +164,13 @@ def vector_space(mesh: Mesh, degree: int = 1) -> Any:
 
 
 def lagrange(mesh: Mesh, degree: int, shape: tuple[int, ...] = (), *, continuous: bool = True) -> Any:
-    """Make the space of Lagrange fields of values of this shape: (), (d,) or (d, d)."""
+    """Make the space of Lagrange fields of values of this shape: (), (d,) or that of a matrix."""
     family = "Lagrange" if continuous else "DG" if _BASIX_ELEMENTS or is_simplex(mesh) else "DQ"
     if _BASIX_ELEMENTS:
         return fem.functionspace(mesh, (family, degree, shape) if shape else (family, degree))
-    make = (fem.FunctionSpace, fem.VectorFunctionSpace, fem.TensorFunctionSpace)[len(shape)]
-    return make(mesh, (family, degree))
+    if len(shape) == 2:
+        return fem.TensorFunctionSpace(mesh, (family, degree), shape=shape)
+    return (fem.VectorFunctionSpace if shape else fem.FunctionSpace)(mesh, (family, degree))
 
 
 def is_simplex(mesh: Mesh) -> bool:
@@ -237,20 +238,9 @@ def assemble_vector(form: Any) -> PETSc.Vec:
     return vector
 
 
-def cell_space(mesh: Mesh, degree: int = 0, shape: tuple[int, int] | None = None) -> Any:
-    """Make the space of functions that are constant, or of a degree, on every cell; of matrices of a shape."""
-    if _BASIX_ELEMENTS:
-        return fem.functionspace(mesh, ("DG", degree) if shape is None else ("DG", degree, shape))
-    family = "DQ" if mesh.ufl_cell().cellname() in ("quadrilateral", "hexahedron") else "DG"
-    if shape is None:
-        return fem.FunctionSpace(mesh, (family, degree))
-    return fem.TensorFunctionSpace(mesh, (family, degree), shape=shape)
-
-
-def cell_dofs(space: Any) -> Indices:
-    """Return the local blocks of unknowns of each cell of any space (owned, then ghosts), (n_cells, n_dofs)."""
-    rows = space.dofmap.list
-    return rows if isinstance(rows, np.ndarray) else rows.array.reshape(-1, space.dofmap.dof_layout.num_dofs)
+def cell_space(mesh: Mesh) -> Any:
+    """Make the space of functions that are constant on every cell."""
+    return lagrange(mesh, 0, continuous=False)
 
 
 def expression(expr: Any, space: Any) -> Any:

@@ -56,7 +56,7 @@ class ElasticForms:
         self._matrices: dict[str, WeakSet[Any]] = {name: WeakSet() for name in ("M", "C", "K")}
         found = [material for _, material in materials]
         degree = int(any(isinstance(one, Heterogeneous) and one.varies for one in found))
-        cells = compat.cell_space(space.mesh, degree)
+        cells = compat.lagrange(space.mesh, degree, continuous=False)
         names = ("lame", "shear", "rho", "alpha_rho", "beta", "lame_out")
         values = [_constants(cells, where, one) for where, one in materials]
         self.viscous = _viscous(damping)
@@ -65,7 +65,7 @@ class ElasticForms:
         if not self.damped and materials:
             self.fields["alpha_rho"] = self.fields["beta"]  # zeros
         for (where, _), one in zip(materials, values, strict=True):
-            dofs = compat.cell_dofs(cells)[where]
+            dofs = compat.cell_blocks(cells)[where]
             for name, value in zip(names, _fields(one, section, damping, space.dimension), strict=True):
                 value = section.thickness * value if name != "beta" else value
                 self.fields[name].x.array[dofs] = value[dofs] if np.ndim(value) else value
@@ -76,7 +76,7 @@ class ElasticForms:
     def cellwise(self, name: str) -> Array:
         """Return the means of a field over the local cells, (cells,)."""
         field = self.fields[name]
-        return np.asarray(field.x.array[compat.cell_dofs(field.function_space)].mean(axis=1))
+        return np.asarray(field.x.array[compat.cell_blocks(field.function_space)].mean(axis=1))
 
     def own(self, system: SemiDiscreteSystem) -> None:
         """Remember the matrices of a system as made of these materials; the forms are then those of its space."""
@@ -182,10 +182,11 @@ def _anisotropic(
     """The matrix of all cells (see ``Orthotropic.matrix``) times the thickness, as a function."""
     if d == 1:
         raise InputError("Orthotropic has no meaning on a line: give a LinearElastic")
-    found = compat.function(compat.cell_space(cells.mesh, degree, (len(VOIGT[d]) + (d == 2), len(VOIGT[d]))))
+    shape = len(VOIGT[d]) + (d == 2), len(VOIGT[d])
+    found = compat.function(compat.lagrange(cells.mesh, degree, shape, continuous=False))
     values = found.x.array.reshape(len(fields["lame"].x.array), -1, len(VOIGT[d]))
     for where, one in materials:
-        dofs = np.ravel(compat.cell_dofs(cells)[where])
+        dofs = np.ravel(compat.cell_blocks(cells)[where])
         if isinstance(one, Orthotropic):
             values[dofs] = section.thickness * one.matrix(section, d)
         else:

@@ -68,7 +68,7 @@ class Heterogeneous:
         cells that no material has. Collective."""
         comm = MpiComm(space.mesh.comm)
         mine = np.zeros(len(compat.function(space).x.array), dtype=bool)
-        mine[compat.cell_dofs(space)[cells]] = True
+        mine[compat.cell_blocks(space)[cells]] = True
         values = {name: _values(words, getattr(self, name), space, comm) for name, (words, *_) in RANGES.items()}
         refuse(_defects(values, mine, space), comm)
         return ElasticValues(**values)
