@@ -13,6 +13,7 @@ import gc
 import itertools
 import os
 import shutil
+import sys
 import tempfile
 import time
 from array import array
@@ -135,12 +136,30 @@ def pytest_collectreport(report: pytest.CollectReport) -> None:
 
 def pytest_collection_finish(session: pytest.Session) -> None:
     gc.freeze()  # what was imported stays: the collector need not look at it again and again
+    _load_forms_once()
     if SIZE == 1:
         return
     mine = "\n".join([*_collection_errors, *(item.nodeid for item in session.items)])
     texts = _meet(session.config, mine, where="collection", seconds=_patience(TEST_SECONDS))
     if any(text != mine for text in texts):
         _abort(session.config, f"ranks collected different tests:\n{mine}")
+
+
+def _load_forms_once() -> None:
+    """FFCx lists its cache of thousands of files whenever a form is made, also one whose module is loaded already."""
+    jit = sys.modules.get("ffcx.codegeneration.jit")
+    if jit is None:
+        return
+    load, known = jit.get_cached_module, dict[Any, Any]()
+
+    def once(name: str, objects: Any, folder: Any, *more: Any) -> Any:
+        key = name, tuple(objects), str(folder)
+        found = known[key] if key in known else load(name, objects, folder, *more)
+        if found[0] is not None:
+            known[key] = found
+        return found
+
+    jit.get_cached_module = once  # type: ignore[attr-defined]
 
 
 @pytest.hookimpl(hookwrapper=True)
@@ -229,3 +248,15 @@ def shared_tmp(comm: Any) -> Iterator[Path]:
     yield Path(path)
     if comm.rank == 0:
         shutil.rmtree(path, ignore_errors=True)
+
+
+@pytest.fixture(autouse=True)
+def _pictures(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Pictures are quick where they are not what is tested."""
+    if request.path.parent.name == "plots":
+        yield
+    else:
+        from plain_pictures import plain_pictures
+
+        with plain_pictures():
+            yield

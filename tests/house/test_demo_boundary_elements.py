@@ -37,7 +37,7 @@ def test_the_boundary_elements_demo(
         assert 0.0 < numbers[f"{name}: uzawa off"] < 1e-6 and 5 < numbers[f"{name}: uzawa"] < 600, name
         assert numbers[f"{name}: certificate"] < 1e-12
     for figure in ("snapshots.png", "tractions.png", "energies.png"):
-        assert (tmp_path / figure).stat().st_size > 20_000, figure
+        assert (tmp_path / figure).stat().st_size > 4_000, figure
     assert "fem energy" in capsys.readouterr().out
 
 
@@ -51,7 +51,7 @@ def test_the_shear_of_histories_is_drawn_on_the_body(
     history = {"t": [1.0], "pressure": [[1.0, 2.0]], "traction_t": [[[3.0], [-3.0]]]}
     contact = SimpleNamespace(points=np.array([(0.0, 0.0), (1.0, 0.0)]), normals=np.array([normal, normal]))
     run = SimpleNamespace(contact=contact, history={name: np.array(values) for name, values in history.items()})
-    monkeypatch.setattr("vi_contact.plots.deformed.read_run", lambda folder: run)
+    monkeypatch.setattr("demos.pictures.tractions.read_run", lambda folder: run)
     deformed.plot_tractions({"box": tmp_path}, (1.0,), tmp_path / "none.png", title="")
     axis = shown[0].axes[1]
     assert axis.get_ylabel() == "shear $p_t$ on the body,\nalong +x [Pa]"

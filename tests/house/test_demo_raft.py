@@ -39,7 +39,7 @@ def test_the_raft_demo(shared_tmp, capsys):
     assert moved > 1.5 * np.hypot(history["a_x_field"], history["a_y_field"]).max()
     assert "run finished: 150 steps" in capsys.readouterr().out
     for name in FIGURES:
-        assert (shared_tmp / f"{name}.png").stat().st_size > 20_000, name
+        assert (shared_tmp / f"{name}.png").stat().st_size > 4_000, name
     files_of_paraview(shared_tmp, 16)
 
 

@@ -18,5 +18,5 @@ def test_the_tower_on_soil_demo(comm, shared_tmp, capsys):
     assert numbers["uplift"] > 0.5 and 0.0 < numbers["slip"] < 0.01
     told = json.loads((shared_tmp / "summary.json").read_text())["boundaries"]
     assert len(told) == 3 and all("upgoing motion" in line for line in told)
-    assert (shared_tmp / "motions.png").stat().st_size > 20_000
+    assert (shared_tmp / "motions.png").stat().st_size > 4_000
     assert comm.rank or "outcrop 3.00 (upgoing wave 1.50)" in capsys.readouterr().out

@@ -16,7 +16,7 @@ serial = pytest.mark.serial
 
 def is_picture(path: Path) -> bool:
     """A PNG with something in it."""
-    return path.read_bytes().startswith(b"\x89PNG") and path.stat().st_size > 5000
+    return path.read_bytes().startswith(b"\x89PNG") and path.stat().st_size > 2_000
 
 
 @pytest.mark.slow

@@ -49,7 +49,7 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 def test_loop_of_a_slider(figures: list[Any], tmp_path: Path) -> None:
     """±1 kN, ±1 mm; the slip is drawn with the sign that makes the area 4 kN mm a cycle (V2.7 iii's law)."""
     path = plot_hysteresis(cycles(), tmp_path / "loop.png")
-    assert path.stat().st_size > 10_000
+    assert path.stat().st_size > 3_000
     (axis,) = figures[0].axes
     x, y = axis.lines[2].get_xdata(), axis.lines[2].get_ydata()
     assert axis.get_xlabel() == "mean slip [mm]" and "x [kN]" in axis.get_ylabel()
@@ -70,7 +70,7 @@ def test_states_of_known_slips() -> None:
 
 def test_map_has_all_points(figures: list[Any], tmp_path: Path) -> None:
     path = plot_states(cycles(), tmp_path / "map.png", position=np.linspace(1.0, 0.0, 6))
-    assert path.stat().st_size > 5_000
+    assert path.stat().st_size > 2_000
     (axis,) = figures[0].axes
     (mesh,) = axis.collections
     shown = np.asarray(mesh.get_array()).reshape(6, 401)

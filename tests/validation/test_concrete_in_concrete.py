@@ -238,5 +238,5 @@ def test_the_embedded_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFi
         assert numbers[f"{name}: floor"] + numbers[f"{name}: walls"] == pytest.approx(1.0, abs=0.02)
     assert numbers["rough: friction"] > 0.0 and numbers["rough: E(20 ms)"] < numbers["smooth: E(20 ms)"]
     for figure in ("snapshots", "energies"):
-        assert (shared_tmp / f"{figure}.png").stat().st_size > 30_000
+        assert (shared_tmp / f"{figure}.png").stat().st_size > 6_000
     assert comm.rank or "shares of load" in capsys.readouterr().out

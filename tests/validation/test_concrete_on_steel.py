@@ -92,5 +92,5 @@ def test_the_concrete_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFi
         assert numbers[f"{name}: force"] == pytest.approx(1.0, abs=0.01)
     assert numbers["smooth: corner"] == pytest.approx(1.0, abs=0.01) and numbers["on steel: corner"] == 0.0
     for figure in ("snapshots", "tractions", "energies"):
-        assert (shared_tmp / f"{figure}.png").stat().st_size > 30_000
+        assert (shared_tmp / f"{figure}.png").stat().st_size > 6_000
     assert comm.rank or "on steel" in capsys.readouterr().out

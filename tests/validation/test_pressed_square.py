@@ -170,7 +170,7 @@ def test_the_square_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixt
         assert numbers[f"{name}: E(1)"] == pytest.approx(0.0114, rel=0.02)
         assert (numbers[f"{name}: friction"] > 0.0) == ("no friction" not in name)
     for figure in ("snapshots", "tractions", "energies"):
-        assert (shared_tmp / f"{figure}.png").stat().st_size > 50_000
+        assert (shared_tmp / f"{figure}.png").stat().st_size > 10_000
     if comm.rank == 0:
         check_what_is_drawn(shared_tmp / "Tresca_0.05_default_scheme")
     assert comm.rank or "Coulomb 0.5, default scheme" in capsys.readouterr().out

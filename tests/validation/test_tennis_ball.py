@@ -179,5 +179,5 @@ def test_the_tennis_ball_demo(comm: Any, shared_tmp: Path, capsys: pytest.Captur
         assert max(numbers[f"{name}: change of energy"], numbers[f"{name}: angular momentum"]) < 1e-10
         assert numbers[f"{name}: velocity"] == pytest.approx(0.066, rel=0.06)
     for figure in ("snapshots", "tractions", "energies"):
-        assert (shared_tmp / f"{figure}.png").stat().st_size > 50_000
+        assert (shared_tmp / f"{figure}.png").stat().st_size > 10_000
     assert comm.rank or "angular momentum" in capsys.readouterr().out
