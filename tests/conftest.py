@@ -12,6 +12,7 @@ import functools
 import gc
 import itertools
 import os
+import re
 import shutil
 import sys
 import tempfile
@@ -95,8 +96,8 @@ def _left_out(item: pytest.Item) -> bool:
 
 def _covering(items: list[pytest.Item]) -> set[pytest.Item]:
     """Tests without parameters, and of every other function so many that each value of each parameter occurs, on three
-    ranks that each parameter varies: all of their combinations run on one rank, where a law, a scheme or a shape takes
-    the path that it takes on several."""
+    ranks that each parameter varies: their combinations run on one rank, where a law, a scheme or a shape takes the
+    path that it takes on several."""
     kept: set[pytest.Item] = set()
     functions: dict[str, list[pytest.Item]] = {}
     for item in items if SIZE % 2 == 0 else reversed(items):  # other combinations on three ranks than on two
@@ -114,19 +115,47 @@ def _covering(items: list[pytest.Item]) -> set[pytest.Item]:
     return kept
 
 
+def _paired(items: list[pytest.Item]) -> set[pytest.Item]:
+    """All tests, but of a function with three lists of parameters or more so many that every two values of different
+    lists meet: what three do together has not been seen to matter."""
+    kept = set(items)
+    functions: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        functions.setdefault(item.nodeid.split("[")[0], []).append(item)
+    for ones in functions.values():
+        lists = [mark.args[0] for mark in ones[0].iter_markers("parametrize")]
+        if len(lists) < 3:
+            continue
+        pairs = {item: set(itertools.combinations(_parametrised(item, lists), 2)) for item in ones}
+        kept -= set(ones)
+        while any(pairs.values()):
+            best = max(ones, key=lambda item: len(pairs[item]))  # the first of the best: alike in every process
+            new = set(pairs[best])
+            kept.add(best)
+            for rest in pairs.values():
+                rest -= new
+    return kept
+
+
+def _parametrised(item: pytest.Item, lists: list[Any]) -> list[tuple[int, int]]:
+    """(number of the list, which of its values the test has)."""
+    params = item.callspec.params  # type: ignore[attr-defined]
+    names = [re.split(r"\s*,\s*", one.strip()) if isinstance(one, str) else one for one in lists]
+    return [(number, hash(tuple(id(params[name]) for name in some))) for number, some in enumerate(names)]
+
+
 def _parameters(item: pytest.Item) -> set[tuple[str, int]]:
     return {(name, id(value)) for name, value in item.callspec.params.items()} if hasattr(item, "callspec") else set()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    if SIZE == 1:  # files of validation and those with many slow tests are long: not last on one core
-        slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
-        items.sort(key=lambda item: -slow[item.path] - 10 * ("validation" in item.path.parts))
-        return
-    kept = _covering([item for item in items if not _left_out(item)])
+    kept = _paired(items) if SIZE == 1 else _covering([item for item in items if not _left_out(item)])
     if left_out := [item for item in items if item not in kept]:
         items[:] = [item for item in items if item in kept]
         config.hook.pytest_deselected(items=left_out)
+    if SIZE == 1:  # files of validation and those with many slow tests are long: not last on one core
+        slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
+        items.sort(key=lambda item: -slow[item.path] - 10 * ("validation" in item.path.parts))
 
 
 def pytest_collectreport(report: pytest.CollectReport) -> None:

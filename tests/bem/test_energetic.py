@@ -160,7 +160,7 @@ def test_symmetric_form_is_positive_definite(ratio):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("ratio", [0.1, 0.25, 0.73, 4.0])
+@pytest.mark.parametrize("ratio", [0.1, 0.73, 4.0])
 def test_stable_for_small_and_large_time_steps(ratio):
     """B5: the rod stays bounded for c_P dt / h from 0.1 to 4 (to t = 60: benchmarks/bem.py)."""
     dt = 0.5 * ratio

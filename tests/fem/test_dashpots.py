@@ -43,6 +43,7 @@ def test_waves_at_right_angles_leave(comm, wave):
     assert energy[-1] < 1e-4 * energy.max()
 
 
+@pytest.mark.serial  # ranks change nothing of it: the column above shows that
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 def test_mistuned_dashpots_reflect(comm, factor):
     """V8.1: R = (1 - a)/(1 + a), 1/3 and -1/3: size and sign of the velocity that comes back, energy R²."""
@@ -103,6 +104,7 @@ def soil_on_compliant_base(comm, motion, **data):
     return fem.assemble(mesh, SOIL, tied=fem.Tied(tags["left"], tags["right"]), dashpots=base, **data)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wave", WAVES)
 def test_compliant_base(comm, wave):
     """V8.2: the surface moves with 2 v_up(t - H/c), the base with v_up(t) + v_up(t - 2H/c); then silence. 1 %."""
@@ -193,7 +195,7 @@ def test_waves_at_right_angles_leave_a_box(comm, wave, axis, moves, solver):
     """V8.1: P and both S waves, along every axis, sides tied both ways: what is left of the energy falls with the
     fourth power of h, as the square of the mesh's reflection, which is that of its error of dispersion."""
     speed, left = WAVES[wave][0], []
-    for cells in (80, 160):
+    for cells in (50, 100):
         h = HEIGHT / cells
         lengths, divisions = (tuple(one if c == axis else other for c in range(3)) for one, other in ((HEIGHT, h),
                                                                                                    (cells, 1)))
@@ -204,7 +206,7 @@ def test_waves_at_right_angles_leave_a_box(comm, wave, axis, moves, solver):
         steps = round(1.5 * cells) * 2
         energy = energies(linear(system), dt=0.5 * h / speed, steps=steps, solver=solver)
         left.append(energy[-1] / energy.max())
-    assert left[0] < 1e-5 and left[1] < 0.2 * left[0]
+    assert left[0] < 6e-5 and left[1] < 0.2 * left[0]
 
 
 @pytest.mark.slow

@@ -131,7 +131,10 @@ def test_twenty_three_conditions():
         assert surface.weights[sides[side]].sum() == pytest.approx(length)
 
 
-@pytest.mark.parametrize("sides", [Rollers(), Rollers(component=0), TiedSides(), Fixed()], ids=str)
+@pytest.mark.parametrize(
+    "sides", [TiedSides(), *(pytest.param(one, marks=serial) for one in (Rollers(), Rollers(component=0), Fixed()))],
+    ids=str,
+)
 def test_weight_rests_on_the_base(sides):
     """Smooth walls: the base carries the channel's weight, the walls push against each other; certified."""
     one = build(CHANNEL, COMM, sides=sides)
@@ -143,6 +146,7 @@ def test_weight_rests_on_the_base(sides):
 
 
 @pytest.mark.slow
+@serial
 def test_who_weighs():
     """The load is the weight of the bodies asked for; a body that does not exist is refused."""
     up = {}

@@ -99,8 +99,7 @@ def test_two_dimensions_against_enumeration(method: Any, law: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mu", [0.3, 0.5, 0.8])
-@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("d, mu", [(2, 0.3), (2, 0.8), (3, 0.5), (3, 0.8)])
 def test_methods_agree(d: int, mu: float) -> None:
     """Up to twelve nodes, every second number with each coefficient, 1e-9; slip and stick both occur; no reaction
     leaves its cone by more than the last digit."""

@@ -106,7 +106,7 @@ def test_oscillator_slides_to_rest() -> None:
     """The friction oscillator of V2.7 with mu falling over v_c = 0.02 m/s: turning points of the differential equation,
     and rest where the spring is weaker than mu_s N."""
     mu = ExponentialDecay(mu_s=0.9, mu_k=0.4, v_c=0.02)
-    turns, x = [], 0.85e-3
+    turns, x = [], 0.45e-3
     while 1.0e4 * abs(x) > 0.9:
         side = -np.sign(x)
 
@@ -120,10 +120,10 @@ def test_oscillator_slides_to_rest() -> None:
         way = solve_ivp(motion, (0.0, 1.0), [x, 0.0], events=turned, method="DOP853", rtol=1e-10, atol=1e-13)
         x = float(way.y[0, -1])
         turns.append(x)
-    run = reports(rubbing_mass(u0=0.85e-3, friction=SlipRateCoulomb(mu), mass=ConsistentMass()), 2e-4, 0.3)
+    run = reports(rubbing_mass(u0=0.45e-3, friction=SlipRateCoulomb(mu), mass=ConsistentMass()), 2e-4, 0.18)
     u = np.array([r.new.u[0] for r in run])
     peaks = u[1:-1][(np.diff(u)[:-1] * np.diff(u)[1:] <= 0.0) & (np.diff(u)[:-1] != 0.0)]
-    assert len(turns) >= 3 and peaks == pytest.approx(turns, rel=0.0, abs=2e-4 * 0.85e-3)
+    assert len(turns) >= 3 and peaks == pytest.approx(turns, rel=0.0, abs=2e-4 * 0.45e-3)
     assert u[-1] == u[-200] == peaks[-1]
 
 
@@ -147,12 +147,13 @@ LAWS = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scheme", [BACKWARD, vc.MoreauJean(1.0)], ids=["displacements", "velocities"])
-@pytest.mark.parametrize("mu", LAWS.values(), ids=LAWS.keys())
-def test_slow_slip_stays_inside_the_cone(mu: Any, scheme: Any) -> None:
+@pytest.mark.parametrize(("law", "scheme"), [
+    *((law, BACKWARD) for law in LAWS), ("jump", vc.MoreauJean(1.0)), ("growing logarithm", vc.MoreauJean(1.0)),
+], ids=lambda value: value if isinstance(value, str) else type(value).__name__)
+def test_slow_slip_stays_inside_the_cone(law: str, scheme: Any) -> None:
     """A belt whose speed grows from 1e-6 to 1 m/s: |r_t| <= mu(|v|) r_n in every step, equal where it slips, with the
     exact law at the rate of the step; mu_s where it sticks. Rates over five decades occur under growing friction."""
-    growth = np.log(1e6) / 6.0
+    growth, mu = np.log(1e6) / 6.0, LAWS[law]
     run = reports(belted(mu, lambda t: 1e-6 * np.expm1(growth * t) / growth), 2e-2, 6.0, scheme=scheme)
     speeds = np.array([rate(r)[0] for r in run])
     friction = np.array([abs(r.result.r_t[0, 0]) for r in run])
@@ -161,7 +162,7 @@ def test_slow_slip_stays_inside_the_cone(mu: Any, scheme: Any) -> None:
     assert np.all(friction[speeds > 0.0] >= limit[speeds > 0.0] * (1.0 - 1e-10)) and np.any(speeds > 0.0)
     assert max(r.certificate.worst for r in run) <= 1e-10
     assert speeds.max() > 0.3
-    if mu is LAWS["growing logarithm"]:
+    if law == "growing logarithm":
         assert speeds[speeds > 0.0].min() < 1e-5
 
 

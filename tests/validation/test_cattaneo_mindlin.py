@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -217,13 +217,14 @@ def test_v2_4_unloading_and_reloading():
     change nothing."""
     top = CYCLE[1]
 
+    @cache
     def first(share: float) -> Array:
         return stages(mirrored_pair(lambda t: share * t), [1.0])[0].shear
 
     there = first(top)
     exact = [there, *(there - 2.0 * first(0.5 * (top - share)) for share in CYCLE[2:5])]
     exact += [-there + 2.0 * first(0.5 * (top + share)) for share in CYCLE[5:]]
-    for increments in (1, 4):
+    for increments in (1, 2):
         times = np.linspace(0.0, 6.0, 6 * increments + 1)[increments:]
         found = stages(mirrored_pair(cyclic_load), times)[::increments]
         for contact, q in zip(found, exact, strict=True):

@@ -41,12 +41,11 @@ T_END = 0.02
 LOAD = 4.0e6 * np.tanh((20.0 / 15.0) ** 2)  # at the end [N/m]
 ROUGH = vc.Coulomb(0.75)
 LAWS = {"smooth": vc.Frictionless(), "rough": ROUGH}
-schemes = pytest.mark.parametrize("scheme", [vc.Midpoint(), None], ids=["midpoint", "default"])
+cases = pytest.mark.parametrize("law, scheme", [("smooth", vc.Midpoint()), ("rough", None)], ids=["smooth", "rough"])
 laws = pytest.mark.parametrize("law", LAWS)
 
 
-@laws
-@schemes
+@cases
 def test_certificates_and_ledger(law, scheme):
     """V9.7: every step certified to 1e-9, the ledger closed to 1e-10; what is put in is more than what is stored by
     what friction takes."""
@@ -70,8 +69,7 @@ def per_body(problem: ContactProblem, load: Array) -> Array:
     return np.asarray(system.algebra.comm.sum(np.column_stack(columns).T @ load)).reshape(2, -1)
 
 
-@laws
-@schemes
+@cases
 def test_action_is_reaction(law, scheme):
     """V7.3, V9.8: what the box gains in momentum beyond the impulse of the pressure, the block loses beyond the
     impulse of its base, to 1e-12; without friction it is the sum of the reactions along the normals."""

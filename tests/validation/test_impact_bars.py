@@ -32,7 +32,6 @@ pytestmark = pytest.mark.slow
 
 BODIES = {"bar": {"dimension": 1}, "strip": {"dimension": 2}, "triangles": {"dimension": 2, "triangles": True}}
 COURANTS = (1.0, 0.5, 0.1)
-ON_RANKS = (1.0, *(pytest.param(courant, marks=pytest.mark.serial) for courant in COURANTS[1:]))
 
 
 @dataclass(frozen=True)
@@ -68,8 +67,11 @@ def follow(bar: Bar, courant: float, t_end: float, *, scheme: Any = None, mass: 
     return History(t, *(value / bar.section for value in values), dt)
 
 
-@pytest.mark.parametrize("courant", ON_RANKS)
-@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize("body, courant", [
+    *((body, 1.0) for body in BODIES),
+    *(pytest.param(body, courant, marks=pytest.mark.serial)
+      for body, courant in (("bar", 0.1), ("strip", 0.5), ("triangles", 0.5))),
+])
 def test_thrown_bar(body: str, courant: float) -> None:
     """V1.1: force within 1 % of 300 in the window, contact 2/3 s ± 2 dt, mean rebound 10 ± 2 %, energy within 1 %."""
     found = follow(Bar(ThrownBar(), **BODIES[body]), courant, 1.6)  # type: ignore[arg-type]
@@ -84,23 +86,23 @@ def test_thrown_bar(body: str, courant: float) -> None:
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("courant", COURANTS)
-@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize(
+    "body, courant", [(body, 1.0) for body in BODIES] + [("bar", 0.1), ("strip", 0.5), ("triangles", 0.5)]
+)
 def test_period_three(body: str, courant: float) -> None:
     """V1.3, four bounces: energy never above 1/8 nor below 98 % of it, force up to 1.8 times the exact one, impulse of
     the first contact within 2 %. Of all four together 4 % are missing at Courant number 1, 2.5 % at ½, 1.5 % at 0.1: it
-    has gone into waves too short for the mesh. Two bounces and 1 % at 0.1 in two dimensions."""
-    bounces = 2 if courant == 0.1 and body != "bar" else 4
-    missing = {1.0: 0.04, 0.5: 0.025, 0.1: 0.015 if bounces == 4 else 0.01}[courant]
-    found = follow(Bar(PeriodicBar(), **BODIES[body]), courant, 3.0 * bounces)  # type: ignore[arg-type]
+    has gone into waves too short for the mesh."""
+    missing = {1.0: 0.04, 0.5: 0.025, 0.1: 0.015}[courant]
+    found = follow(Bar(PeriodicBar(), **BODIES[body]), courant, 12.0)  # type: ignore[arg-type]
     assert found.energy.max() <= 0.125 * (1.0 + 1e-9) and found.energy[-1] >= 0.98 * 0.125
     assert found.force.max() <= 1.8 * 0.5
     assert found.impulse(0.0, 3.0) == pytest.approx(0.5, rel=0.02)
-    assert found.impulse(0.0, 12.0) == pytest.approx(0.5 * bounces, rel=missing)
+    assert found.impulse(0.0, 12.0) == pytest.approx(2.0, rel=missing)
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("courant, periods, floor", [(1.0, 4, 0.988), (0.5, 3, 0.998), (0.1, 0.5, 0.9999)])
+@pytest.mark.parametrize("courant, periods, floor", [(1.0, 4, 0.988), (0.5, 1, 0.998)])
 @pytest.mark.parametrize("body", ["strip"])
 def test_bouncing_strip(body: str, courant: float, periods: float, floor: float) -> None:
     """V1.2: energy after so many periods (ten of the bar: below), impulse of the first contact 800/3 within 0.5 %."""
@@ -112,9 +114,9 @@ def test_bouncing_strip(body: str, courant: float, periods: float, floor: float)
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("courant, periods, floor", [(1.0, 10, 0.88), (0.5, 5, 0.992), (0.1, 1, 0.9999)])
+@pytest.mark.parametrize("courant, periods, floor", [(1.0, 10, 0.88), (0.5, 2, 0.992), (0.1, 0.5, 0.9999)])
 def test_bouncing_bar_for_ten_periods(courant: float, periods: int, floor: float) -> None:
-    """V1.2: energy >= 0.88 of the first after ten periods, 0.992 after five, 0.9999 after one (of 16 000 steps), at
+    """V1.2: energy >= 0.88 of the first after ten periods, 0.992 after two, 0.9999 after half of one (8000 steps), at
     most 1.001 of it; the foot as the exact bar's in the first period, 1.5 % rms of the height (measured 1.4, 1.1 and
     0.9 %)."""
     exact, dt = BouncingBar(), courant / 300.0
@@ -134,6 +136,7 @@ def test_bouncing_bar_for_ten_periods(courant: float, periods: int, floor: float
     assert np.sqrt(np.mean(np.square(error))) <= 0.015 * exact.height
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("body", BODIES)
 def test_code_aster_sdnv100(body: str) -> None:
     """The second data set of V1.1: contact from 2e-5 to 1e-4 s, the top 4 mm lower at the deepest than at touch-down

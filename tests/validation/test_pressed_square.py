@@ -129,7 +129,7 @@ def test_confined_square(scheme):
 
 
 @one_rank
-@pytest.mark.parametrize(("scheme", "law"), [("midpoint", "none"), *(("default", law) for law in RUBBING)])
+@pytest.mark.parametrize(("scheme", "law"), [("midpoint", "none"), ("default", "none"), ("default", "coulomb")])
 def test_energies_converge_with_the_mesh(scheme, law):
     """V7.1: the mean square over time of E_N - E_2N, N = 10, 20, halves with h: order 1 +- 0.3, as a front has it."""
     energies = [run(law, scheme, cells)["energy"][:: cells // 10] for cells in (10, 20, 40)]

@@ -47,7 +47,7 @@ def test_smooth_bilateral_wall(nu: float, thrust: float, height: float):
 def test_unilateral_while_the_ground_presses():
     """Gravity and a surcharge first: the same as bilateral while all pressures are positive; beyond, a gap opens."""
     def added(acceleration: float, bilateral: bool) -> tuple[ContactProblem, State]:
-        return pressed(0.3, acceleration, cells=20, gravity=G, surcharge=1e5, bilateral=bilateral)
+        return pressed(0.3, acceleration, cells=12, gravity=G, surcharge=1e5, bilateral=bilateral)
 
     problem, rest = added(0.0, bilateral=False)
     assert rest.active.all() and rest.r_n.min() > 0.0

@@ -97,7 +97,7 @@ def test_period(model, share):
     assert period == pytest.approx(4.0 * model.block.impact_times(theta0, 1)[0], rel=5e-4)
 
 
-@pytest.mark.parametrize("share", [0.1, 0.25, 0.5, 0.75])
+@pytest.mark.parametrize("share", [0.1, 0.75])
 def test_period_at_housners_angle(model, share):
     """V3.1: T to 2 % from the same angle in radians. At 0.9 alpha small displacements make 2.8 %."""
     assert 4.0 * first_impact(model, share * SHAPE.alpha) == pytest.approx(PERIODS[share], rel=0.02)
