@@ -28,6 +28,7 @@ import vi_contact as vc
 from demos.pictures.boundary import SHEAR, Curve, Panel, Shot, plot_boundary_snapshots, plot_panels
 from demos.problems import disk, embedded, square
 from demos.problems.boundary_elements import disk_contact, disk_problem, embedded_problem, square_problem
+from demos.problems.interior import interior_displacement
 from vi_contact import bem
 from vi_contact.cli import status_of
 
@@ -196,7 +197,7 @@ def shots(name: str, answer: Answer, times: Sequence[float]) -> list[Shot]:
     run, contact, scale = answer.run, answer.run.contact, MAGNIFIED[name]
     steps = [int(np.argmin(np.abs(run.times - t))) for t in times]
     inside = [points_inside(problem.operator.mesh) for problem, _ in answer.bodies]
-    moved = [bem.interior_displacement(problem.operator, motion, x, steps=steps)
+    moved = [interior_displacement(problem.operator, motion, x, steps=steps)
              for x, (problem, motion) in zip(inside, answer.bodies, strict=True)]
     drawn = []
     for row, k in enumerate(steps):

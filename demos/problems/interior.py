@@ -5,16 +5,16 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.algebra import Array
-from ..core.checks import array, instance, integers, shape_of
-from ..core.errors import InputError
-from .boundary_mesh import BoundaryMesh
-from .boundary_operators import N_DOUBLE, N_SINGLE, double_local, integrands, joined_at_nodes, tensor
-from .fundamental_solution import TimeKernels
-from .loops import distances
-from .poincare_steklov import BoundaryMotion, PoincareSteklov
-from .quadrature import at_points
-from .rules import pieces, placed, roots, smoothed
+from vi_contact.bem.boundary_mesh import BoundaryMesh
+from vi_contact.bem.boundary_operators import N_DOUBLE, N_SINGLE, double_local, integrands, joined_at_nodes, tensor
+from vi_contact.bem.fundamental_solution import TimeKernels
+from vi_contact.bem.loops import distances
+from vi_contact.bem.poincare_steklov import BoundaryMotion, PoincareSteklov
+from vi_contact.bem.quadrature import at_points
+from vi_contact.bem.rules import pieces, placed, roots, smoothed
+from vi_contact.core.algebra import Array
+from vi_contact.core.checks import array, instance, integers, shape_of
+from vi_contact.core.errors import InputError
 
 ORDER, CLOSEST = 8, 1e-3  # points a piece; least distance from the boundary in element lengths
 

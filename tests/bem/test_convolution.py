@@ -13,6 +13,7 @@ from plane_waves import MATERIAL, SQUARE, pulse
 from radial_table import RadialTable
 from scipy.linalg import expm
 
+from demos.problems.contact_ledger import ledger
 from vi_contact import LinearElastic, Tresca
 from vi_contact.bem import (
     BoundaryProblem,
@@ -23,7 +24,7 @@ from vi_contact.bem import (
     traction_forces,
 )
 from vi_contact.bem.contact import BoundaryContact
-from vi_contact.bem.contact_run import ledger, march_contact
+from vi_contact.bem.contact_run import march_contact
 from vi_contact.bem.uzawa_space_time import SpaceTimeUzawa
 from vi_contact.core.errors import InputError
 

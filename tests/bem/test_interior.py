@@ -7,8 +7,8 @@ import pytest
 from bem_rod import rod, smooth_integral, smooth_load
 from plane_waves import MATERIAL, SQUARE, pulse
 
+from demos.problems.interior import interior_displacement
 from vi_contact.bem import BoundaryProblem, PoincareSteklov, circle, energetic_blocks, polygon, traction_forces
-from vi_contact.bem.interior import interior_displacement
 from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial

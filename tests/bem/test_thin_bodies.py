@@ -8,6 +8,7 @@ from boundary_matrices import in_time
 from convolution_operator import convolution_operator
 from plane_waves import MATERIAL, SQUARE
 
+from demos.problems.interior import interior_displacement
 from vi_contact.bem import (
     BoundaryMesh,
     BoundaryProblem,
@@ -15,7 +16,6 @@ from vi_contact.bem import (
     PoincareSteklov,
     circle,
     energetic_blocks,
-    interior_displacement,
     polygon,
     traction_forces,
 )

@@ -77,7 +77,6 @@ def operators() -> Table:
     blocks = bem.energetic_blocks(mesh, MATERIAL, dt=0.5, steps=2)
     steklov, still = bem.PoincareSteklov(blocks, 1.0), np.zeros((2, 2, 8))
     problem = bem.BoundaryProblem(steklov, still, contact=mesh.labels == 0)
-    motion = problem.solve()
     histories = RAGGED | {"text": "up", "nan": np.full((2, 2, 8), nan), "flat": np.zeros(16),
                  "short": np.zeros((2, 2, 7)),
                  "texts": np.full((2, 2, 8), "a"), "none": None, "complex": 1j * np.ones((2, 2, 8))}
@@ -95,9 +94,6 @@ def operators() -> Table:
         (bem.BoundaryProblem, {"operator": steklov, "forces": still},
          fields | {"operator": OTHER | {"blocks": blocks}, "forces": histories}),
         (problem.solve, {}, {"contact_forces": {"text": "up", "nan": np.full((2, 6), nan), "short": np.zeros((2, 5))}}),
-        (bem.interior_displacement, {"operator": steklov, "motion": motion, "points": [(0.5, 0.4)]}, {
-            "operator": OTHER, "motion": OTHER, "steps": {"text": "ab", "far": [7], "half": [0.5]},
-            "points": RAGGED | {"text": "middle", "nan": [(nan, 0.0)], "space": np.eye(3), "outside": [(2.0, 2.0)]}}),
     ]
 
 
@@ -108,8 +104,6 @@ def contacts() -> Table:
     problem = bem.BoundaryProblem(bem.PoincareSteklov(blocks, 1.0), np.zeros((2, 2, 8)), contact=mesh.labels == 0)
     compliance = problem.condensed()
     contact = bem.BoundaryContact(compliance)
-    run = bem.march_contact(contact)
-    motion, loads = problem.solve(run.forces), problem.forces
 
     def conditions_on(compliance: Any) -> bem.Conditions:
         return bem.conditions_on(mesh, compliance, mesh.labels == 0)
@@ -128,9 +122,6 @@ def contacts() -> Table:
         (bem.SpaceTimeUzawa, {}, {"tolerance": POSITIVE, "rho": but(POSITIVE, "none"), "max_iterations": COUNT,
                                   "window": COUNT}),
         (bem.SpaceTimeUzawa().solve, {"contact": contact}, {"contact": OTHER}),
-        (bem.ledger, {"run": run, "motion": motion, "loads": loads}, {
-            "run": OTHER, "motion": OTHER, "loads": {"text": "up", "short": loads[1:], "nan": loads + nan},
-            "supported": {"text": "base", "reals": np.ones((2, 8))}}),
         (bem.TwoBodies, {"one": problem, "two": problem}, {"one": NEEDED, "two": NEEDED, "welded": MASK}),
     ]
 

@@ -9,14 +9,11 @@ from .boundary_operators import OperatorMatrices as OperatorMatrices
 from .contact import BoundaryContact as BoundaryContact
 from .contact import Conditions as Conditions
 from .contact import conditions_on as conditions_on
-from .contact_run import ContactLedger as ContactLedger
 from .contact_run import ContactRun as ContactRun
-from .contact_run import ledger as ledger
 from .contact_run import march_contact as march_contact
 from .energetic import EnergeticBlocks as EnergeticBlocks
 from .energetic import energetic_blocks as energetic_blocks
 from .fundamental_solution import TimeKernels as TimeKernels
-from .interior import interior_displacement as interior_displacement
 from .loads import traction_forces as traction_forces
 from .poincare_steklov import BoundaryMotion as BoundaryMotion
 from .poincare_steklov import BoundaryProblem as BoundaryProblem
@@ -26,4 +23,4 @@ from .quadrature import Orders as Orders
 from .two_bodies import TwoBodies as TwoBodies
 from .uzawa_space_time import SpaceTimeUzawa as SpaceTimeUzawa
 
-__all__: list[str] = ['BoundaryContact', 'BoundaryMesh', 'BoundaryMotion', 'BoundaryProblem', 'CondensedCompliance', 'Conditions', 'ContactLedger', 'ContactRun', 'EnergeticBlocks', 'Galerkin', 'OperatorMatrices', 'Orders', 'PoincareSteklov', 'SpaceTimeUzawa', 'TimeKernels', 'TwoBodies', 'circle', 'conditions_on', 'energetic_blocks', 'from_segments', 'interior_displacement', 'ledger', 'march_contact', 'polygon', 'traction_forces']
+__all__: list[str] = ['BoundaryContact', 'BoundaryMesh', 'BoundaryMotion', 'BoundaryProblem', 'CondensedCompliance', 'Conditions', 'ContactRun', 'EnergeticBlocks', 'Galerkin', 'OperatorMatrices', 'Orders', 'PoincareSteklov', 'SpaceTimeUzawa', 'TimeKernels', 'TwoBodies', 'circle', 'conditions_on', 'energetic_blocks', 'from_segments', 'march_contact', 'polygon', 'traction_forces']

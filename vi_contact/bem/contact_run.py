@@ -7,14 +7,14 @@ import numpy as np
 
 from ..core.algebra import Array, Mask
 from ..core.certificate import Certificate
-from ..core.checks import array, instance, mask, number, optional
-from ..core.errors import InputError, StepFailure
+from ..core.checks import instance, number
+from ..core.errors import StepFailure
 from ..core.step import StepProblem, StepResult
 from ..core.verify import kkt_residual
 from ..solvers.certified import TOLERANCE
 from ..solvers.condensed import Condensed
 from .contact import BoundaryContact
-from .poincare_steklov import BoundaryMotion, work
+from .poincare_steklov import work
 
 
 def march_contact(
@@ -111,46 +111,6 @@ class ContactRun:
     def friction_loss(self) -> Array:
         """Return (steps,) energy that friction has taken, sum r_t slip, never negative in a step [J/m]."""
         return np.cumsum((self.r_t * self.slip).sum(axis=1))
-
-
-@dataclass(frozen=True)
-class ContactLedger:
-    """Hold the works up to each time (steps,) [J/m] from boundary data: energy = load + contact + support to round-off.
-
-    energy: of the body; load: of the tractions; contact: of the contact forces, friction included; support: of what
-    holds prescribed unknowns; friction: what friction took (in ``contact`` already).
-    """
-
-    energy: Array
-    load: Array
-    contact: Array
-    support: Array
-    friction: Array
-
-    @property
-    def defect(self) -> float:
-        """Return |energy - load - contact - support| over the largest of them."""
-        terms = (self.energy, self.load, self.contact, self.support)
-        size = max(float(np.abs(term).max(initial=0.0)) for term in terms)
-        return float(np.abs(self.energy - self.load - self.contact - self.support).max()) / (size or 1.0)
-
-
-def ledger(run: ContactRun, motion: BoundaryMotion, loads: Array, *, supported: Mask | None = None) -> ContactLedger:
-    """Return the works of a run from its boundary motion, BoundaryProblem.solve(run.forces); loads: (steps, 2, n).
-
-    supported: (2, n), the ``fixed`` of the problem.
-    """
-    instance("ledger", "run", run, ContactRun, "give the answer of march_contact")
-    instance("ledger", "motion", motion, BoundaryMotion, "give BoundaryProblem.solve(run.forces)")
-    loads = array("ledger", "loads", loads, motion.displacement.shape, unit="N/m")
-    if len(run.times) != len(motion.times):
-        raise InputError(f"ledger: the run has {len(run.times)} steps and the motion {len(motion.times)}; give the "
-                         "motion of this run, BoundaryProblem.solve(run.forces)")
-    optional(mask, "ledger", "supported", supported, motion.displacement.shape[1:])
-    held = np.zeros(loads.shape[1:], bool) if supported is None else supported
-    support = work(np.where(held, motion.forces, 0.0), motion.displacement)
-    load = work(np.where(held, 0.0, loads), motion.displacement)
-    return ContactLedger(motion.work, load, run.work, support, run.friction_loss)
 
 
 def run_steps(
