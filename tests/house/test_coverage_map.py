@@ -112,6 +112,8 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "studies/test_case_inputs.py": "studies.cases.table_calls",
     "studies/test_ida.py":
         "cli.batch cli.ida plots.studies studies.ida.measures studies.ida.processes studies.ida.runs",
+    "vi/test_inequality.py": "vi.linear",
+    "vi/test_wrong_forms.py": "vi.forms",
     "validation/test_pressed_square.py": "plots.deformed",
 }
 BY = {module: test for test, modules in COVERS.items() for module in modules.split()}

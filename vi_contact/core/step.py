@@ -69,7 +69,8 @@ class StepProblem:
     """Pose one step, as every solver sees it. ``guess`` (n,): predicted x; ``active`` (m,): predicted contact set.
 
     ``rate_factor``: slip rate [m/s] = rate_factor (B_t x - slip0): 1/dt for displacements, 1 for velocities, 0 in
-    static problems, where friction is that of rest.
+    static problems, where friction is that of rest. ``lower`` (m,): bounds from below too, which ``Volume`` alone
+    knows (``vi``); None in the steps of a scheme.
     """
 
     A: EffectiveMatrix
@@ -84,6 +85,7 @@ class StepProblem:
     friction: FrictionLaw = field(default_factory=Frictionless)
     slip0: Array | None = None
     rate_factor: float = 0.0
+    lower: Array | None = None
 
     def __post_init__(self) -> None:
         rows, conditions = self.guess.shape[-1], self.surface.count

@@ -73,6 +73,8 @@ class BoundedSystem:
         if self.surface.some(np.isnan(step.bound)):
             raise InputError("the bound of the contact conditions contains NaN: check the gap and the time scheme")
         lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
+        if step.lower is not None:
+            lower[self.bounded] = step.lower
         upper[self.bounded] = step.bound
         held = self.surface.bilateral & np.isfinite(step.bound)
         lower[self.bounded[held]] = step.bound[held]

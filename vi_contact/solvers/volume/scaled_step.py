@@ -30,7 +30,8 @@ class ScaledStep:
         system = self.system
         self.b = system.load(step.b)
         lower, upper = system.bounds(step)
-        z_max, bound_max, b_max = system.max(max_abs(start), max_abs(upper[np.isfinite(upper)]), max_abs(self.b))
+        reach = upper[np.isfinite(upper) & (step.lower is None)]  # boxes may be wider than anything in them
+        z_max, bound_max, b_max = system.max(max_abs(start), max_abs(reach), max_abs(self.b))
         if z_max == 0.0:
             z_max = self._along(self.b, b_max)
         if b_max == 0.0:
@@ -75,13 +76,14 @@ class ScaledStep:
     def active(self, y: Array, F: Array) -> Mask:
         """Return (m,) what the natural map chooses: where the reaction exceeds the remaining gap."""
         i = self.system.bounded
-        return np.asarray((self.upper[i] - y[i] < -F[i]) | (self.lower[i] == self.upper[i]))
+        above, below = self.upper[i] - y[i] < -F[i], y[i] - self.lower[i] < F[i]
+        return np.asarray(above | below | (self.lower[i] == self.upper[i]))
 
     def errors(self, y: Array, F: Array) -> tuple[float, float, float]:
         """Return the largest |F| off the active set and |gap| on it, as in the certificate; backward error of F."""
         system, i = self.system, self.system.bounded
         active = self.active(y, F)
-        gap = (self.upper[i] - y[i])[active]
+        gap = np.where(y[i] - self.lower[i] < F[i], y[i] - self.lower[i], self.upper[i] - y[i])[active]
         force = F.copy()
         force[i[active]] = 0.0
         force[system.feet] += force[system.rows :]  # the body feels what is left over on its springs
