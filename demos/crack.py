@@ -1,0 +1,138 @@
+#!/usr/bin/env python3
+"""Break a bar in tension: a phase field whose damage can only grow, which is a lower bound on d.
+
+Staggered: the displacement by a plain linear solve, then the damage between its values before and one. First the bar stays
+homogeneous, is loaded beyond its peak and unloaded: the closed form to the last digit. Then its ends keep d = 0, and it
+breaks in the middle at once: the elastic energy falls to nothing. The surface energy is that of the crack and of the
+damage all over the bar that came before and cannot heal. The crack alone, which is the least energy with d = 1 where the
+bar broke, a strip of nodes h wide, costs Gc (1 + h / (2 l)). E = Gc = 1, length 1.
+
+    bash demos/run.sh crack                # a table and a figure, into results/crack
+    bash demos/run.sh -n 2 crack           # the same on two ranks
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
+
+import dolfinx
+import numpy as np
+import ufl
+from mpi4py import MPI
+
+from demos.exact.crack import critical, homogeneous
+from demos.pictures.bounds import gathered, plot_crack
+from vi_contact import vi
+from vi_contact.cli import status_of
+from vi_contact.fem import compat
+from vi_contact.solvers import ReducedNewton
+
+# Parameters ----------------------------------------------------------------------------------------------------------
+WIDTH = 0.05  # l
+HEIGHT = 0.1
+ACROSS = 8  # cells; the strip has ten times as many along it
+STRAINS = (0.4, 0.8, 1.0, 1.3, 1.6, 1.0, 0.4, 1.2, 1.6, 2.0)  # of the homogeneous bar, over the critical one
+PULLS = (0.5, 0.8, 0.95, 1.02, 1.1, 1.2)  # of the bar that breaks
+LEFT = 1e-8  # of the stiffness where d = 1
+SETTLED, ROUNDS = 1e-5, 1500  # of d, between two rounds; and how many, at most
+BROKEN = 0.98  # damage of nodes that count as broken
+OUT = Path("results/crack")
+
+
+class Bar:
+    """Hold a strip of plane strain without lateral strain: displacement u along it, damage d; ``held``: whether d = 0 at
+    the ends. ``rounds`` of the staggered iteration, and the ``worst`` certificate, so far."""
+
+    def __init__(self, comm: Any, across: int, held: bool) -> None:
+        self.comm, self.across, self.rounds, self.worst = comm, across, 0, 0.0
+        on = dolfinx.mesh.create_rectangle(comm, [[-0.5, 0.0], [0.5, HEIGHT]], [10 * across, across])
+        V = compat.lagrange(on, 1)
+        self.u, self.d, self.before = (dolfinx.fem.Function(V) for _ in range(3))
+        self.pull = dolfinx.fem.Constant(on, 0.0)
+        ends = [dolfinx.fem.locate_dofs_topological(V, 1, dolfinx.mesh.locate_entities_boundary(
+            on, 1, lambda x, at=at: np.isclose(x[0], at))) for at in (-0.5, 0.5)]
+        zero = dolfinx.fem.Constant(on, 0.0)
+        self.ends = [dolfinx.fem.dirichletbc(zero, ends[0], V), dolfinx.fem.dirichletbc(self.pull, ends[1], V)]
+        self.sound = [dolfinx.fem.dirichletbc(zero, one, V) for one in ends] if held else []
+        v, w = ufl.TestFunction(V), ufl.TrialFunction(V)
+        left = (1.0 - self.d) ** 2 + LEFT
+        self.balance = left * ufl.inner(ufl.grad(w), ufl.grad(v)) * ufl.dx, zero * v * ufl.dx
+        strain = ufl.inner(ufl.grad(self.u), ufl.grad(self.u))  # twice the energy, E = 1
+        inner = ufl.inner(ufl.grad(self.d), ufl.grad(v))
+        self.growth = (-(1.0 - self.d) * strain * v + self.d * v / WIDTH + WIDTH * inner) * ufl.dx
+        surface = 0.5 * (self.d**2 / WIDTH + WIDTH * ufl.inner(ufl.grad(self.d), ufl.grad(self.d)))
+        parts = (0.5 * left * strain, surface, (1.0 - self.d) ** 2 * self.u.dx(0))
+        self.parts = [compat.compile_form(one * ufl.dx) for one in parts]
+
+    def load(self, pull: float) -> tuple[float, float, float]:
+        """Pull so far; return elastic and surface energy over Gc H, and the mean stress."""
+        self.pull.value = pull
+        self.before.x.array[:] = self.d.x.array
+        for _ in range(ROUNDS):
+            last = self.d.x.array.copy()
+            linear = vi.solve(self.balance, self.u, bcs=self.ends, method=ReducedNewton())
+            result = vi.solve(self.growth, self.d, lower=self.before, upper=1.0, bcs=self.sound)
+            self.worst = max(self.worst, linear.certificate.worst, result.certificate.worst)
+            self.rounds += 1
+            if self.comm.allreduce(float(np.max(np.abs(self.d.x.array - last))), op=MPI.MAX) < SETTLED:
+                break
+        return self.energies()
+
+    def energies(self) -> tuple[float, float, float]:
+        """Return elastic and surface energy over Gc H, and the mean stress."""
+        found = [float(self.comm.allreduce(dolfinx.fem.assemble_scalar(one))) / HEIGHT for one in self.parts]
+        return found[0], found[1], found[2]
+
+    def crack_alone(self) -> float:
+        """Let all damage heal but that of broken nodes, without load; return the surface energy over Gc H."""
+        self.u.x.array[:] = 0.0
+        self.before.x.array[:] = self.d.x.array > BROKEN
+        vi.solve(self.growth, self.d, lower=self.before, upper=1.0, bcs=self.sound)
+        return self.energies()[1]
+
+
+def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
+    """Run both bars (``quick``: half the cells, and the second one breaks at once); return stresses and energies."""
+    comm, numbers = MPI.COMM_WORLD, {}
+    strain, stress = critical(WIDTH)
+    even = Bar(comm, 2, held=False)
+    found = np.array([even.load(one * strain)[2] for one in STRAINS]) / stress
+    known = homogeneous(np.array(STRAINS) * strain, WIDTH)[1] / stress
+    numbers["homogeneous: stress error"] = float(np.max(np.abs(found - known)))
+    numbers["homogeneous: certificate"] = even.worst
+
+    bar, pulls = Bar(comm, ACROSS // 2 if quick else ACROSS, held=True), PULLS[-1:] if quick else PULLS
+    energies = np.array([bar.load(one * strain)[:2] for one in pulls])
+    h = HEIGHT / bar.across
+    numbers |= {"elastic": energies[-1, 0], "surface": energies[-1, 1], "h / l": h / WIDTH,
+                "rounds": float(bar.rounds), "certificate": bar.worst}
+    broken = gathered(bar.d)
+    numbers["crack alone"], numbers["1 + h / (2 l)"] = bar.crack_alone(), 1.0 + 0.5 * h / WIDTH
+    alone = gathered(bar.d)
+    if comm.rank == 0:
+        assert broken is not None and alone is not None
+        axis = np.abs(broken[0][:, 1]) < 1e-9
+        x, open_ = broken[0][axis, 0], broken[1][axis] > BROKEN
+        numbers["middle"], numbers["d"] = float(np.mean(x[open_])), float(np.max(broken[1]))
+        away = np.linspace(-9.0, 9.0, 801)
+        near = np.maximum(np.abs(away) - 0.5 * float(np.ptp(x[open_])) / WIDTH, 0.0)
+        out.mkdir(parents=True, exist_ok=True)
+        path = np.interp(np.linspace(0, len(STRAINS), 500), np.arange(len(STRAINS) + 1), (0.0, *STRAINS))
+        place = (x - numbers["middle"]) / WIDTH
+        plot_crack((STRAINS, found, path, homogeneous(path * strain, WIDTH)[1] / stress), pulls,
+                   {"elastic": energies[:, 0], "surface": energies[:, 1]},
+                   {"just broken": (place, broken[1][axis]), "the crack alone": (place, alone[1][axis])},
+                   (away, np.exp(-near)), out / "crack.png")
+        print("\n".join(f"{name:<28} {value:.6g}" for name, value in numbers.items()))
+        print(f"\nThe figure is in {out}.")
+    comm.Barrier()
+    return {key: comm.bcast(numbers.get(key)) for key in ("middle", "d")} | numbers
+
+
+# Things to try: upper=1.0 left out, nothing changes; lower=0.0: cracks heal when the load goes back, and energy is lost.
+if __name__ == "__main__":
+    raise SystemExit(status_of(main))
