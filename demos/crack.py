@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Break a bar in tension: a phase field whose damage can only grow, which is a lower bound on d.
 
-Staggered: the displacement by a plain linear solve, then the damage between its values before and one. First the bar stays
-homogeneous, is loaded beyond its peak and unloaded: the closed form to the last digit. Then its ends keep d = 0, and it
-breaks in the middle at once: the elastic energy falls to nothing. The surface energy is that of the crack and of the
-damage all over the bar that came before and cannot heal. The crack alone, which is the least energy with d = 1 where the
-bar broke, a strip of nodes h wide, costs Gc (1 + h / (2 l)). E = Gc = 1, length 1.
+Staggered: the displacement by a plain linear solve, then the damage between its values before and one. First the bar
+stays homogeneous, is loaded beyond its peak and unloaded: the closed form to the last digit. Then its ends keep d = 0,
+and it breaks in the middle at once: the elastic energy falls to nothing. The surface energy is that of the crack and of
+the damage all over the bar that came before and cannot heal. The crack alone, which is the least energy with d = 1
+where the bar broke, a strip of nodes h wide, costs Gc (1 + h / (2 l)). E = Gc = 1, length 1.
 
     bash demos/run.sh crack                # a table and a figure, into results/crack
     bash demos/run.sh -n 2 crack           # the same on two ranks
@@ -44,8 +44,8 @@ OUT = Path("results/crack")
 
 
 class Bar:
-    """Hold a strip of plane strain without lateral strain: displacement u along it, damage d; ``held``: whether d = 0 at
-    the ends. ``rounds`` of the staggered iteration, and the ``worst`` certificate, so far."""
+    """Hold a strip without lateral displacement: displacement u along it, damage d; ``held``: whether d = 0 at its
+    ends. ``rounds`` of the staggered iteration, and the ``worst`` certificate, so far."""
 
     def __init__(self, comm: Any, across: int, held: bool) -> None:
         self.comm, self.across, self.rounds, self.worst = comm, across, 0, 0.0
@@ -133,6 +133,6 @@ def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
     return {key: comm.bcast(numbers.get(key)) for key in ("middle", "d")} | numbers
 
 
-# Things to try: upper=1.0 left out, nothing changes; lower=0.0: cracks heal when the load goes back, and energy is lost.
+# Things to try: upper=1.0 left out: nothing changes; lower=0.0: cracks heal when the load goes back.
 if __name__ == "__main__":
     raise SystemExit(status_of(main))

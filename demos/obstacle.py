@@ -75,7 +75,8 @@ def radius(numbers: dict[str, float], cells: int) -> float:
 def table(numbers: dict[str, float], meshes: tuple[int, ...], known: Membrane) -> str:
     """Return the errors of all meshes."""
     lines = [f"exact: contact radius {known.radius:.5f}, force {known.force:.5f}", "",
-             f"{'cells':>6} {'error of u':>11} {'farthest active':>16} {'from area':>10} {'force':>9} {'certificate':>12}"]
+             f"{'cells':>6} {'error of u':>11} {'farthest active':>16} {'from area':>10} {'force':>9} "
+             f"{'certificate':>12}"]
     for cells in meshes:
         error, far, force, worst = (numbers[f"{cells}: {name}"] for name in ("error", "radius", "force", "certificate"))
         lines.append(f"{cells:>6} {error:>11.2e} {far:>16.5f} {radius(numbers, cells):>10.5f} {force:>9.5f} "

@@ -2,8 +2,8 @@
 """Twist an elastic-plastic bar: a stress function between bounds, on a disk (exact) and a square.
 
 The yield condition |∇u| <= k is, for a bar without holes, the obstacle |u| <= k times the distance to the boundary.
-Where u lies on it the bar is plastic. On the disk zone and torque are known for every twist; on the square the elastic bar and
-the limit torque are, and one twist is computed again by another method (projected relaxation of finite differences).
+Where u lies on it the bar is plastic. On the disk zone and torque are known for every twist; on the square the elastic
+bar and the limit torque are, and one twist is computed again by another method, projected relaxation of differences.
 
     bash demos/run.sh torsion                # a table and a figure, into results/torsion
     bash demos/run.sh -n 2 torsion           # the same on two ranks
@@ -152,7 +152,8 @@ def table(numbers: dict[str, float]) -> str:
         zone = f"{inner:.4f}" if inner < 2.0 else "none"
         lines.append(f"{w:>6g} {torque:>13.5f} {float(disk_torque(w)):>9.5f} {error:>11.1e} {zone:>13} {1.0 / w:>7.4f} "
                      f"{numbers[f'square {w:g}: torque']:>15.5f} {square_elastic()[0] * w:>9.5f} {SQUARE_LIMIT:>7.4f}")
-    return "\n".join([*lines, "", f"square at {DRAWN:g}, from projected relaxation: {numbers['relaxation']:.1e} of k a"])
+    lines += ["", f"square at {DRAWN:g}, difference from projected relaxation: {numbers['relaxation']:.1e} of k a"]
+    return "\n".join(lines)
 
 
 # Things to try: CELLS = 128; a twist of 20, where the bar is plastic but for its ridges.

@@ -1,7 +1,7 @@
 """A membrane over a ball: the obstacle problem on a square whose solution is known.
 
--Δu >= 0, u >= psi and one of them an equality, on (-2, 2)²; psi is the upper half of the unit ball, continued outside of
-r = 0.9 by its tangent cone so that it has a value everywhere. With the boundary values of
+-Δu >= 0, u >= psi and one of them an equality, on (-2, 2)²; psi is the upper half of the unit ball, continued outside
+of r = 0.9 by its tangent cone so that it has a value everywhere. With the boundary values of
 
     u = psi for r <= a,    u = -A log(r / 2) for r >= a,    A = a² / sqrt(1 - a²)
 

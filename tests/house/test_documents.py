@@ -79,6 +79,12 @@ def test_soil_in_space_prints_what_its_page_says(tmp_path: Path) -> None:
     assert run(blocks(page, "python")[-1], tmp_path) == printed
 
 
+def test_bounds_print_what_their_page_says(tmp_path: Path) -> None:
+    page = ROOT / "docs" / "guide" / "bounds.md"
+    (printed,), (code,) = blocks(page, "text"), blocks(page, "python")
+    assert run(code, tmp_path) == printed
+
+
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_commands_exist(document: Path) -> None:
     """Every script that a document calls is there and bash can read it; every demo too."""

@@ -105,6 +105,13 @@ class Problem:
             whole.destroy()
         return self._jacobian
 
+    def spread(self, values: Array) -> Any:
+        """Return values of the free unknowns as a Function, zero elsewhere. Collective."""
+        made = compat.function(self.u.function_space)
+        made.x.array[: self.owned][self.free] = values
+        made.x.scatter_forward()
+        return made
+
     def close(self) -> None:
         """Free the Jacobian; collective."""
         if self._jacobian is not None:

@@ -1,10 +1,5 @@
 """Find u between bounds: F(u; v - u) >= 0 for all v with lower <= v <= upper, at the points of a Function's space.
 
-With F the vector of F(u; phi_i) the unknowns u_i satisfy, each by itself,
-
-    lower <= u <= upper,    F = lambda_lower - lambda_upper,    0 <= lambda_lower  ⊥  u - lower >= 0,
-                                                                0 <= lambda_upper  ⊥  upper - u >= 0
-
 Newton's method (N. H. Josephy, 1979) solves F(u_k) + J(u_k) (u - u_k) in the place of F (``linear``) and goes towards
 the answer as far as makes the natural residual u - mid(lower, u - F/J_ii, upper) smaller by a part of what the slope
 promises. A linear problem takes one step.
@@ -36,14 +31,12 @@ REFINEMENTS = 5  # of a linear problem, at most
 class Result:
     """Answer ``solve``: u, the Function given, and what is known of it.
 
-    Attributes:
-        lambda_lower, lambda_upper: Functions of the multipliers >= 0: forces at points, in the unit of F, which is
-            lambda_lower - lambda_upper where bcs prescribe nothing; over the vector of ∫ phi_i they are pressures.
-        active: how many unknowns are on their lower and upper bounds: those where the multiplier is above zero.
-        certificate: relative residuals (``core.certificate``): equilibrium of the inactive unknowns, distance of active
-            ones from their bound (complementarity), wrong signs of distances (penetration) and multipliers (tension).
-        iterations, inner: Newton steps, and iterations of ``method`` in them; reason: why it stopped; seconds:
-            processor time of this rank for "setup" and "solve".
+    ``lambda_lower``, ``lambda_upper``: Functions of the multipliers, forces at points in the unit of F >= 0. With F the
+    vector of F(u; phi_i), F = lambda_lower - lambda_upper where bcs prescribe nothing, and zero off the bounds.
+    ``active``: how many unknowns are on their lower and upper bounds, those where the multiplier is above zero.
+    ``certificate``: relative residuals (``core.certificate``): equilibrium of inactive unknowns, distance of active
+    ones from their bound (complementarity), signs of distances (penetration) and of multipliers (tension).
+    ``iterations``, ``inner``: Newton steps, and iterations of ``method`` in them; ``seconds`` of this rank's processor.
     """
 
     u: Any
@@ -66,7 +59,8 @@ class Point:
         self.A, self.x, self.F = problem.jacobian(), problem.x, problem.residual()
         Ax, diagonal = self.A @ self.x, np.abs(self.A.diagonal())
         self.b = Ax - self.F
-        sizes = problem.comm.max(np.array([max_abs(one) for one in (self.x, self.b, Ax, self.F, diagonal)]))
+        local = [max_abs(one) for one in (self.x, self.b, Ax, self.F, diagonal)]
+        sizes = problem.comm.max(np.nan_to_num(local, nan=np.inf, posinf=np.inf))
         self.broken = not np.all(np.isfinite(sizes))
         x_max, b_max, Ax_max, F_max, most = sizes.tolist()
         self.diagonal = np.maximum(diagonal, 1e-8 * most)
@@ -100,13 +94,6 @@ class Point:
                 return True
         return False
 
-    def multiplier(self, push: Array) -> Any:
-        """Return free unknowns' values as a Function, zero elsewhere. Collective."""
-        force = compat.function(self.problem.u.function_space)
-        force.x.array[: self.problem.owned][self.problem.free] = push
-        force.x.scatter_forward()
-        return force
-
 
 def solve(
     form: Any, u: Any, *, lower: Any = None, upper: Any = None, bcs: Sequence[Any] = (), J: Any = None,
@@ -118,9 +105,8 @@ def solve(
     ``form``: F(u; v) of UFL, linear or not in the Function u, or (a, L) for a(u, v) - L(v). ``lower``, ``upper``:
     Functions on the space of u, Constants, numbers, one or one for each component, or None. ``bcs``: dirichletbc on
     that space or its components. ``J``: the Jacobian, else the derivative of F.
-    ``method``: TaoTron(), ReducedNewton() or SemismoothNewton() of ``solvers``; None takes TRON and then the reduced
-    method where J is symmetric, the reduced and then the semismooth method elsewhere. ``petsc_options`` are for it,
-    under ``prefix`` on the command line.
+    ``method``: TaoTron(), ReducedNewton() or SemismoothNewton() of ``solvers``; None takes the first two where J is
+    symmetric, the last two elsewhere. ``petsc_options``: for it, under ``prefix`` on the command line.
 
     The unknowns must be values at points (Lagrange of any degree, DG0, …): bounds hold there, which for degrees above
     one is not everywhere. InputError for forms, bounds and bcs that do not fit; StepFailure when the certificate stays
@@ -163,6 +149,6 @@ def solve(
     if said:
         raise StepFailure(f"vi.solve: {reason}, above {tolerance:g}: {said} (u holds the best so far)")
     active = [round(total(problem.comm, np.count_nonzero(push))) for push in best.push]
-    pushes, seconds = [best.multiplier(one) for one in best.push], (ready - start, time.process_time() - ready)
+    pushes, seconds = [problem.spread(one) for one in best.push], (ready - start, time.process_time() - ready)
     return Result(u, pushes[0], pushes[1], (active[0], active[1]), best.certificate, count, inner, used, reason,
-                  dict(zip(("setup", "solve"), seconds, strict=True)))
+                  {"setup": seconds[0], "solve": seconds[1]})
