@@ -68,10 +68,9 @@ class Known:
         w = ufl.TrialFunction(V)
         self.linear = scale * N(w, v), scale * N(self.exact, v) - force * (low - high) * both * ufl.dx
         self.bc = clamped(V, self.exact)
-        inner = np.ones(len(self.push[0]), dtype=bool)
-        fixed = compat.prescribed(V, [self.bc])[0]
-        inner[fixed[: len(inner)]] = False
-        self.push = [np.where(inner, push, 0.0) for push in self.push]
+        inner = np.ones(len(self.u.x.array), dtype=bool)
+        inner[compat.bc_values(self.bc, len(inner))[0]] = False
+        self.push = [np.where(inner[: len(push)], push, 0.0) for push in self.push]
 
     def vector(self, form: Any) -> Any:
         """The owned entries of a linear form."""

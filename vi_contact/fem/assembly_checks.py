@@ -40,7 +40,7 @@ def check_body(
                          f"{mesh.geometry.dim} coordinates; read it with gdim={mesh.topology.dim}")
     _refuse_lonely_nodes(mesh)
     _check_degree(mesh, degree)
-    refuse_complex()
+    refuse_complex("assemble")
     optional(instance, OWNER, "forms", forms, Forms, "give fem.Forms(stiffness=…, mass=…), or leave them out")
     if material is None and forms is None:
         raise InputError("assemble: neither a material nor forms are given; give one of them")

@@ -276,15 +276,3 @@ def nodal(space: Any) -> bool:
 def constrains(bc: Any, space: Any) -> bool:
     """Say whether this is a Dirichlet condition on a space, or on a component of it."""
     return hasattr(bc, "function_space") and bool(_bare(space).contains(_bare(bc.function_space)))
-
-
-def prescribed(space: Any, bcs: Any) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.float64]]:
-    """Return which unknowns (owned, then ghosts) Dirichlet conditions set, and the values, (n,) and (n,)."""
-    n = len(fem.Function(space).x.array)
-    values = np.zeros(n), np.ones(n)  # what both agree on is set
-    for one in values:
-        if VERSION < (0, 9):
-            fem.set_bc(one, list(bcs))
-        for bc in bcs if VERSION >= (0, 9) else ():
-            bc.set(one)
-    return (values[0] == values[1]) | np.isnan(values[0]), values[0]

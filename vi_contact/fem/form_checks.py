@@ -21,10 +21,10 @@ from .space import FemSpace
 PROBES = 4
 
 
-def refuse_complex() -> None:
+def refuse_complex(owner: str) -> None:
     """Raise InputError where PETSc computes with complex numbers: inequalities have no meaning there."""
     if np.issubdtype(PETSc.ScalarType, np.complexfloating):
-        raise InputError("assemble: this PETSc computes with complex numbers, of which none is less than another; use "
+        raise InputError(f"{owner}: this PETSc computes with complex numbers, of which none is less than another; use "
                          "DOLFINx with a PETSc of real numbers (Debian: python3-dolfinx-real)")
 
 
@@ -48,7 +48,7 @@ def form_of(said: str, call: Callable[..., Any], space: FemSpace, *arguments: An
     if set(on_all(space.comm, said, form.arguments)) != set(arguments):
         raise InputError(f"{said} is no form in the trial and test functions it is given; return one that is not zero "
                          "and linear in each of them")
-    on_all(space.comm, said, lambda: _refuse_not_linear(said, form))
+    on_all(space.comm, said, lambda: refuse_not_linear(said, form))
     own = space.mesh.ufl_domain().ufl_id()
     functions = (getattr(one, "function_space", space.V) for one in form.coefficients())
     if any(one.ufl_id() != own for one in form.ufl_domains()) or any(V.mesh is not space.mesh for V in functions):
@@ -56,7 +56,7 @@ def form_of(said: str, call: Callable[..., Any], space: FemSpace, *arguments: An
     return form
 
 
-def _refuse_not_linear(said: str, form: Any) -> None:
+def refuse_not_linear(said: str, form: Any) -> None:
     """Ask UFL here, on every rank: the compiler asks on one, and the others would wait for it."""
     try:
         compute_form_data(form)

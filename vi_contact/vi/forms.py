@@ -12,6 +12,7 @@ from ..core.checks import at, refuse, shown
 from ..core.errors import InputError
 from ..fem import compat
 from ..fem.communicators import MpiComm, kept
+from ..fem.form_checks import refuse_not_linear
 from ..fem.petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
 from ..fem.petsc_rows import moved
 
@@ -65,15 +66,16 @@ class Problem:
         self.u, space = u, u.function_space
         self.comm = MpiComm(kept(space.mesh.comm))
         self.owned = space.dofmap.index_map_bs * space.dofmap.index_map.size_local
-        alien = next((bc for bc in bcs if not compat.constrains(bc, space)), None)
-        if alien is not None:
-            raise refused(f"bcs has {shown(alien)}; give dirichletbc objects on the space of u or its components")
-        self._clamped, self._values = compat.prescribed(space, bcs)
+        if not isinstance(bcs, list | tuple) or not all(compat.constrains(bc, space) for bc in bcs):
+            raise refused("bcs is no list of dirichletbc objects on the space of u or its components: give one")
+        self._clamped, self._values = np.zeros(len(u.x.array), dtype=bool), np.zeros(len(u.x.array))
+        for bc in bcs:
+            held, values = compat.bc_values(bc, len(self._values))
+            self._clamped[held], self._values[held] = True, values
         self.free: Mask = ~self._clamped[: self.owned]
-        try:
-            self._F, self._J = compat.compile_form(F), compat.compile_form(J)
-        except Exception as error:  # UFL's and FFCx's, of many types, the same on all ranks
-            raise refused(f"a form does not compile ({type(error).__name__}: {error}); {FORMS}") from error
+        for one in (F, J):
+            refuse_not_linear("vi.solve: F or J", one)
+        self._F, self._J = compat.compile_form(F), compat.compile_form(J)
         self.constant = not contains(expand_derivatives(J), u)
         self._jacobian: PetscMatrix | None = None
 

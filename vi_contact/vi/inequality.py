@@ -11,14 +11,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from petsc4py import PETSc
 
 from ..core.algebra import Array, lowest, max_abs, total
 from ..core.certificate import Certificate
-from ..core.checks import instance, several, whole
+from ..core.checks import instance, whole
 from ..core.errors import StepFailure
 from ..core.verify import ROUNDED
 from ..fem import compat
+from ..fem.form_checks import refuse_complex
 from ..solvers.volume.route import Method, TaoTron, Volume
 from .forms import Problem, refused
 from .linear import solve_linear
@@ -113,13 +113,12 @@ def solve(
     above ``tolerance`` after ``iterations`` Newton steps, with the best u so far kept. Collective.
     """
     start, limit = time.process_time(), whole("vi.solve", "iterations", iterations, least=1)
-    if np.issubdtype(PETSc.ScalarType, np.complexfloating):
-        raise refused("PETSc was built for complex numbers, which have no order: use a real build")
+    refuse_complex("vi.solve")
     instance("vi.solve", "u", u, compat.fem.Function, "give the DOLFINx Function to solve for")
     if not compat.nodal(u.function_space):
         raise refused("the unknowns of u are not values of one field at points: take Lagrange or DG0, not mixed")
     settings = Volume(method or TaoTron(), {} if petsc_options is None else petsc_options, prefix, tolerance)
-    problem = Problem(form, u, several("vi.solve", "bcs", bcs, "give a list of dirichletbc"), J)
+    problem = Problem(form, u, bcs, J)
     problem.put(problem.x)
     low, high = problem.bounds(lower, upper)
     problem.put(np.clip(problem.x, low, high))
