@@ -148,6 +148,6 @@ def solve(
     if said:
         raise StepFailure(f"vi.solve: {reason}, above {tolerance:g}: {said} (u holds the best so far)")
     active = [round(total(problem.comm, np.count_nonzero(push))) for push in best.push]
-    pushes, seconds = [problem.spread(one) for one in best.push], (ready - start, time.process_time() - ready)
+    pushes, seconds = [problem.spread(one) for one in best.push], time.process_time() - ready
     return Result(u, pushes[0], pushes[1], (active[0], active[1]), best.certificate, count, inner, used, reason,
-                  {"setup": seconds[0], "solve": seconds[1]})
+                  {"setup": ready - start, "solve": seconds})
