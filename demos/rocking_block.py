@@ -22,14 +22,15 @@ import numpy as np
 from mpi4py import MPI
 
 import vi_contact as vc
+from demos.exact.housner import HousnerBlock
 from demos.pictures.rocking import plot_pulses, plot_rocking
 from demos.problems import rocking_block as rocking
-from vi_contact import exact, fem
+from vi_contact import fem
 from vi_contact.cli import status_of
 from vi_contact.plots.histories import plot_certificate, plot_energy
 
 # Parameters ----------------------------------------------------------------------------------------------------------
-SHAPE = exact.HousnerBlock(width=0.4, height=2.0)  # [m]
+SHAPE = HousnerBlock(width=0.4, height=2.0)  # [m]
 CONCRETE = vc.LinearElastic(E=3.0e10, nu=0.0, rho=2400.0)  # [Pa, -, kg/m³]
 BLOCK = rocking.RockingBlock(SHAPE, CONCRETE, damping=vc.Rayleigh(alpha=0.0, beta=3.0e-4), divisions=(2, 10))
 RELEASE = 0.5  # angle of release over alpha = atan(b/h)

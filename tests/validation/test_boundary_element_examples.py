@@ -12,10 +12,11 @@ import pytest
 
 import vi_contact as vc
 from demos.problems.boundary_elements import disk_contact, disk_problem, embedded_problem, square_problem
+from demos.problems.contact_ledger import ContactLedger, ledger
 from demos.problems.disk import Push
 from vi_contact.bem import BoundaryProblem
 from vi_contact.bem.contact import BoundaryContact
-from vi_contact.bem.contact_run import ContactLedger, ContactRun, ledger, march_contact
+from vi_contact.bem.contact_run import ContactRun, march_contact
 from vi_contact.bem.uzawa_space_time import SpaceTimeUzawa
 from vi_contact.core.algebra import Array
 

@@ -14,15 +14,15 @@ import pytest
 from mpi4py import MPI
 
 import vi_contact as vc
+from demos.exact.housner import HousnerBlock
 from demos.problems import rocking_block as rocking
-from vi_contact import exact
 from vi_contact.core.algebra import Array
 from vi_contact.run.time_steps import TimeSteps
 
 pytestmark = pytest.mark.serial  # ranks change none of these numbers: cheaper tests show it
 
 COMM = MPI.COMM_WORLD
-SHAPE = exact.HousnerBlock(width=0.4, height=2.0)
+SHAPE = HousnerBlock(width=0.4, height=2.0)
 IMPACTS = (0.490304, 1.342807, 2.100685)  # V3.1, from half of alpha [s]
 AMPLITUDES = (0.422036, 0.360729)  # over alpha
 PERIODS = {0.1: 0.695673, 0.25: 1.184459, 0.5: 1.961214, 0.75: 3.072872, 0.9: 4.457509}

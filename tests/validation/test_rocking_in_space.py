@@ -19,8 +19,9 @@ from scipy.linalg import expm
 from two_bodies import per_body, relative
 
 import vi_contact as vc
+from demos.exact.housner import HousnerBlock
 from demos.problems import rocking_block
-from vi_contact import exact, fem
+from vi_contact import fem
 from vi_contact.core.algebra import Array
 from vi_contact.core.step import State
 from vi_contact.meshes.block import BlockMesh
@@ -142,7 +143,7 @@ def differences(found: Rocked, shape: RigidBlock, phases: list[Phase]) -> tuple[
 
 def test_the_rigid_block_on_an_edge_is_housners():
     """Times of impacts and amplitudes are those of the slender block with e = 1 - 1.5 sin²(alpha) (V3.1), to 1e-9."""
-    plane = rocking_block.RockingBlock(exact.HousnerBlock(width=0.5, height=2.0, gravity=G))
+    plane = rocking_block.RockingBlock(HousnerBlock(width=0.5, height=2.0, gravity=G))
     phases = list(OBLONG.phases(OBLONG.tilted(0, 0.0, 0.05), 1.5))
     assert [one.pivots.tolist() for one in phases[:2]] == [[True, False, True, False], [False, True, False, True]]
     assert [one.start for one in phases[1:]] == pytest.approx(plane.impact_times(0.05, 3), rel=1e-9)
