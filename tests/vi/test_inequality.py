@@ -156,6 +156,7 @@ def test_a_component_is_bounded_and_another_held(comm: Any) -> None:
     on = V.mesh
     left = fem.locate_dofs_topological(V.sub(0), 1, mesh.locate_entities_boundary(on, 1, lambda x: np.isclose(x[0], 0)))
     every = mesh.locate_entities(on, 2, lambda x: np.full(x.shape[1], True))
+    on.topology.create_connectivity(2, 2)
     rollers = fem.locate_dofs_topological(V.sub(1), 2, every)
     u, v = fem.Function(V), ufl.TestFunction(V)
     bcs = [fem.dirichletbc(0.0, left, V.sub(0)), fem.dirichletbc(0.0, rollers, V.sub(1))]

@@ -60,7 +60,7 @@ def refuse_not_linear(said: str, form: Any) -> None:
     """Ask UFL here, on every rank: the compiler asks on one, and the others would wait for it."""
     try:
         compute_form_data(form)
-    except (ArityMismatch, TypeError):  # the former is no Exception; the latter where UFL of 0.5 words the former
+    except (ArityMismatch, TypeError, ValueError):  # the first is no Exception; others where UFL words it and fails
         raise InputError(f"{said} is not linear in u or in v; return a sum of products of one and the other") from None
 
 
