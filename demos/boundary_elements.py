@@ -269,6 +269,6 @@ def table(numbers: dict[str, float]) -> str:
 
 
 # Things to try: ELEMENTS of twice the number; bem.SpaceTimeUzawa(rho=...), whose iterations depend on rho;
-# compare_runs(problem, [run], ...) of demos/problems/whole_runs.py beside finite elements.
+# compare_runs(problem, [Reference.of(run)], ...) of demos/problems/whole_runs.py beside finite elements.
 if __name__ == "__main__":
     raise SystemExit(status_of(main))

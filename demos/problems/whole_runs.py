@@ -6,36 +6,38 @@ run: the impulse of the contact forces on the body, and the mean displacement of
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 
 import vi_contact as vc
+from vi_contact.bem import ContactRun
 from vi_contact.core.algebra import Array, largest, max_abs
-from vi_contact.core.checks import number, provides, several
+from vi_contact.core.checks import instance, number, several
 from vi_contact.core.errors import InputError
 from vi_contact.core.step import Report, Scheme, Solver, State
 from vi_contact.run.time_steps import TimeSteps
 
-REFERENCE = ("name", "times", "impulse", "mean_towards")
 
+@dataclass(frozen=True)
+class Reference:
+    """Hold another answer to the same problem, from the same initial time on; in the plane per metre of thickness.
 
-class Reference(Protocol):
-    """Give another answer to the same problem, from the same initial time on; in the plane per metre of thickness."""
+    times: (k,) [s], increasing; impulse: (k, d) of the contact forces of the support on the body up to each time [N s];
+    mean_towards: (k,) displacement towards the support at each time, mean over the contact boundary [m].
+    """
 
-    @property
-    def name(self) -> str: ...
-    @property
-    def times(self) -> Array:
-        """Return (k,) [s], increasing."""
+    name: str
+    times: Array
+    impulse: Array
+    mean_towards: Array
 
-    @property
-    def impulse(self) -> Array:
-        """Return (k, d) of the contact forces of the support on the body up to each time [N s]."""
-
-    @property
-    def mean_towards(self) -> Array:
-        """Return (k,) displacement towards the support at each time, mean over the contact boundary [m]."""
+    @classmethod
+    def of(cls, run: ContactRun) -> "Reference":
+        """Return the answer of boundary elements."""
+        surface = run.contact.surface
+        towards = np.array([surface.gap(t) for t in run.times]) - run.gap
+        mean = np.asarray(towards @ surface.weights / surface.weights.sum())
+        return cls("boundary elements", run.times, run.impulse, mean)
 
 
 @dataclass(frozen=True)
@@ -106,12 +108,12 @@ def compare_runs(
     problem: vc.ContactProblem, references: Sequence[Reference], *, scheme: Scheme | None = None,
     solver: Solver | None = None, dt: TimeSteps, steps: int, state: State | None = None, bound: float = 0.02,
 ) -> list[RunDifference]:
-    """March the problem and return how far each reference is off, for example a ``bem.ContactRun`` of a uniform body.
+    """March the problem and return how far each reference is off, for example ``Reference.of`` a ``bem.ContactRun``.
 
     Impulses and mean displacements should agree within ``bound``, relative; the rest as in ``march``.
     """
     for one in several("compare_runs", "references", references, "give a list of answers of other methods"):
-        provides("compare_runs", "a reference", one, REFERENCE, "give a bem.ContactRun, for example")
+        instance("compare_runs", "a reference", one, Reference, "give Reference.of(a bem.ContactRun), for example")
     number("compare_runs", "bound", bound, positive=True)
     whole = RunComparison()
     for _, report in vc.march(problem, scheme=scheme, solver=solver, dt=dt, steps=steps, state=state):

@@ -12,7 +12,7 @@ from convolution_operator import convolution_operator
 import vi_contact as vc
 from demos.problems.boundary_elements import pressed, square_problem, steklov, unloaded
 from demos.problems.contact_ledger import ledger
-from demos.problems.whole_runs import compare_runs
+from demos.problems.whole_runs import Reference, compare_runs
 from vi_contact import solvers
 from vi_contact.bem import (
     BoundaryProblem,
@@ -248,17 +248,14 @@ def test_a_third_opinion(law):
     from demos.problems.square import Square, build
 
     problem = build(Square(cells=20, pressure=1.0), MPI.COMM_WORLD).problem(friction=LAWS[law])
-    wrong = run("Coulomb")
-    mine, other = compare_runs(problem, [run(law), wrong], solver=vc.Condensed(), dt=0.05, steps=100, bound=0.02)
+    references = [Reference.of(run(law)), Reference.of(run("Coulomb"))]
+    mine, other = compare_runs(problem, references, solver=vc.Condensed(), dt=0.05, steps=100, bound=0.02)
     assert 0.0 < mine.impulse < 0.02 and 0.0 < mine.towards < 0.02 and mine.agrees
     assert not other.agrees and other.impulse > 2.0 * mine.impulse
     assert mine.name == "boundary elements"
+    in_space = Reference("ball", np.array([0.05]), np.zeros((1, 3)), np.zeros(1))
     with pytest.raises(InputError, match="2 components each"):
-        compare_runs(problem, [InSpace()], solver=vc.Condensed(), dt=0.05, steps=2)
-
-
-class InSpace:
-    name, times, impulse, mean_towards = "ball", np.array([0.05]), np.zeros((1, 3)), np.zeros(1)
+        compare_runs(problem, [in_space], solver=vc.Condensed(), dt=0.05, steps=2)
 
 
 @pytest.mark.parametrize("law", ["none", "Tresca"])

@@ -76,22 +76,6 @@ class BeamRun:
         file = checks.path("BeamRun.save", "the path", path)
         return write_csv(file, list(self.history), np.column_stack(list(self.history.values())).tolist())
 
-    def summary(self) -> str:
-        """Return the energies, losses, tip and iterations in a few lines."""
-        history, energy = self.history, self.energy
-        defect = float(np.max(np.abs(history["energy_defect"])))
-        return "\n".join([
-            f"{len(energy) - 1} steps, t = 0 to {history['t'][-1]:g} s",
-            f"  energy                  {energy[0]:.6g} J at the start, {energy[-1]:.6g} J at the end",
-            f"  lost to viscosity       {history['loss_damping'][-1]:.6g} J",
-            f"  lost to friction        {history['loss_friction'][-1]:.6g} J",
-            f"  work of the load        {history['work_input'][-1]:.6g} J",
-            f"  ledger closes to        {defect:.1e} J",
-            f"  tip                     {history['u_tip'][-1]:.6g} m at the end, lowest {history['u_tip'].min():.6g} m",
-            f"  steps that stick        {int(np.sum(history['slip'][1:] == 0.0))}",
-            f"  Newton updates per step {self.mean_updates:.4g}, at most {int(history['newton'].max())}",
-        ])
-
 
 @dataclass(frozen=True)
 class BeamStepper:

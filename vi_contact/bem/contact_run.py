@@ -81,18 +81,6 @@ class ContactRun:
         return np.cumsum(self.resultant, axis=0) * self.contact.compliance.dt
 
     @property
-    def name(self) -> str:
-        """Return the name of the method in comparisons of runs."""
-        return "boundary elements"
-
-    @property
-    def mean_towards(self) -> Array:
-        """Return (steps,) displacement towards the support at the ends, mean over the contact boundary [m]."""
-        surface = self.contact.surface
-        gap = np.array([surface.gap(t) for t in self.times])
-        return np.asarray((gap - self.gap) @ surface.weights / surface.weights.sum())
-
-    @property
     def pressure(self) -> Array:
         """Return (steps, c) normal traction r_n / length [Pa]."""
         return self.r_n / self.contact.surface.weights
