@@ -125,7 +125,7 @@ def test_the_wall_on_a_record(
     monkeypatch.chdir(tmp_path)
     status = main([
         "run", "wall", "--motion", str(path), "--set", "excitation.1.record.processing.pga=5", "--dt", "0.02",
-        "--steps", "50", "--cross-check", "--out", "out/quake", "--set", "fields.every=25", "--quiet",
+        "--steps", "50", "--out", "out/quake", "--set", "fields.every=25", "--quiet",
     ])
     told = capsys.readouterr()
     assert (status, told.err) == (0, "")
@@ -133,8 +133,6 @@ def test_the_wall_on_a_record(
     assert main(["report", "out/quake"]) == 0
     summary = check_folder(tmp_path / "out" / "quake", steps=50, frames_every=25)
     assert summary["worst_certificate"] <= 1e-9 and summary["energy_defect"] <= 1e-10
-    (difference,) = summary["cross_check"].values()
-    assert max(difference["u"], difference["r_n"]) <= 1e-9
     record: Record = read_record(path)
     expected = record.acceleration[:51] * 5.0 / pga(record)
     assert column(tmp_path / "out" / "quake", "a_g_x") == pytest.approx(expected, abs=1e-9)

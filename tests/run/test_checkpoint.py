@@ -31,8 +31,10 @@ from vi_contact.solvers import Iterative
 
 @pytest.mark.slow
 @pytest.mark.serial
-@pytest.mark.parametrize("scheme", [ZienkiewiczWoodTaylor(0.5), SS22(), NEWMARK], ids=repr)
-@pytest.mark.parametrize("impact", [Inelastic(), Inelastic(ImpulseUpdate())], ids=["reset", "projection"])
+@pytest.mark.parametrize(("scheme", "impact"), [
+    (ZienkiewiczWoodTaylor(0.5), Inelastic()), (SS22(), Inelastic(ImpulseUpdate())), (NEWMARK, Inelastic()),
+    (NEWMARK, Inelastic(ImpulseUpdate())),
+], ids=repr)
 def test_restart_to_the_last_bit(tmp_path: Path, scheme: Any, impact: Any) -> None:
     """A run continued from its checkpoint has the state and the histories of the straight run, byte for byte."""
     problem = chain(impact=impact)
