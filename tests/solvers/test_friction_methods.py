@@ -16,10 +16,11 @@ from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.solvers.friction import linear as friction_linear
 from vi_contact.solvers.friction import newton as friction_newton
 from vi_contact.solvers.friction.extrapolation import Anderson, Plain
-from vi_contact.solvers.friction.fixed_point import FixedPoint, contraction
+from vi_contact.solvers.friction.fixed_point import FixedPoint
 from vi_contact.solvers.friction.given_forces import GivenForces
 from vi_contact.solvers.friction.newton import FrictionNewton
 from vi_contact.solvers.friction.nsgs import NSGS
+from vi_contact.solvers.friction.problem import FrictionResult
 from vi_contact.solvers.friction.uzawa import Uzawa, best_step
 from vi_contact.solvers.normal.active_set import ActiveSet
 
@@ -249,6 +250,12 @@ def test_a_point_that_slips_a_little_does_not_stick(method: Any) -> None:
         np.array([[-1.0, -0.3 - 1e-9]]), np.zeros(1), np.full(1, 0.3)
     )
     assert result.r == pytest.approx(np.array([[1.0, 0.3]]), rel=1e-12) and not result.stick.any()
+
+
+def contraction(result: FrictionResult) -> float:
+    """Return the mean factor between changes of the thresholds above rounding (1e-10 of the first); NaN below two."""
+    changes = [change for change in result.history if change > 1e-10 * result.history[0]]
+    return float((changes[-1] / changes[0]) ** (1.0 / (len(changes) - 1))) if len(changes) > 1 else float("nan")
 
 
 def test_fixed_point_contracts_faster_for_less_friction() -> None:

@@ -2,7 +2,7 @@
 
 Every problem with the threshold s given is convex and has one solution; the map is a contraction for small friction
 (Nečas, Jarušek and Haslinger, Boll. Unione Mat. Ital. 17-B, 1980; Haslinger, Hlaváček and Nečas, Handbook of Numerical
-Analysis IV, 1996). Its observed factor is in the result. ``extrapolation`` may shorten the sequence.
+Analysis IV, 1996). ``extrapolation`` may shorten the sequence.
 """
 
 from dataclasses import dataclass, field
@@ -22,8 +22,7 @@ class FixedPoint(Settings):
     thresholds follow. What the thresholds still change by shifts points that stick, and fine meshes amplify that: on
     2e5 unknowns the equilibrium of a step is off by 1e-9 at 1e-10.
 
-    In the result ``iterations`` counts Tresca problems and ``history`` the relative change of the thresholds in each;
-    ``contraction(result)`` is the mean factor between them: with Plain() that of the map itself.
+    In the result ``iterations`` counts Tresca problems and ``history`` the relative change of the thresholds in each.
     """
 
     max_iterations: int = 200
@@ -66,9 +65,3 @@ class PreparedFixedPoint:
             found = self._tresca.solve(q, limit, constant, found.r)
         tolerance = 100.0 * self.method.tolerance
         return step.result(self.method, tolerance, (found.r / self.delassus.scale, len(history) + 1, history))
-
-
-def contraction(result: FrictionResult) -> float:
-    """Return the mean factor between changes of the thresholds above rounding (1e-10 of the first); NaN below two."""
-    changes = [change for change in result.history if change > 1e-10 * result.history[0]]
-    return float((changes[-1] / changes[0]) ** (1.0 / (len(changes) - 1))) if len(changes) > 1 else float("nan")
