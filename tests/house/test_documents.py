@@ -85,6 +85,19 @@ def test_bounds_print_what_their_page_says(tmp_path: Path) -> None:
     assert run(code, tmp_path) == printed
 
 
+@pytest.mark.slow
+def test_bring_your_own_prints_what_its_page_says(tmp_path: Path) -> None:
+    """All snippets as one program; before DOLFINx 0.7 with the names that spaces have there."""
+    from vi_contact.fem import compat
+
+    page = ROOT / "docs" / "guide" / "bring_your_own.md"
+    code, (printed,) = "".join(blocks(page, "python")), blocks(page, "text")
+    if compat.VERSION < (0, 7):
+        code = code.replace('functionspace(mesh, ("Lagrange", 1, (2,)))', 'VectorFunctionSpace(mesh, ("Lagrange", 1))')
+        code = code.replace("fem.functionspace(", "fem.FunctionSpace(")
+    assert run(code, tmp_path) == printed
+
+
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_commands_exist(document: Path) -> None:
     """Every script that a document calls is there and bash can read it; every demo too."""
