@@ -134,6 +134,7 @@ def test_motions_beside_a_run_are_marched_with_its_scheme_and_steps() -> None:
             vc.march(one, scheme=vc.HHT(), dt=vc.HalvedAtImpact(DT), steps=1)
 
 
+@pytest.mark.slow
 def test_outputs_say_when_the_matrices_are_not_of_their_materials(
     caplog: pytest.LogCaptureFixture, shared_tmp: Path
 ) -> None:

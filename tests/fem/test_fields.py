@@ -172,6 +172,7 @@ def test_frames_hold_the_run(comm: Any, shared_tmp: Path) -> None:
     assert (found[2]["contact_status"] == 2).any()
 
 
+@pytest.mark.slow
 def test_friction_in_the_frames(comm: Any, shared_tmp: Path) -> None:
     """Status 2 where a point sticks and 3 where it slipped; traction and slip as vectors along the turned tangents."""
     problem = tipped(comm, ROUGH_ON_ONE_SIDE[0], simplices=True, angle=0.3)
@@ -320,6 +321,7 @@ def test_files_do_not_depend_on_the_ranks(comm: Any, shared_tmp: Path) -> None:
             assert np.allclose(together[name], alone[name], rtol=0.0, atol=1e-10 * size), name
 
 
+@pytest.mark.slow
 def test_restart_goes_on_after_the_frames_it_keeps(comm: Any, shared_tmp: Path) -> None:
     """Frames behind the checkpoint are removed, and the index never names a frame that is not there."""
     problem = shaken_wall(comm)

@@ -87,6 +87,7 @@ def test_a_held_point_follows_its_obstacle() -> None:
         assert u_n == pytest.approx(-0.1 * np.sin(3.0 * report.new.t), abs=1e-14)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme, mass", RUBBING, ids=[repr(scheme) for scheme, _ in RUBBING])
 def test_a_belt_drags_with_the_force_of_friction(scheme: Any, mass: Any) -> None:
     """A block at rest on a running belt is dragged with mu times its weight until it has the belt's speed, and the

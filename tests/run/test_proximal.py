@@ -101,6 +101,7 @@ def leaning(n: int, *, soil: float = 2.5e6, rho: float = 1800.0) -> ContactProbl
     return ContactProblem(system, pair, friction=Coulomb(MU))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("n", "soil", "rho"), [(16, 2.5e6, 1800.0), (32, 2.5e6, 24.0), (16, 2.5e5, 1800.0)])
 def test_a_stiff_block_leans_on_soft_ground(n: int, soil: float, rho: float) -> None:
     """Ten thousand times as soft and more, on any mesh and however light: weight, thrust and moment to 1e-9, in a few

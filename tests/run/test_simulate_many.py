@@ -70,6 +70,7 @@ def test_a_run_that_cannot_begin_or_go_on_leaves_the_others(shared_tmp):
         assert len(vc.read_run(shared_tmp / "run1").history["t"]) == 7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_stops_all_and_a_restart_goes_on(shared_tmp, number):
     """Every run that has begun has its checkpoint; continued they are the runs that nobody stopped."""
@@ -92,6 +93,7 @@ def test_a_signal_stops_all_and_a_restart_goes_on(shared_tmp, number):
     assert found[0].facts["restarted_from_step"] == 20
 
 
+@pytest.mark.slow
 def test_who_no_longer_waits_leaves_checkpoints(shared_tmp):
     """A loop that ends after the first result closes the others, which can be continued (one rank) or begun anew."""
     asked = runs(shared_tmp, steps=30)

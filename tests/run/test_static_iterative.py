@@ -69,6 +69,7 @@ class Watched(Iterative):
         return self.prepared[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_as_with_a_factor(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also where the body stands along the ground, which nothing but its start says."""
