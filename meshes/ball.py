@@ -7,10 +7,15 @@ eighth, "cut" (y = R).
 """
 
 import math
+import sys
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+if __name__ == "__main__":  # run as a file of the source tree, maybe not installed
+    sys.path[0] = str(Path(__file__).resolve().parents[1])
 
 from vi_contact.core.checks import MOST_CELLS, attributes, counted
 from vi_contact.core.errors import InputError
@@ -111,3 +116,9 @@ def _add_foot(model: Any, sphere: int, foot: float) -> None:
     entity = model.addDiscreteEntity(2)
     model.mesh.addElementsByType(entity, _TRIANGLE, [], triangles[near].reshape(-1))
     model.setPhysicalName(2, model.addPhysicalGroup(2, [entity]), "foot")
+
+
+if __name__ == "__main__":  # python3 meshes/ball.py is python3 meshes ball
+    from meshes.__main__ import main
+
+    main([Path(__file__).stem, *sys.argv[1:]])

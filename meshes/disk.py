@@ -5,11 +5,16 @@ arc within an angle of the lowest point: the contact side) and "rest". Symmetric
 """
 
 import math
+import sys
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+if __name__ == "__main__":  # run as a file of the source tree, maybe not installed
+    sys.path[0] = str(Path(__file__).resolve().parents[1])
 
 from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
@@ -86,3 +91,9 @@ def _mirrored(model: Any, dimension: int, entity: int, kind: int, image: npt.NDA
 
 def _name(model: Any, dimension: int, name: str, entities: list[int]) -> None:
     model.setPhysicalName(dimension, model.addPhysicalGroup(dimension, entities), name)
+
+
+if __name__ == "__main__":  # python3 meshes/disk.py is python3 meshes disk
+    from meshes.__main__ import main
+
+    main([Path(__file__).stem, *sys.argv[1:]])

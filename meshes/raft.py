@@ -6,11 +6,16 @@ it, "soil_foot", which reaches a cell further; "soil_surface" around that; "soil
 "soil_back", "soil_front" (y), opposite ones divided alike so that they can be tied; "roof".
 """
 
+import sys
 from dataclasses import dataclass
 from itertools import accumulate
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+if __name__ == "__main__":  # run as a file of the source tree, maybe not installed
+    sys.path[0] = str(Path(__file__).resolve().parents[1])
 
 from vi_contact.core.checks import MOST_CELLS, array, attributes, counted
 from vi_contact.core.errors import InputError
@@ -105,3 +110,9 @@ class RaftMesh:
                 found[name] = [face for face in faces
                                if abs(model.occ.getCenterOfMass(2, face)[axis] - place) < 1e-6 * wide]
         return found
+
+
+if __name__ == "__main__":  # python3 meshes/raft.py is python3 meshes raft
+    from meshes.__main__ import main
+
+    main([Path(__file__).stem, *sys.argv[1:]])
