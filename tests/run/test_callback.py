@@ -90,6 +90,7 @@ def test_what_it_raises_ends_the_run_on_all_ranks(comm: Any, shared_tmp: Path) -
     words = r"the callback after step 7, t = 0\.0125 s: it ended in ValueError: too large \(test_callback\.py, line \d"
     with pytest.raises(vc.InputError, match=words):
         vc.simulate(problem, **RUN, steps=30, out=shared_tmp, callback=seen)
+    comm.Barrier()  # rank 0 writes the summary last
     run = vc.read_run(shared_tmp)
     assert run.history["k"][-1] == 7 and run.facts["status"] == "failed" and "the callback" in run.facts["reason"]
     seen = Seen()
