@@ -21,6 +21,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import vi_contact as vc  # noqa: E402
+from demos.problems import published_beam as source  # noqa: E402
 from vi_contact import beam  # noqa: E402
 
 STEPS, DT = 1000, 0.002
@@ -38,18 +39,18 @@ def best(action: Callable[[], object], repeat: int) -> float:
 
 def runs(count: int) -> list[Callable[[], object]]:
     """What is timed, for so many elements."""
-    elements, body, start = beam.published_elements(count), beam.TimoshenkoBeam(viscosity=0.001), beam.published_start()
+    elements, body, start = source.published_elements(count), beam.TimoshenkoBeam(viscosity=0.001), source.published_start()
     law = vc.Coulomb(0.3)
     problem = beam.beam_problem(body, elements, normal_force=lambda t: 100.0, friction=law, start=start)
 
     def algorithm(name: str, friction: beam.TipFriction) -> object:
-        stepper = beam.BeamStepper(body, elements, DT, beam.readings(DT)[name], beam.published_mu, friction)
+        stepper = beam.BeamStepper(body, elements, DT, source.readings(DT)[name], source.published_mu, friction)
         return beam.run_beam(stepper, start, steps=STEPS)
 
     def contract() -> object:
         return [state.t for state, _ in vc.march(problem, scheme=vc.Midpoint(), dt=DT, steps=STEPS)]
 
-    newton, exact = beam.published_friction(), beam.ExactFriction()
+    newton, exact = source.published_friction(), beam.ExactFriction()
     cases = (("A", newton), ("C", newton), ("A", exact))
     return [*(partial(algorithm, *case) for case in cases), contract]
 

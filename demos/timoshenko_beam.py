@@ -22,6 +22,7 @@ import numpy as np
 
 import vi_contact as vc
 from demos.pictures.beam import plot_beam_energies, plot_regularisation, plot_rubbing, plot_shapes, plot_tips
+from demos.problems.published_beam import published_elements, published_mu, published_start, readings
 from vi_contact import beam
 from vi_contact.cli import status_of
 
@@ -49,17 +50,17 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 def published(count: int, dt: float, out: Path) -> dict[str, float]:
     """Run the source's beam under every reading of its normal force; Figs. 8.1 to 8.9 with READING."""
-    steps, forces = round(T_END / dt), beam.readings(dt)
+    steps, forces = round(T_END / dt), readings(dt)
     numbers, drawn = {}, {}
     print(f"\nThe source's beam, m = {count}, dt = {dt:g} s, E(0) and what is left of it at t = {T_END:g} s [J]")
     print("  a2 [s]  reading   E(0)     E(end)   lost to friction, viscosity   tip(1), tip(end) [m]   updates   ledger")
     for viscosity in VISCOSITIES:
         for name, force in forces.items():
             stepper = beam.BeamStepper(
-                beam.TimoshenkoBeam(viscosity=viscosity), beam.published_elements(count), dt, normal_force=force,
-                mu=beam.published_mu, friction=beam.RegularisedFriction(0.002, absolute=1e-10),
+                beam.TimoshenkoBeam(viscosity=viscosity), published_elements(count), dt, normal_force=force,
+                mu=published_mu, friction=beam.RegularisedFriction(0.002, absolute=1e-10),
             )
-            run = beam.run_beam(stepper, beam.published_start(), steps=steps, every=max(1, round(0.02 / dt)))
+            run = beam.run_beam(stepper, published_start(), steps=steps, every=max(1, round(0.02 / dt)))
             history, energy = run.history, run.energy
             defect = float(np.max(np.abs(history["energy_defect"])))
             tip, lost = history["u_tip"], (history["loss_friction"][-1], history["loss_damping"][-1])
@@ -82,7 +83,7 @@ def published(count: int, dt: float, out: Path) -> dict[str, float]:
 
 def exact(count: int, dt: float, out: Path) -> dict[str, float]:
     """Run constant force and coefficient: the inequality, by Algorithm 10 and by the contract, and eps -> 0."""
-    body, elements, start = beam.TimoshenkoBeam(viscosity=VISCOSITIES[0]), beam.Elements(count), beam.published_start()
+    body, elements, start = beam.TimoshenkoBeam(viscosity=VISCOSITIES[0]), beam.Elements(count), published_start()
     steps = round(T_END / dt)
 
     def algorithm(friction: beam.TipFriction) -> beam.BeamRun:
@@ -110,7 +111,7 @@ def rubbing(count: int, dt: float, out: Path, progress: bool) -> dict[str, float
     """Run rod and beam as one contact problem, with impulses on velocities: their forces do not ring."""
     problem = beam.rubbing_problem(
         ROD, beam.TimoshenkoBeam(viscosity=VISCOSITIES[0]), beam.Elements(count), friction=vc.Coulomb(MU),
-        start=beam.published_start(),
+        start=published_start(),
     )
     solution = vc.simulate(
         problem, scheme=vc.MoreauJean(), dt=dt, t_end=3.0, out=out / "rod_and_beam", progress=progress,

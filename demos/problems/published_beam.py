@@ -10,10 +10,10 @@ for. eps is printed as 102/5, read as 10⁻²/5 = 0.002; minus signs of the init
 
 from collections.abc import Callable
 
-from ..core.checks import number
-from .elements import Elements
-from .tip import RegularisedFriction
-from .values import Start
+from vi_contact.beam.elements import Elements
+from vi_contact.beam.tip import RegularisedFriction
+from vi_contact.beam.values import Start
+from vi_contact.core.checks import number
 
 Force = Callable[[float], float]
 FORCE = 1.0e5  # |r_N(0)| [N]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vi_contact.beam import source_data as source
+from demos.problems import published_beam as source
 from vi_contact.beam.algorithm import BeamRun, BeamStepper, run_beam
 from vi_contact.beam.elements import Elements
 from vi_contact.beam.tip import ExactFriction, RegularisedFriction

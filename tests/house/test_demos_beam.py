@@ -9,6 +9,7 @@ from demo_runs import demo
 from kept_figures import keep_figures
 
 from demos.pictures import beam as plotting_beam
+from demos.problems.published_beam import published_start
 from vi_contact import beam
 
 pytestmark = pytest.mark.serial
@@ -38,7 +39,7 @@ def test_every_axis_has_a_label(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     """Quantity and unit; curves in every panel."""
     seen = keep_figures(monkeypatch, plotting_beam)
     stepper = beam.BeamStepper(beam.TimoshenkoBeam(), beam.Elements(10), 0.01, lambda t: 5.0, lambda t, rate: 0.2)
-    run = beam.run_beam(stepper, beam.published_start(), steps=40, every=4)
+    run = beam.run_beam(stepper, published_start(), steps=40, every=4)
     plotting_beam.plot_beam_energies({"one": run}, tmp_path / "energy.png", title="Energy")
     plotting_beam.plot_tips({"one": run, "two": run}, tmp_path / "tips.png", title="Tips")
     plotting_beam.plot_shapes(run, tmp_path / "shapes.png", span=(0.1, 0.3), title="Shapes", count=4)

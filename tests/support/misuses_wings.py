@@ -16,6 +16,7 @@ import vi_contact as vc
 from demos.problems.boundary_elements import disk_contact, disk_problem, embedded_problem, square_problem
 from demos.problems.disk import Disk, Push
 from demos.problems.embedded import Embedded
+from demos.problems.published_beam import readings
 from demos.problems.square import Square
 from vi_contact import beam, bem
 from vi_contact.boundary_layer.bilateral import bilateral_motion
@@ -176,7 +177,7 @@ def beams() -> Table:
          runs | {"dt": POSITIVE, "steps": STEPS, "scheme": but(THING, "list")}),
         (beam.StepForces, {"dt": 0.1, "forces": (1.0, 2.0)},
          {"dt": POSITIVE, "forces": RAGGED | {"text": "ab", "nan": (nan,), "number": 1.0}}),
-        (beam.readings, {"dt": 0.1}, {"dt": POSITIVE}),
+        (readings, {"dt": 0.1}, {"dt": POSITIVE}),
     ]
 
 

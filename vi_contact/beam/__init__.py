@@ -9,12 +9,11 @@
 from .algorithm import BeamRun, BeamStepper, Snapshot, run_beam
 from .contract import StepForces, beam_problem, rod_forces, rod_problem, rubbing_problem
 from .elements import Elements
-from .source_data import published_elements, published_friction, published_mu, published_start, readings
 from .tip import ExactFriction, RegularisedFriction, Slip, TipFriction
 from .values import Rod, Start, TimoshenkoBeam
 
 __all__ = [
     "BeamRun", "BeamStepper", "Elements", "ExactFriction", "RegularisedFriction", "Rod", "Slip", "Snapshot", "Start",
-    "StepForces", "TimoshenkoBeam", "TipFriction", "beam_problem", "published_elements", "published_friction",
-    "published_mu", "published_start", "readings", "rod_forces", "rod_problem", "rubbing_problem", "run_beam",
+    "StepForces", "TimoshenkoBeam", "TipFriction", "beam_problem", "rod_forces", "rod_problem", "rubbing_problem",
+    "run_beam",
 ]
