@@ -39,7 +39,8 @@ def best(action: Callable[[], object], repeat: int) -> float:
 
 def runs(count: int) -> list[Callable[[], object]]:
     """What is timed, for so many elements."""
-    elements, body, start = source.published_elements(count), beam.TimoshenkoBeam(viscosity=0.001), source.published_start()
+    elements, start = source.published_elements(count), source.published_start()
+    body = beam.TimoshenkoBeam(viscosity=0.001)
     law = vc.Coulomb(0.3)
     problem = beam.beam_problem(body, elements, normal_force=lambda t: 100.0, friction=law, start=start)
 
