@@ -14,10 +14,12 @@ import pytest
 
 pytest.importorskip("dolfinx")
 
+import dolfinx.mesh
 from caps import Cap, CapMesh, Caps
 from curved_cells import Curved, mesh_of, wavy
 from fem_problems import max_over_ranks, nodal
 from mpi4py import MPI
+from own_meshes import at
 from spheres import RADIUS, SLOPE, STEEL
 from two_bodies import SOFT, blocks, momenta, per_body, thrown
 
@@ -216,6 +218,27 @@ def test_a_thrown_block_keeps_its_energy_on_any_number_of_ranks() -> None:
         assert np.max(np.abs(history["energy_defect"])) < 1e-9 * energy
         assert -0.2 * energy < history["loss_friction"][-1] < 0.2 * energy
         assert history["contact_resultant"].max() > 0.0
+    assert np.allclose(*found, rtol=0.0, atol=1e-8 * found[1].max())
+
+
+def test_a_tied_layer_carries_the_same_along_it_on_any_number_of_ranks() -> None:
+    """A layer hung over a plane that it presses, tied and pulled along x: reactions that depend on y alone."""
+    found = []
+    for comm in (COMM, MPI.COMM_SELF):
+        mesh = dolfinx.mesh.create_box(comm, [np.zeros(3), np.array([2.0, 1.0, 1.0])], [4, 3, 3])
+        left, right, bottom, top = (
+            fem.Facets.where(name, mesh, at(axis, x))
+            for name, axis, x in (("left", 0, 0.0), ("right", 0, 2.0), ("bottom", 2, 0.0), ("top", 2, 1.0))
+        )
+        loads = fem.BodyForce((3.0e3, 0.0, -5.0e4))
+        system = fem.assemble(mesh, SOFT, clamped=top, tied=fem.Tied(left, right), loads=loads, degree=2)
+        surface = fem.contact_surface(system, bottom, obstacle=vc.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
+        state = vc.static_equilibrium(vc.ContactProblem(system, surface), tolerance=1e-10)
+        points, r_n = surface.everywhere(surface.points), surface.everywhere(state.r_n)
+        found.append(r_n[np.lexsort(points[:, :2].round(6).T)].reshape(4, 4))
+    assert found[1].min() > 0.0
+    for rows in found:
+        assert np.allclose(rows, rows[:, :1], rtol=0.0, atol=1e-8 * rows.max())
     assert np.allclose(*found, rtol=0.0, atol=1e-8 * found[1].max())
 
 

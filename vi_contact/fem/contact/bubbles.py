@@ -61,7 +61,8 @@ def _bubbles(space: FemSpace, hierarchy: Hierarchy, facets: Facets, everywhere: 
     geometry = compat.entities_to_geometry(mesh, mesh.topology.dim - 1, local)
     nodes, normals = space.node_of_block[rows], outward(mesh, local, geometry)
     found = Bubbles(nodes[:, :3], nodes[:, 3:], unknowns[:, 3:], normals, *_integrals(points[rows]))
-    away = np.ones(len(rows), dtype=bool) if everywhere else ~np.isin(found.vertices, space.nodes).all(axis=1)
+    corners = np.hstack([found.vertices, space.leaders(found.vertices.ravel()).reshape(-1, 3)])  # tied ones count there
+    away = everywhere | ~np.isin(corners, space.nodes).all(axis=1)
     parts = from_each(space.comm, found.pick(away))
     if not everywhere:
         parts[space.comm.rank] = found
