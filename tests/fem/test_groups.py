@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -151,6 +152,32 @@ def test_a_model_of_gmsh_as_dolfinx_reads_it():
     state = static_equilibrium(problem, tolerance=1e-9)
     assert size(base) == pytest.approx(1.5) == problem.surface.everywhere(problem.surface.weights).sum()
     assert problem.surface.everywhere(state.r_n).max() > 0.0
+
+
+def checkered(comm: Any, ghosts: str, owned: bool) -> tuple[Any, Any, Any]:
+    """A mesh of 10 by 8 squares of two triangles, and its dark and light squares as a chessboard has them."""
+    mesh = own_mesh(comm, "triangle", ghosts, times=2)
+    dofs = compat.geometry_dofmap(mesh)[: mesh.topology.index_map(2).size_local if owned else None]
+    square = np.floor(mesh.geometry.x[dofs].mean(axis=1)[:, :2] / (0.2, 0.1875)).astype(np.int32).sum(axis=1) % 2
+    tags = dolfinx.mesh.meshtags(mesh, 2, np.arange(len(dofs), dtype=np.int32), square.astype(np.int32))
+    return mesh, fem.Cells.tagged("dark", tags, 0, mesh), fem.Cells.tagged("light", tags, 1, mesh)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_the_later_pair_of_initial_values_counts_where_cells_meet(degree):
+    """A chessboard, of which some nodes touch light cells on other ranks only; with tags of ghosts and without."""
+    for (ghosts, owned), later in product((("none", True), ("shared_facet", True), ("shared_facet", False)), (0, 1)):
+        mesh, *squares = checkered(COMM, ghosts, owned)
+        pairs = [(squares[1 - later], (1.0, 0.0)), (squares[later], lambda x: 0.0 * x + (0.0, 3.0))]
+        system = fem.assemble(mesh, CONCRETE, degree=degree, initial_velocity=pairs)
+        points, v = field(system, system.v0)
+        place = points / (0.2, 0.1875)
+        low, high = np.floor(place - 1e-6).astype(int), np.floor(place + 1e-6).astype(int)
+        touches = np.zeros(len(points), dtype=bool)  # the later ones, among the up to four squares about a point
+        for i, j in product((low[:, 0], high[:, 0]), (low[:, 1], high[:, 1])):
+            touches |= (i >= 0) & (i < 10) & (j >= 0) & (j < 8) & ((i + j) % 2 == later)
+        assert 0 < touches.sum() < len(touches)
+        assert np.array_equal(v, np.where(touches[:, None], (0.0, 3.0), (1.0, 0.0)))
 
 
 def test_bodies_are_counted_without_ghosts():

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import ufl
 
-from ..core.algebra import Array
+from ..core.algebra import Array, from_each
 from ..core.checks import optional, whole
 from ..core.stages import stage
 from ..core.system import Load, SemiDiscreteSystem
@@ -204,8 +204,10 @@ def _initial(space: FemSpace, name: str, value: Initial) -> Array:
         values = np.zeros((len(space.nodes), space.dimension))
         for cells, one in pairs:
             blocks = np.unique(compat.cell_blocks(space.V)[cells.indices])
-            blocks = blocks[blocks < len(values)]
-            values[blocks] = _nodal(space, name, one)[blocks]
+            shared = np.concatenate(from_each(space.comm, space.node_of_block[blocks[blocks >= len(values)]]))
+            touched = np.isin(space.nodes, shared)  # by cells of other ranks
+            touched[blocks[blocks < len(values)]] = True
+            values[touched] = _nodal(space, name, one)[touched]
         return space.restrict(values)
     return space.restrict(_nodal(space, name, value))
 
