@@ -191,9 +191,28 @@ def test_what_is_refused():
     shifted = dfem.dirichletbc(np.array([1e-4, 0.0]), on(V, at(0, 0.0)), V)
     assert "bcs[0] and what is prescribed on 'base' hold the same at different values" in said(shifted, clamped=base)
     fem.assemble(mesh, CONCRETE, bcs=[clamped(V)], clamped=base)
+    rates = (np.sin, np.cos, lambda t: -np.sin(t))
+    swing = fem.Prescribed(base, *(lambda x, t, f=f: 0.0 * x + 1e-3 * f(t) for f in rates))
+    assert "bcs[0] and what is prescribed on 'base' hold the same at diff" in said(clamped(V), prescribed=swing)
+    fem.assemble(mesh, CONCRETE, bcs=[clamped(V, at(1, 0.0))], prescribed=swing)
+    still = fem.Prescribed(base, (1e-4, 0.0))
+    fem.assemble(mesh, CONCRETE, bcs=[shifted], prescribed=still)
     damped = said(clamped(V), dashpots=fem.Dashpots(base))
     assert "boundary 'base' has dashpots in a direction that is prescribed on 'bcs[0]'" in damped
     fem.assemble(mesh, CONCRETE, bcs=[clamped(V, at(1, 0.0))], dashpots=fem.Dashpots(base))
+
+
+@pytest.mark.skipif(COMM.size == 1, reason="one rank has one list")
+def test_lists_that_differ_between_ranks_are_refused():
+    """A condition that the last rank leaves out would keep the others waiting."""
+    mesh = own_mesh(COMM, "triangle")
+    V = compat.vector_space(mesh)
+    bcs = [dfem.dirichletbc(dfem.Function(V), on(V, at(0, x))) for x in (0.0, 2.0)]
+    given = bcs[: 1 if COMM.rank == COMM.size - 1 else 2]
+    assert refusal(COMM, lambda: fem.assemble(mesh, CONCRETE, bcs=given)) == (
+        "assemble: bcs has 2 items on one rank and 1 on another; give all ranks the same list, also where a rank has "
+        "none of its unknowns"
+    )
 
 
 def test_own_forms_beside_own_conditions():

@@ -46,6 +46,10 @@ class GivenValues:
 
 def taken_space(mesh: Any, V: Any, bcs: Sequence[Any], degree: int) -> tuple[Any, int]:
     """Return (the user's space, or that of the conditions without one; its degree); (None, degree) without both."""
+    counts = mesh.comm.allgather(len(bcs)) if hasattr(mesh, "comm") else [0]
+    if min(counts) < max(counts):
+        raise InputError(f"assemble: bcs has {max(counts)} items on one rank and {min(counts)} on another; give all "
+                         "ranks the same list, also where a rank has none of its unknowns")
     for bc in bcs:
         provides("assemble", "bcs", bc, ("dof_indices", "function_space", "g"), REMEDY)
         if not compat.is_on(bc.function_space, mesh):
@@ -90,16 +94,18 @@ def taken(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[GivenValues, ...]:
 
 def refuse_contradictions(space: Any) -> None:
     """Raise InputError, on all ranks, where a dirichletbc and a ``Prescribed`` hold the same components of nodes, or
-    one those of the other and more, at different values. Conditions that only meet do not contradict. Collective."""
+    one those of the other and more, at different values, as every function of time may become. Conditions that only
+    meet do not contradict. Collective."""
     given = np.array([isinstance(one, GivenValues) for one in space.prescribed], dtype=bool)
     held = [np.full(space.held.shape, np.nan) for _ in given if given.any()]
     for values, one in zip(held, space.prescribed, strict=False):
         places = one.places(space)
         values[places] = one.at(space, places, 0.0, 0)[0]
     for i, j in product(np.flatnonzero(~given), np.flatnonzero(given)):
+        moves = space.prescribed[i].moves and callable(space.prescribed[i].displacement)
         apart = np.abs(held[i] - held[j])
         both, *each = space.comm.sum(np.array([np.isfinite(one).sum() for one in (apart, held[i], held[j])]))
-        if both and both in each and largest(space.comm, np.nanmax(apart, initial=0.0)):
+        if both and both in each and (moves or largest(space.comm, np.nanmax(apart, initial=0.0))):
             raise InputError(f"assemble: {space.prescribed[j].name} and what is prescribed on "
                              f"'{space.prescribed[i].name}' hold the same at different values: leave one of them out")
 
