@@ -119,6 +119,23 @@ def test_runs_with_forms_are_runs_with_tractions(comm):
             assert np.abs(found[name] - expected[name]).max() < 1e-9 * np.abs(expected[name]).max(), name
 
 
+def test_reactions_know_the_form_as_it_was_assembled():
+    """A Constant changes between bodies, of one form or of several: each is held against its own load, to round-off."""
+    mesh = own_mesh(COMM, "quadrilateral")
+    push, base = Constant(mesh, (0.0, 0.0)), fem.Facets.where("base", mesh, at(0, 0.0))
+    often = fem.LinearForm(lambda v: ufl.inner(push, v) * ufl.dx)
+    for loads in ([often, often], [fem.LinearForm(lambda v: ufl.inner(push, v) * ufl.dx, h) for h in (None, cos)]):
+        problems, found = [], []
+        for load, size in zip(loads, (1e3, 7e3), strict=True):
+            push.value = (-2.0 * size, size)
+            problems.append(linear(fem.assemble(mesh, CONCRETE, clamped=base, loads=load)))
+        for problem, load in zip(problems, loads, strict=True):
+            state = static_equilibrium(problem)
+            row = fem.Reactions("base", base, centre=(0.0, 0.0), loads=load).start(problem, state)
+            found.append([row["reaction_x_base"], row["reaction_y_base"]])
+        assert np.array(found) == pytest.approx(np.array([[6e3, -3e3], [42e3, -21e3]]), rel=1e-10)
+
+
 @pytest.mark.parametrize("cell", ["triangle", "hexahedron"])
 def test_a_free_body_that_is_heated_grows_without_stress(cell):
     """u = alpha dT x with supports that do not resist: K u = ∫ (3 lambda + 2 mu) alpha dT div v."""

@@ -177,7 +177,8 @@ def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...]) ->
 def _integrated(space: FemSpace, section: Section, load: AnyLoad) -> Callable[[float], Array]:
     """t -> Pᵀ ∫ interpolated value · v, as one product with a matrix assembled here; of a form its own."""
     if isinstance(load, LinearForm):
-        return load.integrated(space, section.thickness)
+        full = load.full(space, section.thickness)
+        return lambda t: space.pull(full(t))
     g, v = ufl.TrialFunction(space.V), ufl.TestFunction(space.V)
     form = ufl.inner(load.acting(g, space.mesh), v) * load.measure(space.mesh)
     matrix = PetscMatrix(compat.assemble_matrix(compiled(space, form)))

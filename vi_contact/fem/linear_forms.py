@@ -1,8 +1,9 @@
 """Take loads as a user of UFL writes them: as linear forms, the virtual work of the load on a displacement v."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import ufl
@@ -32,7 +33,8 @@ class LinearForm:
         history: factor f(t) of the form, which is assembled once, as it is without one; t in seconds.
         update: function of the time alone that sets Constants and Functions of the form to their values at t, on every
             rank (``f.x.scatter_forward()`` where it writes to arrays). The form is then assembled anew at every time
-            that a step asks for: one sweep over its cells or facets, where a history costs one vector update.
+            that a step asks for: one sweep over its cells or facets, where a history costs one vector update. Whether
+            a restart goes on with the same update is looked at in the first steps only.
     Raises:
         InputError: history and update together; from ``assemble``, on all ranks: what is no linear form in v on this
             mesh; from ``assemble`` and in steps: NaN or infinite forces, an update that ends in an error.
@@ -41,6 +43,7 @@ class LinearForm:
     form: Callable[[Any], Any]
     history: Callable[[float], float] | None = None
     update: Callable[[float], Any] | None = None
+    _once: Any = field(default_factory=WeakKeyDictionary, init=False, repr=False, compare=False)  # space -> forces
 
     def __post_init__(self) -> None:
         function(NAME, "form", self.form, "give a function of the test function v that returns a UFL form")
@@ -55,7 +58,9 @@ class LinearForm:
         return self.update is None
 
     def full(self, space: FemSpace, thickness: float) -> Callable[[float], Array]:
-        """Return t -> the forces (owned full,) on all components, less the history. Collective."""
+        """Return t -> the forces (owned full,), less the history; without update as once assembled. Collective."""
+        if space in self._once:
+            return lambda t: np.asarray(self._once[space])
         name, v = f"{NAME}: form", ufl.TestFunction(space.V)
         form = form_of(name, self.form, space, v)
         vector_of = on_all(space.comm, name, lambda: compiled(space, form))
@@ -69,14 +74,9 @@ class LinearForm:
             vector.destroy()
             defect = f"{NAME} gives NaN or infinite forces at t = {t:g} s: check its Functions, Constants and numbers"
             refuse(["" if np.all(np.isfinite(forces)) else defect], space.comm)
-            return np.asarray(forces)
+            return np.asarray(forces if update is not None else self._once.setdefault(space, forces))
 
         return at
-
-    def integrated(self, space: FemSpace, thickness: float) -> Callable[[float], Array]:
-        """Return t -> the forces on the free unknowns, less the history."""
-        full = self.full(space, thickness)
-        return lambda t: space.pull(full(t))
 
 
 AnyLoad = Traction | BodyForce | LinearForm

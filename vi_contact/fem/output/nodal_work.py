@@ -66,16 +66,13 @@ class NodalWork:
             compiled(space, space.forms.against(name, self._r, self._inside))
             if name != "C" or space.forms.damped else None for name in ("K", "C", "M")
         ]
-        g, mesh, factor = ufl.TestFunction(space.V), space.mesh, space.forms.section.thickness * self._inside
+        g, mesh, h = ufl.TestFunction(space.V), space.mesh, space.forms.section.thickness
         self._load_forms = [  # their products with nodal values of the loads are rᵀf
             None if isinstance(load, LinearForm)
-            else compiled(space, factor * ufl.inner(self._r, load.acting(g, mesh)) * load.measure(mesh))
+            else compiled(space, h * self._inside * ufl.inner(self._r, load.acting(g, mesh)) * load.measure(mesh))
             for load in self._loads
         ]
-        thickness = space.forms.section.thickness
-        self._nodal = {
-            k: one.full(space, thickness) for k, one in enumerate(self._loads) if isinstance(one, LinearForm)
-        }
+        self._nodal = {k: one.full(space, h) for k, one in enumerate(self._loads) if isinstance(one, LinearForm)}
         self._tell_constant_loads(owner)
 
     def _tell_constant_loads(self, owner: str) -> None:
