@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from fem_problems import BODIES, CONCRETE, block, dense, field, linear, max_over_ranks
+from mesh_tools import refusal
 
 pytest.importorskip("dolfinx")
 import ufl
@@ -290,6 +291,15 @@ def test_functions_of_no_material_are_refused_with_their_place(comm: Any) -> Non
         fem.assemble(mesh, Heterogeneous(away, 0.2, 1e3))
     with pytest.raises(InputError, match="rho .* is of another mesh"):
         fem.assemble(mesh, Heterogeneous(1e9, 0.2, 1e3 + ufl.SpatialCoordinate(other)[0]))
+    for E, words in (
+        (1e9 * (1.0 + 0.5j) * ufl.SpatialCoordinate(mesh)[0], "ended in "),  # the compiler says no
+        (lambda x: 1e9 * (1.0 + 0.5j * x[0]), "complex128"),
+        (ufl.as_ufl(1e9 + 1e9j), "ended in TypeError"),
+    ):
+        said = refusal(comm, lambda: fem.assemble(mesh, Heterogeneous(E, 0.2, 1e3)))  # noqa: B023
+        assert said.startswith("Heterogeneous: Young's modulus E [Pa] ") and words in said
+    same(comm, fem.assemble(mesh, Heterogeneous(ufl.as_ufl(1e9), 0.2, 1e3)),
+         fem.assemble(mesh, LinearElastic(1e9, 0.2, 1e3)))
     with pytest.raises(InputError, match="has values of shape \\(2,\\)"):
         Heterogeneous(compat.function(compat.vector_space(mesh)), 0.2, 1e3)
     with pytest.raises(InputError, match="give a LinearElastic, Orthotropic or Heterogeneous"):

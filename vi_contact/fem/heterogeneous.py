@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -84,15 +83,19 @@ def _on_cells(value: Any) -> bool:
 
 
 def _values(words: str, value: Values, space: Any, comm: MpiComm) -> Array:
-    found = compat.function(space)
-    if not callable(value):
-        found.x.array[:] = value
-        return np.array(found.x.array)
-    if isinstance(value, Expr):
-        if any(one.ufl_id() != space.mesh.ufl_domain().ufl_id() for one in extract_domains(value)):
-            raise InputError(f"Heterogeneous: {words} is of another mesh; give it on the mesh of the body")
-        value = value if _is_function(value) else compat.expression(value, space)
-    on_all(comm, f"Heterogeneous: {words}", partial(found.interpolate, value))
+    found, domains = compat.function(space), extract_domains(value) if isinstance(value, Expr) else ()
+    if any(one.ufl_id() != space.mesh.ufl_domain().ufl_id() for one in domains):
+        raise InputError(f"Heterogeneous: {words} is of another mesh; give it on the mesh of the body")
+
+    def fill() -> None:
+        if domains:
+            found.interpolate(value if _is_function(value) else compat.expression(value, space))
+        elif callable(value) and not isinstance(value, Expr):
+            found.interpolate(lambda x: np.positive(value(x), dtype=float))  # an error for complex numbers
+        else:
+            found.x.array[:] = float(value)
+
+    on_all(comm, f"Heterogeneous: {words}", fill)
     return np.array(found.x.array)
 
 
