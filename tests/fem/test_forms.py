@@ -13,6 +13,8 @@ pytest.importorskip("dolfinx")
 
 import ufl
 from fem_problems import BODIES, CONCRETE, block, dense, field, linear, max_over_ranks
+from mesh_tools import refusal
+from own_meshes import own_mesh
 from petsc4py import PETSc
 
 import vi_contact as vc
@@ -34,6 +36,7 @@ from vi_contact.laws import (
 )
 from vi_contact.laws.mass import ConsistentMass, Redistributed
 from vi_contact.plots.deformed import read_frames
+from vi_contact.run.files.identity import differences, identity
 from vi_contact.solvers.volume import ReducedNewton, SemismoothNewton, TaoTron, Volume
 
 SECTIONS = {"strain": PlaneStrain(0.7), "stress": PlaneStress(0.2), "solid": None}
@@ -293,6 +296,20 @@ def test_stiffness_that_is_not_symmetric(comm: Any) -> None:
         assert len(found) == 5 and max(one.certificate.worst for one in found) <= 1e-9
 
 
+def test_a_restart_sees_the_sense_of_a_skew_damping(comm: Any) -> None:
+    """wᵀCw of a skew C is zero: C, 2 C and -C are three runs, and C is C."""
+    mesh, _ = block(comm, **BODIES["triangles"])
+
+    def facts(spin: float) -> Any:
+        own = replace(isotropic(mesh), damping=lambda u, v: spin * (u[0] * v[1] - u[1] * v[0]) * ufl.dx)
+        return identity(linear(fem.assemble(mesh, forms=own)), vc.Midpoint(), 1e-3, start=0.0, end=1e-2)
+
+    first = facts(3e3)
+    assert differences(first, facts(3e3)) == {}
+    for other in (-3e3, 6e3):
+        assert differences(first, facts(other)) == {"damping": "another damping"}
+
+
 def test_gyroscopic_damping_takes_no_energy(comm: Any) -> None:
     """A block on springs k per volume in a frame that turns with W, C skew: z'' + 2iW z' + (k/rho) z = 0 of z = x + iy,
     so that z = v0 (exp(iat) - exp(ibt)) / (i (a - b)), a, b = -W ± sqrt(W² + k/rho); the midpoint rule has the phases
@@ -365,6 +382,31 @@ def test_forms_that_cannot_be_a_body(comm: Any) -> None:
     ):
         with pytest.raises(InputError, match=words):
             fem.assemble(mesh, **data)
+
+
+def test_facets_between_ranks_need_ghosts(comm: Any) -> None:
+    """u = (|x - 1|, 0) has a kink of 2 on a line of length 1.5: ∫ jump·jump dS = 6; without ghosts one sentence."""
+    def jumps(u: Any, v: Any) -> Any:
+        return ufl.inner(ufl.jump(ufl.grad(u)), ufl.jump(ufl.grad(v))) * ufl.dS
+
+    for ghosts in ("shared_facet", "none"):
+        mesh = own_mesh(comm, "triangle", ghosts, times=2)
+        given = Forms(mass=lambda u, v: ufl.inner(u, v) * ufl.dx, stiffness=jumps)
+        if ghosts == "none" and comm.size > 1:
+            said = refusal(comm, lambda: fem.assemble(mesh, forms=given))  # noqa: B023
+            assert "stiffness integrates over interior facets (dS), which on several ranks needs a mesh with" in said
+            continue
+        system = fem.assemble(mesh, forms=given)
+        u = np.column_stack([np.abs(system.space.points[:, 0] - 1.0), 0.0 * system.space.points[:, 0]])
+        assert 2.0 * system.strain_energy(u.ravel()) == pytest.approx(6.0, rel=1e-10)
+
+
+def test_von_mises_without_sigma_zz_is_noted(comm: Any) -> None:
+    mesh, _ = block(comm, **BODIES["triangles"])
+    for section, shape, noted in ((PlaneStrain(), 2, True), (PlaneStrain(), 3, False), (PlaneStress(), 2, False)):
+        given = replace(isotropic(mesh), stress=lambda u, k=shape: ufl.grad(u)[0, 0] * ufl.Identity(k))
+        notes = fem.assemble(mesh, forms=given, section=section).notes
+        assert any("take sigma_zz as zero: give a stress of shape (3, 3)" in one for one in notes) is noted
 
 
 def test_complex_numbers_are_refused(comm: Any, monkeypatch: pytest.MonkeyPatch) -> None:

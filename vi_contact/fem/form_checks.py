@@ -53,6 +53,12 @@ def form_of(said: str, call: Callable[..., Any], space: FemSpace, *arguments: An
     functions = (getattr(one, "function_space", space.V) for one in form.coefficients())
     if any(one.ufl_id() != own for one in form.ufl_domains()) or any(V.mesh is not space.mesh for V in functions):
         raise InputError(f"{said} is of another mesh; give measures and Functions of the mesh of the body")
+    if any(one.integral_type() == "interior_facet" for one in form.integrals()):
+        maps = space.V.dofmap.index_map, space.mesh.topology.index_map(space.mesh.topology.dim)
+        nodes, cells = space.comm.sum(np.array([one.num_ghosts for one in maps]))
+        if nodes and not cells:  # no rank knows both cells of a facet between ranks
+            raise InputError(f"{said} integrates over interior facets (dS), which on several ranks needs a mesh with "
+                             "ghost_mode=shared_facet")
     return form
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import ufl
 
 from ..core.errors import InputError
-from ..laws.materials import Damping, Rayleigh, Section
+from ..laws.materials import Damping, PlaneStrain, Rayleigh, Section
 from . import compat
 from .form_checks import form_of, is_symmetric, matrix_of, refuse_masses, refuse_stress, takes
 from .forms import ElasticForms, Material
@@ -94,11 +94,13 @@ class OwnForms(ElasticForms):
     def _notes(self, material: bool) -> tuple[str, ...]:
         mass = "the density of the material" if self._given.mass is None else "a form"
         stress, waves = "a" if self.tells_stress else "no", "the material beside them" if material else "no material"
-        said = (f"the body is stated by forms: its mass by {mass}, its stress by {stress} form, wave speeds at "
-                f"boundaries by {waves}")
-        if self.symmetric:
-            return (said,)
-        return said, "its matrices are not symmetric: only Volume() solves it, and ½ uᵀKu is no energy"
+        notes = [f"the body is stated by forms: its mass by {mass}, its stress by {stress} form, wave speeds at "
+                 f"boundaries by {waves}"]
+        if not self.symmetric:
+            notes.append("its matrices are not symmetric: only Volume() solves it, and ½ uᵀKu is no energy")
+        if self.tells_stress and isinstance(self.section, PlaneStrain) and self._stress(self.u).ufl_shape == (2, 2):
+            notes.append("von Mises stresses take sigma_zz as zero: give a stress of shape (3, 3)")
+        return tuple(notes)
 
     def stress(self, u: Any) -> Any:
         sigma, d = self._stress(u), self.space.dimension

@@ -1,8 +1,9 @@
 """Tell what makes two runs runs of the same problem, in few numbers that any ranks, machine or release give alike.
 
-Matrices and loads are seen through vectors w made of the numbers of the unknowns: wᵀMw, wᵀKw, wᵀCw, w·f(t). Such
-numbers depend neither on the ranks nor on their order, and round-off changes them in the last digits only; they are
-kept with their sizes and compared relative to these. Laws and schemes are texts, with numbers compared likewise.
+Matrices and loads are seen through vectors w made of the numbers of the unknowns: wᵀMw, wᵀKw, wᵀCw, w·f(t), and vᵀCw
+of two where a matrix may be skew. Such numbers depend neither on the ranks nor on their order, and round-off changes
+them in the last digits only; they are kept with their sizes and compared relative to these. Laws and schemes are texts,
+with numbers compared likewise.
 """
 
 import re
@@ -43,6 +44,8 @@ def identity(problem: ContactProblem, scheme: Scheme, dt: TimeSteps, *, start: f
     """Name -> number, text or numbers with sizes, of all ranks; histories from ``start`` to ``end`` [s]. Collective."""
     system, surface = problem.system, problem.surface
     probes = [probe(np.asarray(system.space.ids), j) for j in range(PROBES)]
+    symmetric = getattr(system.algebra, "symmetric", True)
+    pairs = [(w, w) for w in probes] + ([] if symmetric else [(probes[0], probes[1])])
     first = min(end - start, STEPS * min(pieces_of(dt))[0])
     early = [start + first * i / EARLY for i in range(EARLY + 1)]
     times = start + (end - start) * (np.arange(SAMPLES) + probe(np.arange(SAMPLES), 0) + 0.5) / SAMPLES
@@ -54,9 +57,9 @@ def identity(problem: ContactProblem, scheme: Scheme, dt: TimeSteps, *, start: f
         "mass": text_of(problem.mass),
         "impact law": text_of(problem.impact),
         "friction law": text_of(with_values(problem.friction, surface, partial(_of_all_points, surface))),
-        "stiffness": [_dot(system, w, system.K @ w) for w in probes],
-        "mass matrix": [_dot(system, w, system.M @ w) for w in probes],
-        "damping": [] if system.C is None else [_dot(system, w, system.C @ w) for w in probes],
+        "stiffness": [_dot(system, w, system.K @ x) for w, x in pairs],
+        "mass matrix": [_dot(system, w, system.M @ x) for w, x in pairs],
+        "damping": [] if system.C is None else [_dot(system, w, system.C @ x) for w, x in pairs],
         "geometry": [_dot(system, probes[0], x) for x in system.space.coordinates.T],
         "load": _loads(system, probes, early, times),
         "excitation": _excitation(problem, times),
