@@ -64,6 +64,25 @@ def test_arrays_are_read_only_and_no_scheme_minds(scheme: Any) -> None:
             array[:] = 0
 
 
+def test_reports_are_read_only_and_the_problem_stays_as_it_was(comm: Any) -> None:
+    """The bound of a step is the gap of the problem itself: written into, later runs would have another one."""
+    problem, met = shaken_wall(comm), []
+    before = vc.simulate(problem, **RUN, steps=5)
+
+    def write(_: vc.State, report: vc.Report) -> None:
+        step, result = report.step, report.result
+        ours = step.bound, step.b, step.guess, step.active, result.x, result.r_n
+        for array in (*ours, report.v_minus, report.old.r_n):
+            with pytest.raises(ValueError, match="read-only"):
+                array[:] = 0
+            met.append(array)
+
+    during, after = vc.simulate(problem, **RUN, steps=5, callback=write), vc.simulate(problem, **RUN, steps=5)
+    assert len(met) == 40 and np.array_equal(before.state.u, during.state.u)
+    assert np.array_equal(before.state.u, after.state.u)
+    assert problem.surface.gap0.flags.writeable == shaken_wall(comm).surface.gap0.flags.writeable
+
+
 def test_true_ends_the_run_and_a_restart_goes_on(comm: Any, shared_tmp: Path) -> None:
     """Asked by one rank alone, in the middle of a halved step: the base step is ended, all is written."""
     problem, dt = shaken_wall(comm), vc.HalvedAtImpact(WALL_DT, 2)

@@ -5,10 +5,10 @@ import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from signal import Signals
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from .time_steps import StepPlan, described, pieces_of
 from .wall_time import WallTime
 
 log = logging.getLogger(__name__)
+T = TypeVar("T")
 TIMED = 10_000  # the last steps, of which seconds_per_step is the median
 LINEAR_STEPS = 21  # repetitions of the plain linear step that the step is compared with
 
@@ -182,6 +183,8 @@ class Session:
         for array in (state.r_n, state.active, state.r_t, *state.memory.values()):
             if array is not None:
                 array.setflags(write=False)  # u and v are so
+        old, step, result = _locked(report.old), _locked(report.step), _locked(report.result)
+        report = _locked(replace(report, old=old, step=step, result=result))
         place = f"after step {state.k}, t = {state.t:.6g} s"
         try:
             said = on_all(self._comm, "it", lambda: callback(state, report))
@@ -279,3 +282,13 @@ class Session:
             scheme.finish(problem, old, step, StepResult(x, none, none.astype(bool), 0, "linear"), dt)
             found.append(time.perf_counter() - begin)
         return float(np.median(found[1:]))  # the first is slower
+
+
+def _locked(value: T) -> T:
+    """The same with views of its arrays that are read-only: some, such as the gap at rest, belong to the problem."""
+    own: Any = value
+    views = {one.name: array.view() for one in fields(own) if isinstance(array := getattr(own, one.name), np.ndarray)}
+    for view in views.values():
+        view.setflags(write=False)
+    locked: T = replace(own, **views)
+    return locked
