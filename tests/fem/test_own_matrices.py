@@ -18,8 +18,10 @@ from frame_elements import frame, line
 
 import vi_contact as vc
 from vi_contact import fem, plots
+from vi_contact.core.algebra import SerialMatrix
 from vi_contact.core.errors import InputError
 from vi_contact.core.system import Load
+from vi_contact.laws.free_motions import free_motions
 
 pytestmark = pytest.mark.serial  # numpy and scipy alone: ranks would all do the same
 EI, EA, RHO_A, L = 2.0e3, 5.0e5, 3.0, 2.0
@@ -194,6 +196,68 @@ def test_matrices_that_are_not_symmetric_are_for_volume(name):
 
 
 # Mass laws, weight, bodies --------------------------------------------------------------------------------------------
+
+
+def hung(stiff, load, *, soft=1.0):
+    """A chain of five masses on stiff springs, hung at its first node on a soft one, with a stop 0.3 m from its end."""
+    K = stiff * (2.0 * np.eye(5) - np.eye(5, k=1) - np.eye(5, k=-1))
+    K[0, 0], K[4, 4] = stiff + soft, stiff
+    system = vc.system_from_arrays(np.ones(5), None, K, coordinates=np.arange(5.0)[:, None], load=[0, 0, 0, 0, load])
+    return vc.ContactProblem(system, vc.contact_points(system, [4], [1.0], gap0=0.3))
+
+
+@pytest.mark.parametrize("stiff", [1.0e9, 1.0e11, 1.0e13])
+def test_a_soft_spring_holds_a_stiff_body(stiff):
+    """Also where it is 1e-13 of the body's stiffness: u = f / k, or 0.3 m and r = f - 0.3 k. Rounding is that of u,
+    magnified by the stiffness; what is 1e-17 of it is lost."""
+    off, on, lost = hung(stiff, -0.5), hung(stiff, 0.5), hung(stiff, 0.5, soft=1e-17 * stiff)
+    state = vc.static_equilibrium(off)
+    assert not off.system.floating and lost.system.floating
+    assert state.u == pytest.approx(np.full(5, -0.5), rel=1e-3) and state.r_n[0] == 0.0
+    state = vc.static_equilibrium(on)
+    assert state.u == pytest.approx(np.full(5, 0.3), rel=1e-8) and state.r_n == pytest.approx([0.2], rel=1e-3)
+
+
+@pytest.mark.parametrize("stiffness", [1.0e3, 0.0])
+def test_a_mass_without_stiffness_floats(stiffness):
+    """It comes to rest on its stop, beside a mass on a spring or another of its kind."""
+    system = vc.system_from_arrays([1.0, 2.0], None, np.diag([stiffness, 0.0]), coordinates=[[0.0], [1.0]],
+                                   load=[-1.0, -2.0])  # fmt: skip
+    surface = vc.contact_points(system, [0, 1], [-1.0], gap0=0.01)
+    problem = vc.ContactProblem(system, surface, mass=vc.ConsistentMass())
+    state = vc.static_equilibrium(problem)
+    u = problem.cartesian(state.u)
+    assert system.floating and u == pytest.approx([-1.0e-3 if stiffness else -0.01, -0.01], rel=1e-9)
+    assert state.r_n == pytest.approx([0.0 if stiffness else 1.0, 2.0], rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("size", [1.0e-6, 1.0, 1.0e9])
+@pytest.mark.parametrize("digits", [3, 16])
+def test_free_motions_in_any_units(size, digits):
+    """A frame of bars at an angle, free, pinned, on rollers, held and on springs of a millionth; rounded places too."""
+    X, K = np.round([[0.1, 0.2], [1 / 3, 1 / 7], [0.4, 0.9], [0.05, 2 / 3]], digits) * size, np.zeros((8, 8))
+    for i in range(4):
+        for j in range(i):
+            way = (X[i] - X[j]) / np.linalg.norm(X[i] - X[j])
+            row = np.kron(np.eye(4)[i] - np.eye(4)[j], way)
+            K += 1.0e9 / np.linalg.norm(X[i] - X[j]) * np.outer(row, row)
+    springs = K + 1.0e-6 * np.diag(K.diagonal() * np.array([1, 1, 0, 1, 0, 0, 0, 0]))
+    cases = [(K, [], 3), (K, [0, 1], 1), (K, [1, 3], 1), (K, [0, 1, 3], 0), (springs, [], 0)]
+    for matrix, clamped, free in cases:
+        system = vc.system_from_arrays(np.ones(8), None, matrix, coordinates=X, clamped=clamped)
+        found = sum(body.motions.shape[1] for body in free_motions(system))
+        assert found == free and system.floating == (free > 0)
+
+
+def test_products_do_not_grow_with_bodies(monkeypatch):
+    """Bodies of one mass on a spring: K is multiplied as often for a thousand as for ten."""
+    counts, product = [], SerialMatrix.__matmul__
+    monkeypatch.setattr(SerialMatrix, "__matmul__", lambda A, x: counts.append(A) or product(A, x))
+    for n in (10, 1000):
+        system = vc.system_from_arrays(np.ones(n), None, np.eye(n), coordinates=np.arange(float(n))[:, None])
+        counts.append(n)
+        assert not system.floating
+    assert counts.index(10) == len(counts) - counts.index(10) - 2
 
 
 def test_mass_of_rotations():

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from chain import chain_problem
 from fem_problems import CONCRETE, block, linear
 from mpi4py import MPI
 
@@ -22,13 +23,14 @@ from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.pairs import contact_pair
 from vi_contact.fem.contact.surface import contact_surface
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
-from vi_contact.fem.mesh import build_mesh
+from vi_contact.fem.mesh import Cells, build_mesh
 from vi_contact.laws.friction import Coulomb
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.meshes.two_blocks import Blocks
 from vi_contact.models.channel.model import Channel, build
+from vi_contact.run.proximal import Proximal
 from vi_contact.run.rigid_bodies import RigidBodies
 from vi_contact.run.static import static_equilibrium
 from vi_contact.solvers.condensed import Condensed
@@ -150,6 +152,31 @@ def test_held_bodies_and_components_are_no_free_motions() -> None:
         assert COMM.allreduce(static_equilibrium(problem).r_n.sum()) == pytest.approx(1.0e3, rel=1e-12)
 
 
+@pytest.mark.parametrize("ratio", [1e-8, 1e-10])
+def test_a_clamped_body_floats_on_no_contrast(ratio: float) -> None:
+    """Steel and far more on a layer that is clamped: u = -p (h / E_layer + h / E) without contraction."""
+    mesh, tags = block(COMM, lengths=(1.0, 2.0), divisions=(4, 8))
+    high, low = (lambda x: x[1] > 1.0 - 1e-9), (lambda x: x[1] < 1.0 + 1e-9)
+    parts = Cells.where("high", mesh, high), Cells.where("low", mesh, low)
+    moduli, push = (1e11, 1e11 * ratio), 1e8 * ratio
+    materials = [(part, LinearElastic(E=E, nu=0.0, rho=1.0)) for part, E in zip(parts, moduli, strict=True)]
+    system = assemble(mesh, materials, clamped=tags["bottom"], loads=Traction(tags["top"], (0.0, -push)))
+    u = static_equilibrium(linear(system)).u
+    assert not system.floating
+    sag = COMM.allreduce(np.abs(u).max(initial=0.0), op=MPI.MAX)
+    assert sag == pytest.approx(push * sum(1.0 / E for E in moduli), rel=2e-3)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_clamped_body_that_hardly_changes_volume_is_held(degree: int) -> None:
+    """On rollers it slides. Its stiffness against shear is 1e-11 of that against change of volume."""
+    mesh, tags = block(COMM, lengths=(1.0, 2.0), divisions=(4, 8))
+    rubber = LinearElastic(E=1e7, nu=0.49999999999, rho=1000.0)
+    for components, floats in (((0, 1), False), ((1,), True)):
+        held = Prescribed(tags["bottom"], components=components)
+        assert assemble(mesh, rubber, prescribed=held, degree=degree).floating == floats
+
+
 @pytest.mark.parametrize("angle", [0.0, 0.4])
 def test_resultants_are_those_of_motions_that_nothing_holds(angle: float) -> None:
     """A free body has all, one on rollers those along them, a clamped one none; the part of a force that has its
@@ -190,3 +217,18 @@ def test_a_method_that_crawls_comes_to_an_end() -> None:
     with pytest.raises(StepFailure, match="held by contact alone was not solved") as failure:
         static_equilibrium(problem, solver=solver)
     assert len(solver.prepared) == 2 and "time step" not in str(failure.value) and "Condensed()" in str(failure.value)
+
+
+@pytest.mark.serial
+def test_a_step_after_one_that_moved_nothing_is_not_prolonged() -> None:
+    """There is no ratio of their sizes; bodies that were at rest to the last digit came to this."""
+    problem = chain_problem(3, floating=True, gap=1.0)
+    system, surface = problem.static_load, problem.surface
+    A = EffectiveMatrix(system.K, system.algebra)
+    proximal = Proximal(problem, A, Condensed(), 1e-9)
+    u, none = np.zeros(system.rows), np.zeros(surface.count, dtype=bool)
+    proximal.step = StepProblem(A, u, surface.gap(0.0), surface, 1.0, u, none, 0.0, 0)
+    rest, moved = proximal._motion(u, none), proximal._motion(u + 1.0, none)
+    answer = StepResult(u, np.zeros(surface.count), none, 1, "")
+    assert rest.pace == 0.0 < moved.pace and proximal._ahead(rest, moved, answer) == 0.0
+    assert proximal._ahead(moved, moved, answer) > 0.0

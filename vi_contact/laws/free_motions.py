@@ -5,17 +5,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.algebra import Array, Comm, Factor, Indices, Mask, Matrix, largest
+from ..core.algebra import Array, Comm, Factor, Indices, Mask, largest
 from ..core.system import SemiDiscreteSystem
 from .mass_transfer import rigid_motions
 
-FREE = 1e-10  # wᵀKw over the body's largest K_ii, for motions w of size one, that is round-off
+ROUNDED = 16.0 * float(np.finfo(float).eps)  # wᵀKw over Σ K_ii w_i² that is round-off: 1.1 eps at most on meshes
+NOWHERE = 1e300  # [m], where bodies are that are held everywhere
 SOFT = 1e-12  # of a diagonal entry: lets unknowns be solved for that nothing holds
 
 
 @dataclass(frozen=True)
 class FreeMotions:
-    """Hold a body's owned unknowns, its free motions w (rows, k) of size one, and orthonormal in its mass, with M w."""
+    """Hold a body's owned unknowns, its free motions w (rows, k) of size one, and orthonormal in m = diag M; m w."""
 
     rows: Indices
     unit: Array
@@ -29,29 +30,44 @@ def floating(system: SemiDiscreteSystem) -> SemiDiscreteSystem:
 
 
 def free_motions(system: SemiDiscreteSystem) -> Iterator[FreeMotions]:
-    """Yield every body with a stiffness: its rigid motions w with K w = 0. Unknowns that are no displacements, such as
-    rotations, which no ``influence`` moves, take the values that cost the least energy. Collective."""
-    comm, points = system.algebra.comm, system.space.coordinates
+    """Yield every body: its rigid motions w with K w = 0, those of a mass without a stiffness too. Unknowns that are no
+    displacements, such as rotations, which no ``influence`` moves, take the values that cost the least energy.
+    Collective."""
+    comm, bodies, motions = system.algebra.comm, rows_of_bodies(system), _rigid(system)
+    stiffness, mass = np.abs(system.K.diagonal())[:, None], system.M.diagonal()[:, None]
+    pulls = np.column_stack([system.K @ w for w in motions.T])
+    for rows in bodies:
+        w = motions[rows]
+        form, size, inertia = comm.sum(np.stack([w.T @ x for x in (pulls[rows], stiffness[rows] * w, mass[rows] * w)]))
+        kernel = _kernel(0.5 * (form + form.T), size.diagonal())
+        basis = kernel @ _orthonormal(kernel.T @ inertia @ kernel)
+        most = comm.max(np.max(np.abs(w @ basis), axis=0, initial=0.0))
+        yield FreeMotions(rows, w @ basis / most, w @ basis, mass[rows] * (w @ basis))
+
+
+def rows_of_bodies(system: SemiDiscreteSystem) -> list[Indices]:
+    """Return the owned unknowns of every body of all ranks. Collective."""
     numbers = np.asarray(system.space.bodies)
-    stiffness, other = np.abs(system.K.diagonal()), ~system.influence.any(axis=1)
-    factor = _factor(system, stiffness, other) if largest(comm, other.any()) else None
-    for number in range(bodies_in(comm, numbers)):
-        rows = np.flatnonzero(numbers == number)
-        stiffest = largest(comm, np.max(stiffness[rows[~other[rows]]], initial=0.0))
-        if stiffest == 0.0:
-            continue  # every node of it is held
-        high = comm.max(np.max(points[rows], axis=0, initial=-np.inf))
-        low = -comm.max(np.max(-points[rows], axis=0, initial=-np.inf))
-        place = (points[rows] - 0.5 * (low + high)) / max(float(np.max(high - low)), 1e-300)
-        w = rigid_motions(system.influence[rows], place)
-        if factor is not None:
-            w = np.column_stack([_followed(system, factor, other, rows, column) for column in w.T])
-        bending = _form(system, system.K, rows, w)[1]
-        w = w @ _kernel(bending, FREE * stiffest)
-        momenta, inertia = _form(system, system.M, rows, w)
-        basis = _orthonormal(inertia)
-        size = comm.max(np.max(np.abs(w @ basis), axis=0, initial=0.0))
-        yield FreeMotions(rows, w @ basis / size, w @ basis, momenta @ basis)
+    counts = np.bincount(numbers, minlength=bodies_in(system.algebra.comm, numbers))
+    return np.split(np.argsort(numbers, kind="stable"), np.cumsum(counts)[:-1])
+
+
+def _rigid(system: SemiDiscreteSystem) -> Array:
+    """Rigid motions of all bodies about their middles, in one vector each: bodies share no unknown. Each moves by
+    another amount, so that what K ties to another body does not go with it."""
+    comm, points, bodies = system.algebra.comm, system.space.coordinates, rows_of_bodies(system)
+    place, amount = np.zeros_like(points), np.zeros((system.rows, 1))
+    for rows, factor in zip(bodies, np.random.default_rng(0).uniform(1.0, 2.0, len(bodies)), strict=True):
+        high = comm.max(np.max(points[rows], axis=0, initial=-NOWHERE))
+        low = -comm.max(np.max(-points[rows], axis=0, initial=-NOWHERE))
+        place[rows] = (points[rows] - 0.5 * (low + high)) / max(float(np.max(high - low)), 1e-300)
+        amount[rows] = factor
+    motions, other = amount * rigid_motions(system.influence, place), ~system.influence.any(axis=1)
+    if largest(comm, other.any()):
+        solver = _factor(system, np.abs(system.K.diagonal()), other)
+        for w in motions.T:
+            w[other] = -solver.solve((system.K @ w)[other])
+    return motions
 
 
 def _factor(system: SemiDiscreteSystem, stiffness: Array, other: Mask) -> Factor:
@@ -61,21 +77,16 @@ def _factor(system: SemiDiscreteSystem, stiffness: Array, other: Mask) -> Factor
     return algebra.factor(algebra.combine([(1.0, algebra.block(system.K, other)), (1.0, shift)]))
 
 
-def _followed(system: SemiDiscreteSystem, factor: Factor, other: Mask, rows: Indices, w: Array) -> Array:
-    """The motion w of a body with the other unknowns as they follow it."""
-    x = np.zeros(system.rows)
-    x[rows] = w
-    x[other] = -factor.solve((system.K @ x)[other])
-    return x[rows]
-
-
-def _kernel(form: Array, zero: float) -> Array:
-    """Columns whose form is zero: axes of that kind, so that sums of forces stay apart, and others between the rest."""
-    free = np.abs(form.diagonal()) <= zero
+def _kernel(form: Array, size: Array) -> Array:
+    """Columns whose form is round-off: axes of that kind, so that sums of forces stay apart, and others between the
+    rest. ``size``: the sum of each axis without its signs."""
+    scale = np.sqrt(np.where(size > 0.0, size, 1.0))
+    form = form / np.outer(scale, scale)
+    free = np.abs(form.diagonal()) <= ROUNDED
     values, vectors = np.linalg.eigh(form[np.ix_(~free, ~free)])
     others = np.zeros((len(form), len(values)))
-    others[~free] = vectors
-    return np.column_stack([np.eye(len(form))[:, free], others[:, np.abs(values) <= zero]])
+    others[~free] = vectors / scale[~free, None]
+    return np.column_stack([np.eye(len(form))[:, free], others[:, np.abs(values) <= ROUNDED]])
 
 
 def _orthonormal(form: Array) -> Array:
@@ -88,18 +99,6 @@ def _orthonormal(form: Array) -> Array:
         if size > 1e-10 * np.max(form):
             columns.append(column / np.sqrt(size))
     return np.column_stack(columns) if columns else np.zeros((len(form), 0))
-
-
-def _form(system: SemiDiscreteSystem, A: Matrix, rows: Indices, w: Array) -> tuple[Array, Array]:
-    """(A w, wᵀA w) of motions of a body, on the body."""
-    columns = []
-    for values in w.T:
-        x = np.zeros(system.rows)
-        x[rows] = values
-        columns.append((A @ x)[rows])
-    moved = np.column_stack(columns) if columns else np.zeros_like(w)
-    form = system.algebra.comm.sum(w.T @ moved)
-    return moved, 0.5 * (form + form.T)
 
 
 def bodies_in(comm: Comm, numbers: Indices) -> int:

@@ -200,7 +200,7 @@ class Proximal:
         """How many times d to go further at once: the sum of the steps to come when each is ‖d_new‖/‖d_old‖ of the
         one before (Aitken), or only to the next contact. 0 unless d_new and d_old are parallel, to the accuracy which
         that distance needs. Any start of the next step will do, so nothing but the speed depends on it."""
-        if new.pace == 0.0 or self.step.surface.some(old.active != new.active):
+        if 0.0 in (old.pace, new.pace) or self.step.surface.some(old.active != new.active):
             return 0.0
         surface, ratio = self.step.surface, new.pace / old.pace
         rows = self._closes(new) & ~result.active

@@ -33,7 +33,7 @@ class RigidBodies:
         return worst
 
     def resultants(self, force: Array) -> Array:
-        """Return M w (w·force), the part of a force on the unknowns of ``static_load`` with its resultants."""
+        """Return m w (w·force), m = diag M: the part of a force on ``static_load``'s unknowns with its resultants."""
         own, part = self._own(force), np.zeros_like(force)
         for body in self._free:
             part[body.rows] += body.momenta @ self._comm.sum(body.motions.T @ own[body.rows])
@@ -47,7 +47,7 @@ class RigidBodies:
 def body_springs(problem: ContactProblem) -> Matrix:
     """Return P: the mass matrix of every body, times a number [1/s²] that makes the sum of its entries along a
     direction STRONG of the stiffness of what is softest here, a body or the springs it stands on, and at least WEAK of
-    the body's own largest K_ii; in the unknowns of ``problem.static_load``. Collective.
+    the body's own largest K_ii if it has a stiffness; in the unknowns of ``problem.static_load``. Collective.
 
     It does not grow as meshes are refined, as it would with the largest K_ii / M_ii. Weaker springs take fewer steps to
     push a stiff body into a soft one, and cost digits: round-off of the first step is 1e-16 / WEAK² at worst.
@@ -64,6 +64,7 @@ def body_springs(problem: ContactProblem) -> Matrix:
     bed = total(surface.comm, np.sum(1.0 / surface.compliance[soft])) or np.inf
     softest = min(bed, float(np.min(stiffness, where=stiffness > 0.0, initial=np.inf)))
     wanted = np.clip(STRONG * softest, WEAK * stiffness, STRONG * stiffness)
+    wanted[stiffness == 0.0] = STRONG * softest if np.isfinite(softest) else 1.0  # a mass alone: any strength will do
     root = np.sqrt(np.divide(wanted, mass, out=np.zeros(count), where=mass > 0.0))
     every = np.arange(system.rows)
     springs = algebra.congruence(algebra.local(every, every, root[numbers], system.rows), system.M)
