@@ -285,7 +285,7 @@ class Session:
 
 
 def _locked(value: T) -> T:
-    """The same with views of its arrays that are read-only: some, such as the gap at rest, belong to the problem."""
+    """The value with read-only views of its arrays: some of them, such as the gap at rest, belong to the problem."""
     own: Any = value
     views = {one.name: array.view() for one in fields(own) if isinstance(array := getattr(own, one.name), np.ndarray)}
     for view in views.values():
