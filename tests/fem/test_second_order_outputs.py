@@ -15,9 +15,9 @@ import h5py
 import ufl
 from curved_cells import SHAPES, mesh_of
 from fem_problems import CONCRETE, block, linear, nodal, run
-from mesh_tools import integral
+from mesh_tools import integral, size
 from mpi4py import MPI
-from two_bodies import blocks, per_body, two_blocks
+from two_bodies import SOFT, blocks, per_body, two_blocks
 
 import vi_contact as vc
 from vi_contact import fem
@@ -30,6 +30,7 @@ from vi_contact.plots.deformed import read_frames
 from vi_contact.soil.free_field import FreeField
 
 COMM = MPI.COMM_WORLD
+P = 1.0e4
 curved = pytest.mark.parametrize("curved", [False, True], ids=["straight", "curved"])
 VTK = {  # which vertices every node of a cell is the mean of, in VTK's order (VTK book, quadratic cells)
     "triangles": [(0,), (1,), (2,), (0, 1), (1, 2), (0, 2)],
@@ -199,3 +200,63 @@ def test_what_knows_first_order_only_says_so() -> None:
         fem.assemble(mesh, CONCRETE, degree=2, clamped=tags["bottom"], dashpots=side)
     with pytest.raises(InputError, match="a mesh of second order cannot be cut or welded"):
         fem.build_mesh(CutOpen(mesh_of("triangles", curved=True), "bottom"), COMM)
+
+
+@curved
+def test_reactions_hold_what_contact_does_to_held_edges(curved: bool) -> None:
+    """A block clamped beside its contact: loads, contact, friction and reactions are in balance, at rest and in steps,
+    and a cut along the clamped side has minus the reactions."""
+    mesh, tags = fem.build_mesh(mesh_of("tetrahedra", curved), COMM)
+    density = np.array([1e3, -3e4, 2e3])
+    loads = fem.BodyForce(tuple(density))
+    system = fem.assemble(mesh, SOFT, clamped=tags["left"], loads=loads, degree=2)
+    surface = fem.contact_surface(system, tags["bottom"], obstacle=vc.AnalyticGap(lambda x: 1e-3 * x[:, 2]))
+    problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.2))
+    state = vc.static_equilibrium(problem, tolerance=1e-13)
+    record: list[Any] = [fem.Reactions("left", tags["left"], (0.0, 0.0, 0.0), loads=loads), vc.Contact()]
+    if not curved:
+        side = (0.0, 0.0, 0.0), (0.0, 1.5, 0.0), (0.0, 0.0, 1.2)
+        record.append(fem.SectionForces({"side": side}, loads=loads))
+    history = vc.simulate(problem, dt=1e-3, steps=2, state=state, record=record, progress=False).history
+    total = density * integral(mesh, 1.0, ufl.dx)
+    held = np.column_stack([history[f"reaction_{c}_left"] for c in "xyz"])
+    contact = np.column_stack([history[f"contact_force_{c}"] + history[f"friction_force_{c}"] for c in "xyz"])
+    assert contact[0, 1] > 0.2 * abs(total[1])
+    assert np.abs(contact[:, [0, 2]]).max() > 0.01 * contact[0, 1]
+    assert np.allclose(held + contact, -total, rtol=0.0, atol=1e-8 * abs(total[1]))
+    if not curved:
+        cut = np.column_stack([history[f"{name}_side"] for name in ("N", "V_2", "V_3")])
+        assert np.allclose(cut, -held, rtol=0.0, atol=1e-8 * abs(total[1]))
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_reactions_of_both_sides_of_a_pair(degree: int) -> None:
+    """Two blocks held beside their interface, or the lower one on it: each is in balance with its part of the loads."""
+    both = blocks(3, upper=(2, 1, 2), lower=(2, 1, 2), simplices=True)
+    mesh, tags = fem.build_mesh(both, COMM)
+    load = fem.Traction(tags["upper_top"], (0.0, -P, 0.0))
+    total = P * size(tags["upper_top"])
+    for lower in (tags["lower_left"], tags["lower_top"]):
+        system = fem.assemble(mesh, SOFT, clamped=[lower, tags["upper_left"]], loads=load, degree=degree)
+        problem = vc.ContactProblem(system, fem.contact_pair(system, *(tags[side] for side in both.interface)))
+        state = vc.static_equilibrium(problem, tolerance=1e-13)
+        pressed = COMM.allreduce(float(state.r_n.sum()))
+        below = fem.Reactions("lower", lower, (0.0, 0.0, 0.0), loads=load).start(problem, state)
+        above = fem.Reactions("upper", tags["upper_left"], (0.0, 0.0, 0.0), loads=load).start(problem, state)
+        assert pressed > 0.2 * total
+        assert below["reaction_y_lower"] == pytest.approx(pressed, rel=1e-9)
+        assert above["reaction_y_upper"] == pytest.approx(total - pressed, rel=1e-9)
+
+
+@pytest.mark.parametrize("points", [None, [(1.0, 0.0, 0.6), (2.0, 0.0, 1.2)]], ids=["all", "listed"])
+def test_the_pressure_of_tetrahedra_has_the_contact_force(points: Any) -> None:
+    """∫ p = sum r_n, also where contact facets have vertices without a condition, clamped or not listed."""
+    mesh, tags = fem.build_mesh(mesh_of("tetrahedra", False), COMM)
+    system = fem.assemble(mesh, SOFT, clamped=tags["left"], loads=fem.BodyForce((0.0, -3e4, 0.0)), degree=2)
+    problem = vc.ContactProblem(system, fem.contact_surface(system, tags["bottom"], points=points))
+    state = vc.static_equilibrium(problem)
+    pressure = fem.as_function(problem, state, "contact_pressure")
+    ds = compat.measure(mesh, 2, tags["bottom"].indices)
+    force = COMM.allreduce(float(state.r_n.sum()))
+    assert force > 0.0
+    assert integral(mesh, pressure, ds) == pytest.approx(force, rel=1e-12)

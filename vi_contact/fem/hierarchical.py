@@ -62,9 +62,9 @@ class Hierarchy:
         return every[: len(nodal)]
 
     def between(self, nodal: Array, known: Mask, mean: Any) -> Array:
-        """Return owned nodal values (k, c), with a ``mean`` at mid-points of edges with two known ends."""
-        every, both = self.with_ghosts(nodal), self.with_ghosts(known[:, None])[self._ends, 0].all(axis=1)
-        every[self._mids[both]] = mean(every[self._ends[both]], axis=1)
+        """Return owned nodal values (k, c), with a ``mean`` of the ends of edges at mid-points that are known."""
+        every, found = self.with_ghosts(nodal), self.with_ghosts(known[:, None])[self._mids, 0] > 0.0
+        every[self._mids[found]] = mean(every[self._ends[found]], axis=1)
         return every[: len(nodal)]
 
     def around(self, turn: Matrix | None, dual: Matrix | None) -> tuple[Matrix, Matrix]:

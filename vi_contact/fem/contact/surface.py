@@ -81,21 +81,29 @@ def prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str,
     held = any(part.nodes.held[part.P.indices].any() for part in parts)
     if not moves or not (space.hierarchy or largest(space.comm, held)):
         return {}
-    frames, free = NodalFrames(*given([conditions])), ~conditions.nodes.held
+    moved, values = moved_by_held(space, [conditions]), space.prescribed_values
+    return {"motion": lambda t: moved(values(t))[0], "slide": lambda t: moved(values(t))[1]}
+
+
+def moved_by_held(space: FemSpace, conditions: Sequence[NodalConditions]) -> Callable[[Array], tuple[Array, Array]]:
+    """Return a function that tells how far nodal displacements (k, d) of held components move the obstacles of these
+    conditions towards their nodes, (m,), and along their tangents, (m, d-1). Both are collective."""
+    frames, free = NodalFrames(*given(conditions)), ~joined_nodes([one.nodes for one in conditions]).held
     free = np.take_along_axis(free, tangential_columns(frames.column, space.dimension), axis=1) & frames.rubs
     tangents, directions = tangent_vectors(frames.directions, frames.place), frames.directions
-    numbers = np.unique(np.concatenate(from_each(space.comm, np.concatenate([part.nodes.numbers for part in parts]))))
-    places = [np.searchsorted(numbers, part.nodes.numbers) for part in parts]
+    faced = [[part for part in (one.facing, *one.bubbles) if part is not None] for one in conditions]
+    own = [np.zeros(0, dtype=np.int64), *(part.nodes.numbers for parts in faced for part in parts)]
+    numbers = np.unique(np.concatenate(from_each(space.comm, np.concatenate(own))))
+    shares = [[(part.P, np.searchsorted(numbers, part.nodes.numbers)) for part in parts] for parts in faced]
 
-    def displacement(t: float) -> Array:
-        nodal = space.prescribed_values(t).reshape(-1, space.dimension)
+    def moved(nodal: Array) -> tuple[Array, Array]:
+        nodal = nodal.reshape(-1, space.dimension)
         found = space.at_nodes(numbers, nodal if space.hierarchy is None else space.hierarchy.bent(nodal))
-        return np.asarray(sum(part.P @ found[place] for part, place in zip(parts, places, strict=True)))
+        there = np.concatenate([sum((P @ found[place] for P, place in parts), start=np.zeros_like(one.directions))
+                                for one, parts in zip(conditions, shares, strict=True)])
+        return -np.sum(there * directions, axis=1), np.einsum("ijk,ij->ik", tangents, there) * free
 
-    return {
-        "motion": lambda t: -np.sum(displacement(t) * directions, axis=1),
-        "slide": lambda t: np.einsum("ijk,ij->ik", tangents, displacement(t)) * free,
-    }
+    return moved
 
 
 def _obstacle(obstacle: Obstacle | None, size: float) -> Callable[[Array, Array], tuple[Array, Array]]:

@@ -15,7 +15,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from ...core.algebra import Array, Indices, Mask, on_first
+from ...core.algebra import Array, Indices, Mask, from_each, on_first
 from ...core.checks import attributes
 from ...core.files import FIELDS, FIELDS_INDEX, frames_of, hdf5_atomically, on_root, open_hdf5, write_atomically
 from ...core.problem import ContactProblem
@@ -167,8 +167,7 @@ class FrameWriter:
             slipping = slipped(report)
         pressure, status = nodal_contact(problem, state, np.where(state.active, np.where(slipping, 3, 2), 1))
         if problem.frictional:
-            known = status[:, 0] > 0
-            moving += [between(space, nodal, known) for nodal in self._rubbing(state)]
+            moving += [between(problem, nodal) for nodal in self._rubbing(state)]
         rows = np.hstack([*(_three(nodal) for nodal in moving), pressure, status])
         on_root(space.comm, partial(self._write, state, on_first(space.comm, space.nodes, rows), stress))
 
@@ -247,14 +246,18 @@ def nodal_contact(problem: ContactProblem, state: State, status: Array) -> tuple
     order = np.argsort(np.abs(each), kind="stable")
     pressure[blocks[order], 0] = each[order]
     np.maximum.at(highest[:, 0], blocks, status)
-    known = highest[:, 0] > 0
-    return between(space, pressure, known), between(space, highest, known, np.min)
+    return between(problem, pressure), between(problem, highest, np.min)
 
 
-def between(space: NodalSpace, nodal: Array, known: Mask, mean: Any = np.mean) -> Array:
-    """Return nodal values (k, c), those of mid-points from the known ends of their edges where conditions are those of
-    vertices only. Collective."""
-    return nodal if space.hierarchy is None else space.hierarchy.between(nodal, known, mean)
+def between(problem: ContactProblem, nodal: Array, mean: Any = np.mean) -> Array:
+    """Return nodal values (k, c), where conditions are those of vertices only with those of the mid-points of contact
+    facets: linear from end to end, zero at ends without a condition, so that ∫ p = sum r_n. Collective."""
+    space = cast(NodalSpace, problem.system.space)
+    if space.hierarchy is None:
+        return nodal
+    own = [part.nodes.numbers for one in getattr(problem.surface, "parts", ()) for part in one.bubbles]
+    middles = np.concatenate(from_each(space.comm, np.concatenate([np.zeros(0, dtype=np.int64), *own])))
+    return space.hierarchy.between(nodal, np.isin(space.nodes, middles), mean)
 
 
 def slipped(report: Report) -> Mask:

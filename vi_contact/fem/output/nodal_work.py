@@ -18,8 +18,9 @@ from ...core.algebra import Array, Mask
 from ...core.checks import array, instance, optional
 from ...core.errors import InputError
 from ...core.problem import ContactProblem
-from ...core.step import Report, State
+from ...core.step import Balance, Report, State
 from .. import compat
+from ..contact.surface import moved_by_held
 from ..groups import facets_of
 from ..linear_forms import AnyLoad, LinearForm, Loads
 from ..loads import BodyForce, Traction, as_tuple, evaluate
@@ -97,10 +98,14 @@ class NodalWork:
         densities = [(ours.cellwise(name), None) if ours.densities else None for name in ("alpha_rho", "rho")]
         densities += [(ours.section.thickness, load) for load in self._loads]
         rows: list[list[Any]] = [[] for _ in forms]
+        moved = [moved_by_held(self.space, made)] if (made := getattr(self._problem.surface, "parts", ())) else []
+        self._direct: list[tuple[Array, Array]] = []  # how far each motion of held nodes moves obstacles
         for where, centre, cells, beyond in parts:
             self._inside.x.array[:] = 1.0 if cells is None else cells
             less = [beyond and beyond(*density) for density in densities]  # type: ignore[misc]
+            straight = self.space.held & where & (cells is None or self.space.hierarchy is not None)
             for k, motion in enumerate(rigid_motions(self.space.points, centre)):
+                self._direct += [one(np.where(straight, motion, 0.0)) for one in moved]
                 self._r.x.array[: motion.size] = np.where(where, motion, 0.0).ravel()
                 self._r.x.scatter_forward()
                 self.space.forms.follow(self._r)
@@ -118,7 +123,7 @@ class NodalWork:
         """Return the work of a state without acceleration, (count,): a static one, or the start of a run."""
         problem, space, t = self._problem, self.space, state.t
         motion = [space.expand(problem.cartesian(x), t, k) for k, x in enumerate((state.u, state.v))]
-        return self._sum([*motion, np.zeros_like(motion[0]) - self._gravity], lambda one: one(t))
+        return self._sum([*motion, np.zeros_like(motion[0]) - self._gravity], lambda one: one(t), state)
 
     def of_step(self, report: Report) -> Array:
         """Return the work in a step's equation of motion (``Report.balance``), with absolute accelerations, (count,).
@@ -137,7 +142,7 @@ class NodalWork:
             free = problem.cartesian(x)
             motion.append(between(partial(space.expand, free, derivative=k)) if moves else space.expand(free, t1, k))
         motion[2] = motion[2] + between(problem.ground_acceleration) - self._gravity
-        return self._sum(motion, between)
+        return self._sum(motion, between, balance)
 
     def _place(self, report: Report) -> float:
         """w of u = (1 - w) u_old + w u_new; the end where nothing moved."""
@@ -145,9 +150,11 @@ class NodalWork:
         both, square = self.space.comm.sum(np.array([here @ way, way @ way]))
         return float(min(max(both / square, 0.0), 1.0)) if square > 0.0 else 1.0
 
-    def _sum(self, motion: Sequence[Array], at: Callable[[Callable[[float], Any]], Any]) -> Array:
-        """The numbers for nodal u, v, a (owned, d); ``at`` evaluates functions of time."""
-        total = np.zeros(self._count)
+    def _sum(self, motion: Sequence[Array], at: Callable[..., Any], contact: State | Balance) -> Array:
+        """The numbers for nodal u, v, a (owned, d), less contact forces on held ones; ``at`` evaluates functions."""
+        total, r_t = np.zeros(self._count), 0.0 if contact.r_t is None else contact.r_t
+        for k, (towards, along) in enumerate(self._direct):
+            total[k] = towards @ contact.r_n - np.sum(along * r_t)
         for matrix, x in zip(self._matrices, motion, strict=False):
             if matrix is not None:
                 total += matrix @ x.ravel()

@@ -26,13 +26,14 @@ class Reactions:
         R = (K u + C v + M (a + r a_g) - f)_c
 
     On held components they are rows of the equation of motion that the elimination of prescribed displacements took
-    out; at nodes with dashpots what these and the waves that come in (CompliantBase, FreeField) do to the elements, and
-    contact if there is any at these nodes. Nodes that two boundaries share count in both. In the relative frame
-    the inertia load of the ground motion is M r a_g, of the held nodes too, so that R is the same force as with the
-    ground moved by ``Prescribed``, and balances all masses, loads and contact forces of the body (with
-    ``base_inertia=True``, the default of ``assemble``; K, C, M are those of the elements, whatever a time scheme does
-    to the mass of contact nodes). Values are those of the step's equation of motion, its mean or end, as the contact
-    reactions are; row 0 is that of the initial state at rest.
+    out, less contact forces (on a prescribed side 2 of a pair and on edges of P2 tetrahedra); at nodes with dashpots
+    what these and the waves that come in (CompliantBase, FreeField) do to the elements, and contact if there is any at
+    these nodes. Nodes that two boundaries share count in both. In the relative frame the inertia load of the ground
+    motion is M r a_g, of the held nodes too, so that R is the same force as with the ground moved by ``Prescribed``,
+    and balances all masses, loads and contact forces of the body (with ``base_inertia=True``, the default of
+    ``assemble``; K, C, M are those of the elements, whatever a time scheme does to the mass of contact nodes). Values
+    are those of the step's equation of motion, its mean or end, as the contact reactions are; row 0 is that of the
+    initial state at rest.
 
     Columns reaction_x_<name>, reaction_y_<name>, …: the force on the body; reaction_M_<name> about the centre,
     anticlockwise positive (reaction_M_x_<name>, … in three dimensions). Base shear is reaction_x, the overturning

@@ -55,9 +55,9 @@ class SectionForces:
     A cut may run along element sides or, of P1 and Q1, through elements, at any inclination. F is minus the sum of the
     nodal forces K u + C v + M a - f (a absolute) of the cells on the cut at their nodes on one side, without inertia
     and loads of the parts of cells on this side: not integrated stresses, but the forces by which these elements are in
-    equilibrium, exact on any mesh for what acts on them. Contact forces act at nodes; those on nodes of the cut itself
-    belong to neither side and are left out. Values are those of the step's equation of motion, row 0 those of the
-    initial state at rest; per thickness of the section (plane strain: per metre).
+    equilibrium, exact on any mesh for what acts on them. Contact forces act at nodes; those on nodes of the cut itself,
+    of P2 tetrahedra on held ones too, belong to neither side and are left out. Values are those of the step's equation
+    of motion, row 0 those of the initial state at rest; per thickness of the section (plane strain: per metre).
 
     Args:
         cells: the group that is cut, the whole mesh when None: a cut of a wall with soil on both sides needs it.
@@ -157,7 +157,7 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
                          "other")
     sign = 1.0 if left >= right else -1.0
     away, at = level(space.points), (space.points - corners[0]) @ axes[1:].T
-    nodes = (sign * away < 0.0) | ((away == 0.0) & ((at >= -tol) & (at <= size + tol)).all(axis=1))
+    nodes = (sign * away < 0.0) & (space.degree < 2) | ((away == 0.0) & ((at >= -tol) & (at <= size + tol)).all(axis=1))
     crossed = inside & (level(x).max(axis=1) > 0.0) & (level(x).min(axis=1) < 0.0)
     if space.degree > 1 and space.comm.max(np.array([float(crossed.any())]))[0]:
         raise InputError(f"section '{name}' goes through cells of degree 2: let it follow their plane sides")
