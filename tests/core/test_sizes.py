@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from chain import chain_problem
 
-from vi_contact.core.algebra import SerialComm
+from vi_contact.core.algebra import SerialAlgebra, SerialComm
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.sizes import DENSE_ROWS, OWN_CONDITIONS, OWN_UNKNOWNS, small
@@ -36,7 +36,8 @@ def touching(m: int) -> ContactProblem:
 def rubbing(m: int) -> Any:
     """Points in space, as far as a count of their unknowns goes."""
     surface = replace(touching(m).surface, tangents=np.full((m, 2), -1))
-    return SimpleNamespace(frictional=True, friction=Coulomb(0.3), surface=surface)
+    system = SimpleNamespace(algebra=SerialAlgebra())
+    return SimpleNamespace(frictional=True, friction=Coulomb(0.3), surface=surface, system=system)
 
 
 def told(owner: str, rows: int) -> str:

@@ -149,7 +149,7 @@ def test_one_rank_is_late(comm: Any, shared_tmp: Path, clock: Clock) -> None:
 
 @serial
 def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    """Status 75 and one sentence; what is no wall time, and a case that keeps no checkpoint, are refused."""
+    """Status 75 and one sentence; what is no wall time is refused."""
     pytest.importorskip("dolfinx")
     monkeypatch.setattr("vi_contact.cli.entry.world", SerialComm)
     monkeypatch.setattr(watch, "age", Clock(300.0))
@@ -159,7 +159,6 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     assert said.out == "" and said.err.startswith("vi-contact: 0 s left of the wall time 0:05:00 ended the run after")
     assert said.err.count("\n") == 1
     assert main([*short, "--wall-time", "soon"]) == 1 and "none that Slurm reads" in capsys.readouterr().err
-    assert main(["run", "layer", "--wall-time", "5"]) == 1 and "keeps no checkpoint" in capsys.readouterr().err
 
 
 @serial
