@@ -152,3 +152,8 @@ def test_numbers_of_no_material_are_refused():
     for wrong in ({"rho": 1e300}, {"E": 1e101}, {"rho": 1e-200}):
         with pytest.raises(InputError, match="are of no material; give numbers between 1e-100 and 1e\\+100"):
             LinearElastic(**({"E": 1.0, "nu": 0.0, "rho": 1.0} | wrong))
+
+
+def test_functions_of_the_place_are_another_material() -> None:
+    with pytest.raises(InputError, match=r"numbers; give fem\.Heterogeneous\(E, nu, rho\)"):
+        LinearElastic(E=lambda x: 2.0e10 * (1.0 + x[0]), nu=0.3, rho=2400.0)  # type: ignore[arg-type]

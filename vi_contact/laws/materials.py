@@ -26,6 +26,9 @@ class LinearElastic:
     rho: float
 
     def __post_init__(self) -> None:
+        if any(callable(one) or hasattr(one, "ufl_shape") for one in (self.E, self.nu, self.rho)):
+            raise InputError("LinearElastic: E, nu and rho are numbers; give fem.Heterogeneous(E, nu, rho) where they "
+                             "change from place to place")
         number("LinearElastic", "Young's modulus E [Pa]", self.E, positive=True)
         number("LinearElastic", "Poisson's ratio nu", self.nu)
         number("LinearElastic", "the mass density rho [kg/m³]", self.rho, positive=True)
