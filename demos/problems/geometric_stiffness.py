@@ -17,15 +17,15 @@ from typing import Any
 
 import ufl
 
-from ..core.algebra import Array
-from ..core.problem import ContactProblem
-from ..core.state_checks import check_problem_given, check_sizes
-from ..core.step import State
-from ..core.system import Load, SemiDiscreteSystem
-from . import compat
-from .petsc_algebra import PetscMatrix
-from .quadrature import compiled
-from .space import FemSpace, known_matrices, space_of
+from vi_contact.core.algebra import Array
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.state_checks import check_problem_given, check_sizes
+from vi_contact.core.step import State
+from vi_contact.core.system import Load, SemiDiscreteSystem
+from vi_contact.fem import compat
+from vi_contact.fem.petsc_algebra import PetscMatrix
+from vi_contact.fem.quadrature import compiled
+from vi_contact.fem.space import FemSpace, known_matrices, space_of
 
 
 def geometric_stiffness(problem: ContactProblem, state: State) -> SemiDiscreteSystem:

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from demos.exact.housner import HousnerBlock
+from demos.problems.geometric_stiffness import geometric_stiffness
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.obstacles import HalfSpace
@@ -27,7 +28,6 @@ from vi_contact.core.protocols import Excitation
 from vi_contact.core.step import Columns, Report, Row, State
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
-from vi_contact.fem.initial_stress import geometric_stiffness
 from vi_contact.fem.loads import BodyForce, Prescribed
 from vi_contact.fem.mesh import build_mesh
 from vi_contact.laws.materials import Damping, LinearElastic, PlaneStress, Rayleigh
@@ -181,7 +181,7 @@ def build(block: RockingBlock, comm: Any) -> RockingModel:
     """Build mesh, gravity stage and second-order system of the block.
 
     The stresses are those of the block on its whole base: standing on its corners it pushes them apart, and the thrust
-    of the held base would be counted as weight (virial theorem, see ``fem.initial_stress``).
+    of the held base would be counted as weight (virial theorem, see ``geometric_stiffness``).
     """
     width, height, gravity = block.shape.width, block.shape.height, block.shape.gravity
     mesh, tags = build_mesh(BlockMesh(lengths=(width, height), divisions=block.divisions), comm)

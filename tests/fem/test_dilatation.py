@@ -11,9 +11,9 @@ from fem_problems import BODIES, block, linear, max_over_ranks, nodal
 from mpi4py import MPI
 
 import vi_contact as vc
+from demos.problems.geometric_stiffness import initial_stress_matrix
 from vi_contact import fem
 from vi_contact.core.errors import InputError
-from vi_contact.fem.initial_stress import initial_stress_matrix
 from vi_contact.fem.petsc_algebra import PetscMatrix, as_petsc
 from vi_contact.meshes.block import BlockMesh
 

@@ -14,6 +14,7 @@ from mesh_tools import refusal
 from mpi4py import MPI
 from own_meshes import OWN, at, own_mesh
 
+from demos.problems.geometric_stiffness import geometric_stiffness
 from vi_contact import fem
 from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
@@ -254,7 +255,7 @@ def test_stages_and_functions_beside_them():
         state = static_equilibrium(problems[0], tolerance=1e-9)
         assert problems[0].surface.everywhere(state.r_n).max() > 0.0
         u = fem.as_function(problems[0], state, "u")
-        stiffer = fem.geometric_stiffness(problems[0], state)
+        stiffer = geometric_stiffness(problems[0], state)
         return fem.release(problems[0], state, problems[1])[0].system.load(0.0), stiffer.load(0.0), u
 
     def moved(*components: int) -> fem.Prescribed:

@@ -13,6 +13,7 @@ from fem_problems import CONCRETE, block, dense, held_by, linear, max_over_ranks
 from mpi4py import MPI
 from standing import COLUMN, G, standing
 
+from demos.problems.geometric_stiffness import geometric_stiffness, initial_stress_matrix
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.obstacles import HalfSpace
@@ -20,7 +21,6 @@ from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import State
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
-from vi_contact.fem.initial_stress import geometric_stiffness, initial_stress_matrix
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.petsc_algebra import PetscMatrix
 from vi_contact.run.march import march

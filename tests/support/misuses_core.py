@@ -270,7 +270,6 @@ def of_the_mesh() -> Table:
         (vc.with_weight, {"system": b.system}, {"system": NEEDED, "acceleration": NUMBER,
                                                 "direction": but(VECTOR, "none") | {"long": (2.0, 0.0)}}),
         (engineering.lowest_frequency, {"system": b.system}, {"system": NEEDED, "max_iterations": COUNT}),
-        (fem.geometric_stiffness, {"problem": b.problem, "state": b.state}, {"problem": NEEDED, "state": states()}),
         (fem.release, {"static": b.problem, "state": b.state, "problem": b.problem},
          {"static": NEEDED, "problem": NEEDED, "state": states()}),
         (started, {"recorder": vc.Energy()}, {"recorder": {

@@ -21,6 +21,7 @@ from two_bodies import per_body, relative
 import vi_contact as vc
 from demos.exact.housner import HousnerBlock
 from demos.problems import rocking_block
+from demos.problems.geometric_stiffness import geometric_stiffness
 from vi_contact import fem
 from vi_contact.core.algebra import Array
 from vi_contact.core.step import State
@@ -96,7 +97,7 @@ def built(shape: RigidBlock, slab: bool, friction: bool = False) -> Model:
         return vc.ContactProblem(system, surface, **data)
 
     whole = problem(system)  # without friction: thrust of the base would be counted as weight
-    heavy = fem.geometric_stiffness(whole, vc.static_equilibrium(whole, solver=vc.Condensed()))
+    heavy = geometric_stiffness(whole, vc.static_equilibrium(whole, solver=vc.Condensed()))
     rough = {"friction": vc.Coulomb(1.0)} if friction else {}
     corners = problem(heavy, [turned(corner) for corner in shape.corners], **rough)
     return Model(shape, corners, vc.static_equilibrium(corners, solver=vc.Condensed()))

@@ -28,7 +28,6 @@ _CONTENTS = {
     "contact.surface": ("contact_surface",),
     "dashpots": ("CompliantBase", "Dashpots"),
     "heterogeneous": ("Heterogeneous",),
-    "initial_stress": ("geometric_stiffness",),
     "linear_forms": ("LinearForm",),
     "loads": ("BodyForce", "Prescribed", "TangentialTraction", "Traction"),
     "mesh": ("Cells", "Facets", "Tags", "build_mesh", "node_numbers", "read_mesh"),

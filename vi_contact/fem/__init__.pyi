@@ -9,7 +9,6 @@ from .contact.surface import contact_surface as contact_surface
 from .dashpots import CompliantBase as CompliantBase
 from .dashpots import Dashpots as Dashpots
 from .heterogeneous import Heterogeneous as Heterogeneous
-from .initial_stress import geometric_stiffness as geometric_stiffness
 from .linear_forms import LinearForm as LinearForm
 from .loads import BodyForce as BodyForce
 from .loads import Prescribed as Prescribed
@@ -31,4 +30,4 @@ from .petsc_system import system_from_matrices as system_from_matrices
 from .released_supports import release as release
 from .ties import Tied as Tied
 
-__all__: list[str] = ['BodyForce', 'Cells', 'CompliantBase', 'Dashpots', 'DualMortar', 'Facets', 'Forms', 'Heterogeneous', 'LinearForm', 'NodeToNode', 'Prescribed', 'Reactions', 'SectionForces', 'Tags', 'TangentialTraction', 'Tied', 'Traction', 'XDMF', 'as_function', 'assemble', 'build_mesh', 'contact_pair', 'contact_surface', 'geometric_stiffness', 'joined_surfaces', 'node_numbers', 'read_function', 'read_mesh', 'release', 'system_from_matrices']
+__all__: list[str] = ['BodyForce', 'Cells', 'CompliantBase', 'Dashpots', 'DualMortar', 'Facets', 'Forms', 'Heterogeneous', 'LinearForm', 'NodeToNode', 'Prescribed', 'Reactions', 'SectionForces', 'Tags', 'TangentialTraction', 'Tied', 'Traction', 'XDMF', 'as_function', 'assemble', 'build_mesh', 'contact_pair', 'contact_surface', 'joined_surfaces', 'node_numbers', 'read_function', 'read_mesh', 'release', 'system_from_matrices']
