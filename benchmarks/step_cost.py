@@ -38,6 +38,7 @@ from mpi4py import MPI  # noqa: E402
 from petsc4py import PETSc  # noqa: E402
 
 import vi_contact as vc  # noqa: E402
+from demos.problems import channel  # noqa: E402
 from vi_contact import fem  # noqa: E402
 from vi_contact.core import contact_last  # noqa: E402
 from vi_contact.core.algebra import EffectiveMatrix, SerialComm  # noqa: E402
@@ -46,7 +47,6 @@ from vi_contact.core.state_checks import initial_state  # noqa: E402
 from vi_contact.fem.petsc_algebra import PREFIX, PetscFactor  # noqa: E402
 from vi_contact.meshes.block import BlockMesh  # noqa: E402
 from vi_contact.meshes.channel import ChannelMesh  # noqa: E402
-from vi_contact.models.channel import model as channel  # noqa: E402
 from vi_contact.models.wall import Wall, build  # noqa: E402
 
 SCHEME = vc.ZienkiewiczWoodTaylor(phi=0.5)

@@ -5,37 +5,36 @@ base and right wall; the two bottom corners touch with both their sides.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from ...core.algebra import Array, Indices, Mask, from_each
-from ...core.errors import InputError
-from ...core.problem import ContactProblem
-from ...core.protocols import Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
-from ...core.step import Columns, Recorder, Report, Row, State
-from ...core.surfaces import ContactSurface
-from ...core.system import SemiDiscreteSystem
-from ...fem.assembly import assemble
-from ...fem.contact.frames import FemSurface
-from ...fem.contact.joined import joined_surfaces
-from ...fem.contact.pairs import contact_pair
-from ...fem.loads import Prescribed, as_tuple
-from ...fem.mesh import build_mesh
-from ...laws.excitation import Harmonic
-from ...laws.impact import ImpulseUpdate, Inelastic
-from ...laws.mass import ConsistentMass
-from ...laws.materials import Damping, LinearElastic, NoDamping, PlaneStrain
-from ...laws.weight import own_weight
-from ...meshes.channel import ChannelMesh
-from ...run.recorders import Contact, Energy, Probe
-from ...soil.moving_base import BaseMotion
-from ...solvers.volume.route import Volume
-from ...solvers.volume.snes import ReducedNewton
-from .ends import Sides
-from .sides import RockBelow, Rollers
+from demos.problems.channel_sides import RockBelow, Rollers, Sides
+from vi_contact.core.algebra import Array, Indices, Mask, from_each
+from vi_contact.core.errors import InputError
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.protocols import Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
+from vi_contact.core.step import Columns, Recorder, Report, Row, State
+from vi_contact.core.surfaces import ContactSurface
+from vi_contact.core.system import SemiDiscreteSystem
+from vi_contact.fem.assembly import assemble
+from vi_contact.fem.contact.frames import FemSurface
+from vi_contact.fem.contact.joined import joined_surfaces
+from vi_contact.fem.contact.pairs import contact_pair
+from vi_contact.fem.loads import Prescribed, as_tuple
+from vi_contact.fem.mesh import build_mesh
+from vi_contact.laws.excitation import Harmonic
+from vi_contact.laws.impact import ImpulseUpdate, Inelastic
+from vi_contact.laws.mass import ConsistentMass
+from vi_contact.laws.materials import Damping, LinearElastic, NoDamping, PlaneStrain
+from vi_contact.laws.weight import with_weight
+from vi_contact.meshes.channel import ChannelMesh
+from vi_contact.run.recorders import Contact, Energy, Probe
+from vi_contact.soil.moving_base import BaseMotion
+from vi_contact.solvers.volume.route import Volume
+from vi_contact.solvers.volume.snes import ReducedNewton
 
 REFERENCE = Volume(method=ReducedNewton(), petsc_options={"snes_linesearch_type": "l2"})
 """The volume route to compare with and to fall back on. Without a line search its active set runs in circles in some
@@ -218,6 +217,4 @@ def weighted(system: SemiDiscreteSystem, weighing: Sequence[str]) -> SemiDiscret
     for name in weighing:
         if name not in BODIES:
             raise InputError(f"unknown body '{name}': {' and '.join(BODIES)} may have weight")
-    heavy = np.isin(system.space.bodies, [BODIES.index(name) for name in weighing])
-    load = replace(system.load, constant=system.load.constant + np.where(heavy, own_weight(system), 0.0))
-    return system.changed(load=load)
+    return with_weight(system, bodies=[BODIES.index(name) for name in weighing])

@@ -2,23 +2,36 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from ...core.algebra import Array
-from ...core.checks import check_word
-from ...core.errors import InputError
-from ...core.protocols import Excitation
-from ...fem.dashpots import CompliantBase, Dashpots
-from ...fem.loads import Prescribed
-from ...fem.ties import Tied
-from ...laws.materials import LinearElastic
-from ...soil.free_field import FreeField
-from ...soil.moving_base import BaseMotion, base_motion
-from ...soil.upgoing_wave import upgoing
+from vi_contact.core.algebra import Array
+from vi_contact.core.checks import check_word
+from vi_contact.core.errors import InputError
+from vi_contact.core.protocols import Excitation
+from vi_contact.fem.dashpots import CompliantBase, Dashpots
+from vi_contact.fem.loads import Prescribed
+from vi_contact.fem.ties import Tied
+from vi_contact.laws.materials import LinearElastic
+from vi_contact.soil.free_field import FreeField
+from vi_contact.soil.moving_base import BaseMotion, base_motion
+from vi_contact.soil.upgoing_wave import upgoing
 
 ENDS = ("left_side", "right_side")
+
+
+class Sides(Protocol):
+    """Give the conditions at the layer's ends. ``firm``: they hold static loads; else see ``staged`` for gravity."""
+
+    @property
+    def firm(self) -> bool: ...
+
+    def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the arguments of fem.assemble, for the groups of a ChannelMesh.
+
+        ``motion``: displacement, velocity, acceleration of the bedrock as `Prescribed` takes them; empty in its frame.
+        """
 
 
 @dataclass(frozen=True)

@@ -79,9 +79,10 @@ WRONG: dict[str, dict[str, list[str]]] = {  # command -> option -> values; an op
     "run wall": STEP | {"--set model.case=": ["foo", "3"], "--set model.size=": [*SET, "1e-9"],
                         "--set model.divisions=": ["[0,1]", "[1.5,1]", "[1000000,1000000]"]},
     "run channel": STEP | {
-        "--set model.sides=": ["foo", '{type="foo"}'], "--set model.base=": ["foo", "3"], "--set model.size=": SET,
-        "--set model.rock=": ["{E=1,nu=0.6,rho=1}", "3"], "--set friction.mu=": ["0.3"],
-        "--set model.damping=": ['{type="Rayleigh",alpha=-1}', '{type="Rayleigh.from_frequencies",f1=nan}'],
+        "--set system.prescribed=": ["foo", '{type="foo"}'], "--set gravity.cells=": ["foo", "3"],
+        "--set mesh.size=": SET, "--set model.size=": SET, "--set model.sides=": ["foo", '{type="foo"}'],
+        "--set material.soil=": ["{E=1,nu=0.6,rho=1}", "3"], "--set friction.mu=": ["0.3"],
+        "--set system.damping=": ['{type="Rayleigh",alpha=-1}', '{type="Rayleigh.from_frequencies",f1=nan}'],
     },
     **{command: {"": ["", "--steps 3", "--out x", "--k 1 2", "--help", "--motion FILE --scale 2"]}
        for command in ("wall", "channel", "beam", "layer")},  # answered by the command that has taken their place

@@ -9,13 +9,13 @@ import pytest
 from fem_problems import CONCRETE, block, linear
 
 import vi_contact as vc
+from demos.problems.channel import Channel, build
 from vi_contact import engineering, fem, solvers
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.core.state_checks import initial_state
 from vi_contact.engineering.resultants import tangent_vectors
 from vi_contact.fem import compat
-from vi_contact.models.channel.model import Channel, build
 from vi_contact.soil.moving_base import base_motion
 
 WIDTH, HEIGHT = 0.5, 4.0

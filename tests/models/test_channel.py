@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-
 import numpy as np
 import pytest
 
@@ -13,15 +11,16 @@ from channel_runs import CHANNEL, DT, FRICTION, SCHEME, follow, model
 from mpi4py import MPI
 
 import vi_contact as vc
+from demos.problems.channel import BODIES, REFERENCE, Channel, SoilProbe, build, staged
+from demos.problems.channel_sides import DashpotSides, Fixed, FreeFieldSides, Rollers, TiedSides, bedrock
 from vi_contact import fem
 from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
 from vi_contact.core.units import STANDARD_GRAVITY
 from vi_contact.engineering import contact_summary
+from vi_contact.ground_motion import Record, read_record
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.meshes.extract import arrays_from_script
-from vi_contact.models.channel.model import BODIES, REFERENCE, Channel, SoilProbe, build, staged
-from vi_contact.models.channel.sides import DashpotSides, Fixed, Rollers, TiedSides
 from vi_contact.studies.cases.case import read_case
 from vi_contact.studies.cases.library import located
 from vi_contact.studies.cases.short_settings import ShortOptions
@@ -162,6 +161,17 @@ def test_who_weighs():
         build(CHANNEL, COMM, weighing=("water",))
 
 
+def test_bodies_of_a_cell_group():
+    """Numbers of whole bodies, the same on every rank; a group that shares nodes with other cells is none."""
+    one = model()
+    assert [fem.bodies_of(one.system, one.tags[name]) for name in BODIES] == [(0,), (1,)]
+    whole = fem.Cells.where("all", one.mesh, lambda x: np.isfinite(x[0]))
+    half = fem.Cells.where("half", one.mesh, lambda x: x[0] < 12.1)
+    assert fem.bodies_of(one.system, whole) == (0, 1)
+    with pytest.raises(InputError, match="the cell group 'half' is a part of a body, .* give a group of whole bodies"):
+        fem.bodies_of(one.system, half)
+
+
 def test_defaults_of_a_problem():
     """V4.2: a_g = 2 sin(2 pi 2 t), dt = 1/80 s, the inelastic rule as an M-orthogonal impulse on consistent mass."""
     problem = model().problem()
@@ -225,7 +235,7 @@ def test_other_meshes(name):
 def test_the_command(shared_tmp, capsys):
     """vi-contact run channel: histories and fields in the folder, the summary on rank 0."""
     damping = '{type="Rayleigh.from_frequencies", f1=1, f2=10, xi1=0.05, xi2=0.05}'
-    options = ["friction.type=Coulomb", "friction.mu=0.4", f"model.damping={damping}"]
+    options = ["friction.type=Coulomb", "friction.mu=0.4", f"system.damping={damping}"]
     command = ["run", "channel", *(word for one in options for word in ("--set", one)), "--steps", "10", "--quiet"]
     assert main([*command, "--out", str(shared_tmp)]) == 0
     text = capsys.readouterr().out
@@ -238,14 +248,14 @@ def test_the_command(shared_tmp, capsys):
 
 
 def test_the_case_that_ships_is_the_channel_of_the_figures():
-    """Shape, materials, harmonic and time step are those of the model, its reference that of the catalogue."""
+    """Shape, materials, points, harmonic and time step are those of the model, its reference that of the catalogue."""
     case = built_in()
     assert case.excitations() == (CHANNEL.harmonic(),)
     assert build_call(case.nodes["run"], {}) == {"dt": CHANNEL.time_step(), "steps": 400}
-    given = {key: build_call(node, {}) for key, node in case.nodes["model"].arguments.items()}
-    shape = {one.name: given.get(one.name) for one in fields(ChannelMesh) if one.name in given}
-    assert ChannelMesh(**shape) == CHANNEL.shape
-    assert (given["soil"], given["concrete"], given["damping"]) == (CHANNEL.soil, CHANNEL.concrete, CHANNEL.damping)
+    assert build_call(case.nodes["mesh"], {}) == CHANNEL.shape
+    assert build_call(case.nodes["material"], {}) == {"channel": CHANNEL.concrete, "soil": CHANNEL.soil}
+    assert build_call(case.nodes["system"].arguments["damping"], {}) == CHANNEL.damping
+    assert build_call(case.nodes["record"], {})[2].points == CHANNEL.probes()
     assert build_call(case.nodes["escalation"], {})[0] == REFERENCE
     impact = build_call(case.nodes["impact"], {})
     assert isinstance(impact, vc.Inelastic) and isinstance(impact.update, vc.ImpulseUpdate)
@@ -257,44 +267,75 @@ def built_in(*given, **short):
     return read_case(path, ShortOptions(**short).settings(read_toml(path), given))
 
 
-WEIGHING = ("fields=", 'model.weighing=["channel","soil"]')
+def on_base(base, ends, shaking, *, dt, steps, weighing=BODIES, rock=None, hht=False):
+    """(problem, history) on this base, from rest under the weight of these bodies; released where ends hold none."""
+    bottom = bedrock(base, shaking, dt=dt, rock=rock)
+    sides = FreeFieldSides(bottom or shaking) if ends is FreeFieldSides else ends()
+    one, firm = staged(CHANNEL, COMM, sides=sides, weighing=weighing, base=bottom)
+    rule = {"impact": None} if hht else {}
+    problem = one.problem(excitation=shaking if bottom is None else (), **rule)
+    static = problem if firm is None else firm.problem(excitation=(), **rule)
+    start = vc.static_equilibrium(static, solver=vc.Condensed())
+    problem, start = (problem, start) if firm is None else fem.release(static, start, problem)
+    solution = vc.simulate(problem, scheme=vc.HHT() if hht else SCHEME, solver=vc.Condensed(), dt=dt, steps=steps,
+                           state=start, record=one.recorders(), progress=False)
+    return problem, solution.history
 
 
 @serial
-@pytest.mark.parametrize("sides, scheme", [(None, "HHT"), ("FreeFieldSides", None), ("DashpotSides", None)])
-def test_a_moved_bedrock_from_options(tmp_path, sides, scheme):
-    """model.base prescribed: the same contact forces, with records in both directions, whatever the sides."""
-    t = 0.01 * np.arange(31)
-    record = tmp_path / "record.txt"
-    record.write_text("".join(f"{a:.4f} {b:.9e}\n" for a, b in zip(t, np.sin(20.0 * t), strict=True)))
+@pytest.mark.parametrize("ends, hht", [(TiedSides, True), (FreeFieldSides, False), (DashpotSides, False)])
+def test_a_moved_bedrock(ends, hht):
+    """Base "prescribed": the same contact forces, with records in both directions, whatever the sides."""
+    record = Record(np.sin(20.0 * 0.01 * np.arange(31)), 0.01)
+    shaking = tuple(vc.GroundMotion(record, direction=way) for way in ((1.0, 0.0), (0.0, 1.0)))
     found = []
     for base in ("relative", "prescribed"):
-        given = [f"model.base={base}", *WEIGHING, *(f"excitation.{k}.record.units=m/s2" for k in (1, 2))]
-        given += [f"model.sides.type={sides}"] if sides else []
-        case = built_in(*given, motion=f"{record},{record}", dt=0.01, steps=20, scheme=scheme)
-        problem = case.problem(COMM)
+        problem, history = on_base(base, ends, shaking, dt=0.01, steps=20, hht=hht)
         assert len(problem.excitations) == (2 if base == "relative" else 0)
-        assert problem.system.space.tied.any() == (sides is None)  # tied sides with a vertical record
-        found.append(np.asarray(case.run(COMM, progress=False).history["pressure"]))
-    same_dashpots = sides != "DashpotSides"  # these resist the velocity they see: another problem in another frame
+        assert problem.system.space.tied.any() == (ends is TiedSides)
+        found.append(np.asarray(history["pressure"]))
+    same_dashpots = ends is not DashpotSides  # these resist the velocity they see: another problem in another frame
     assert (np.abs(found[0] - found[1]).max() < 1e-8 * found[0].max()) == same_dashpots
     assert np.abs(found[0] - found[0][0]).max() > 0.1 * found[0].max()
 
 
 @serial
-@pytest.mark.parametrize("sides", ["TiedSides", "FreeFieldSides"])
-def test_waves_from_below_from_options(sides):
-    """model.base compliant: at rest without waves, on what the released bedrock carried; with waves stiff rock brings
+def test_a_vertical_record_ties_the_ends_of_the_case(tmp_path):
+    """--motion H,V on the case that ships: rollers would hold what shakes upwards; one record leaves them alone."""
+    record = tmp_path / "record.txt"
+    record.write_text("".join(f"{0.01 * k:.2f} {np.sin(0.2 * k):.9e}\n" for k in range(31)))
+    units = [f"excitation.{k}.record.units=m/s2" for k in (1, 2)]
+    both = built_in("fields=", "gravity.cells=", *units, motion=f"{record},{record}", dt=0.01, steps=20, scheme="HHT")
+    problem = both.problem(COMM)
+    assert len(problem.excitations) == 2 and problem.impact is None and problem.system.space.tied.any()
+    shaking = tuple(vc.GroundMotion(read_record(record, "m/s2"), direction=way) for way in ((1.0, 0.0), (0.0, 1.0)))
+    _, expected = on_base("relative", TiedSides, shaking, dt=0.01, steps=20, hht=True)
+    pressure = np.asarray(both.run(COMM, progress=False).history["pressure"])
+    assert np.abs(pressure - expected["pressure"]).max() < 1e-10 * np.abs(pressure).max()
+    assert not built_in(units[0], motion=f"{record}", dt=0.01).problem(COMM).system.space.tied.any()
+
+
+@serial
+@pytest.mark.parametrize("ends", [TiedSides, FreeFieldSides])
+def test_waves_from_below(ends):
+    """Base "compliant": at rest without waves, on what the released bedrock carried; with waves stiff rock brings
     nearly the motion of a rigid base, whose acceleration is that of the outcrop."""
-    ends = f"model.sides.type={sides}"
-    history = built_in(ends, *WEIGHING, "model.base=compliant", scale=0.0, steps=20).run(COMM, progress=False).history
+    _, history = on_base("compliant", ends, (CHANNEL.harmonic(0.0),), dt=DT, steps=20)
     size = np.abs(history["u_y_1"]).max()
     assert max(np.ptp(history[name]) for name in ("u_x_1", "u_y_1", "u_x_13")) < 1e-10 * size
     opening = []
-    for more in ((), ("model.base=compliant", "model.rock={E=2e14, nu=0.25, rho=2400}")):
-        solution = built_in(ends, "fields=", *more, dt=0.005, steps=60).run(COMM, progress=False)
-        opening.append(solution.history["opening_left"])
+    for base, rock in (("relative", None), ("compliant", vc.LinearElastic(E=2e14, nu=0.25, rho=2400.0))):
+        _, history = on_base(base, ends, (CHANNEL.harmonic(),), dt=0.005, steps=60, weighing=("channel",), rock=rock)
+        opening.append(history["opening_left"])
     assert np.abs(opening[1] - opening[0]).max() < 0.03 * opening[0].max()
+
+
+@serial
+def test_no_such_base():
+    with pytest.raises(InputError, match="unknown base 'free': choose one of relative, prescribed, compliant"):
+        bedrock("free", (), dt=None)
+    with pytest.raises(InputError, match="rock is what is under a compliant base"):
+        bedrock("relative", (), dt=None, rock=CHANNEL.concrete)
 
 
 def test_at_rest_before_the_shaking():
@@ -314,12 +355,14 @@ def test_at_rest_before_the_shaking():
     [
         ("friction.mu=0.3", r"\[friction\] has no type"),
         ("friction.type=Coulomb", "lacks 'mu', which Coulomb needs"),
-        ("model.sides.type=walls", "unknown type 'walls': .*Rollers"),
-        ('model.weighing=["moon"]', "unknown body 'moon': channel and soil may have weight"),
-        ("model.base=free", "unknown base 'free': choose one of relative, prescribed, compliant"),
-        ("model.rock={E=2e10, nu=0.2, rho=2400}", "rock is what is under a compliant base"),
-        ("model.wide=3", "unknown key 'wide' for Channel: did you mean width"),
-        ("model.size=-1", "size is -1.0; give a finite number"),
+        ("gravity.cells=moon", r"\[gravity\] cells is 'moon', but the mesh has no group 'moon'"),
+        ("gravity.cells=bedrock", "a boundary group: give the name of a cell group"),
+        ("mesh.wide=3", "unknown key 'wide' for ChannelMesh: did you mean width"),
+        ("mesh.size=-1", "size is -1.0; give a finite number"),
+        ("model.size=0.25", r"\[model\] size was of the model Channel, which is retired: give mesh.size of the case"),
+        ("model.weighing=[]", "give gravity.cells of the case 'channel', .*builtin/channel.toml"),
+        ("model.held=true", r"give held in each \[\[contact\]\]"),
+        ("model.sides.type=FreeFieldSides", r"give clamped, prescribed, tied and dashpots in \[system\]"),
     ],
 )
 def test_wrong_options(wrong, sentence):
@@ -328,9 +371,12 @@ def test_wrong_options(wrong, sentence):
 
 
 @serial
-def test_shape_as_a_table_or_as_keys():
-    """Keys of the mesh stand in the model or in its shape, and those in the model count."""
-    one, two = (built_in(*given).problem(COMM).system.space.unknowns for given in (
-        ("model.size=1",), ("model.size=", "model.shape={size=1.0}")))
-    three = built_in("model.shape={size=0.5}", "model.size=1").problem(COMM).system.space.unknowns
-    assert one == two == three < model().system.space.unknowns
+def test_the_case_held_and_on_another_mesh():
+    """Keys of the mesh and of its contact: the linear comparison is that of the model."""
+    coarse = build(Channel(ChannelMesh(size=1.0)), COMM)
+    held = [f"contact.{k}.held=true" for k in (1, 2, 3)]
+    problem = built_in("mesh.size=1", *held).problem(COMM)
+    assert problem.system.space.unknowns == coarse.system.space.unknowns < model().system.space.unknowns
+    other = coarse.problem(bilateral=True).surface
+    assert problem.surface.bilateral.all() and np.array_equal(problem.surface.gap0, other.gap0)
+    assert np.array_equal(problem.surface.points, other.points)

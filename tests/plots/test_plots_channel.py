@@ -25,10 +25,10 @@ from demos.pictures.channel_interface import (
     plot_rocking,
 )
 from demos.pictures.channel_mesh import animate, read_bodies
+from demos.problems.channel import Channel, ChannelModel, build
 from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.channel import ChannelMesh
-from vi_contact.models.channel.model import Channel, ChannelModel, build
 from vi_contact.plots.run_pictures import draw_run
 from vi_contact.run.files.reading import read_run
 from vi_contact.run.static import static_equilibrium

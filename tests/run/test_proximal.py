@@ -11,6 +11,7 @@ from chain import chain_problem
 from fem_problems import CONCRETE, block, linear
 from mpi4py import MPI
 
+from demos.problems.channel import Channel, build
 from vi_contact.core.algebra import EffectiveMatrix
 from vi_contact.core.certificate import Certificate
 from vi_contact.core.errors import InputError, StepFailure
@@ -29,7 +30,6 @@ from vi_contact.laws.materials import LinearElastic
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.meshes.two_blocks import Blocks
-from vi_contact.models.channel.model import Channel, build
 from vi_contact.run.proximal import Proximal
 from vi_contact.run.rigid_bodies import RigidBodies
 from vi_contact.run.static import static_equilibrium

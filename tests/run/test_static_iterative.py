@@ -13,6 +13,7 @@ from mpi4py import MPI
 from standing import standing
 
 import vi_contact as vc
+from demos.problems.channel import Channel, build
 from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.core.obstacles import HalfSpace
@@ -20,7 +21,6 @@ from vi_contact.fem.mesh import build_mesh
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.channel import ChannelMesh
 from vi_contact.meshes.two_blocks import Blocks
-from vi_contact.models.channel.model import Channel, build
 from vi_contact.solvers.iterative.route import Iterative, PreparedIterative
 
 COMM = MPI.COMM_WORLD

@@ -26,7 +26,8 @@ from vi_contact.models.wall import Wall, build
 from vi_contact.soil import FreeField, upgoing
 from vi_contact.solvers.friction.problem import FrictionMethod
 from vi_contact.studies import Case, read_case
-from vi_contact.studies.cases.short_settings import REFERENCE, ShortOptions
+from vi_contact.studies.cases.library import located
+from vi_contact.studies.cases.short_settings import REFERENCE, ROLLERS, ShortOptions
 from vi_contact.studies.cases.toml_file import with_settings
 from vi_contact.studies.cases.vocabulary import names_of, words
 
@@ -211,12 +212,18 @@ def test_a_model_by_its_name(shared_tmp: Path) -> None:
     assert_same(found.history, expected.history)
 
 
-def test_the_channel_by_its_name(shared_tmp: Path) -> None:
-    """Tables in tables: mesh and sides of the channel; its own recorders, its weight and static stage."""
-    text = MODEL.replace('type = "Wall"\ncase = "a"\nthickness = 0.3', 'type = "Channel"\nsides = {type = "Rollers"}\n'
-                         "shape = {size = 1.0, wall = 1.0, slab = 1.0}").replace("steps = 30", "steps = 2")
-    history = read_case(write(shared_tmp, text)).run(COMM, progress=False).history
+def test_the_channel_with_a_recorder_of_its_demo(shared_tmp: Path) -> None:
+    """Keys of its mesh; a recorder that stands with the demo, its weight and static stage; its model is retired."""
+    text = located("channel").read_text("utf-8") + (
+        '\n[[record]]\ntype = "demos.problems.channel:SoilProbe"\npoints = {1_soil = [10.0, 5.0]}\n')
+    path = write(shared_tmp, text)
+    given = ("mesh.size=1.0", "mesh.wall=1.0", "mesh.slab=1.0", "run.steps=2", "fields=")
+    history = read_case(path, given, allow=("demos",)).run(COMM, progress=False).history
     assert history["contact_resultant"][0] > 0.0 and "u_x_1_soil" in history
+    old = MODEL.replace('type = "Wall"\ncase = "a"\nthickness = 0.3', 'type = "Channel"')
+    retired = write(shared_tmp, old, "old.toml")
+    with pytest.raises(InputError, match=r"\[model\] type was of the model Channel, which is retired: give the tables"):
+        read_case(retired)
 
 
 GROUND = """
@@ -292,6 +299,10 @@ def test_weight_is_the_body_force_of_the_density(comm: Any) -> None:
     for direction, components in (((0.0, 2.0), 2), ((1.0,), 2)):
         with pytest.raises(InputError, match=f"direction .* give {components} components of a vector of length one"):
             vc.with_weight(system, direction=direction)
+    assert not vc.with_weight(system, bodies=()).load(0.0).any()
+    assert np.array_equal(vc.with_weight(system, bodies=[0]).load(0.0), vc.with_weight(system).load(0.0))
+    with pytest.raises(InputError, match="the number of a body is 1; give a whole number of at least 0 and at most 0"):
+        vc.with_weight(system, bodies=[1])
     bare = fem.assemble(mesh, material, clamped=tags["bottom"], base_inertia=False)
     with pytest.raises(InputError, match="assemble with base_inertia=True"):
         vc.with_weight(bare)
@@ -422,7 +433,7 @@ def test_settings() -> None:
 def test_short_options_are_settings() -> None:
     """What replaces comes before --set, what acts on the result after it; KEY= takes a key away."""
     tables = {"excitation": [{"type": "Harmonic", "amplitude": 2.0, "direction": [1.0, 0.0]}], "impact": {"type": "X"},
-              "run": {"dt": 0.1, "t_end": 1.0}, "model": {"type": "Channel"}}
+              "run": {"dt": 0.1, "t_end": 1.0}, "system": {"prescribed": ROLLERS}}
     given = ["excitation.1.amplitude=3", "run.dt=0.2"]
     short = ShortOptions(scale=2.0, dt=0.5, steps=7, scheme="Newmark", solver="Hildreth", cross_check=True)
     made = with_settings(tables, short.settings(tables, given))
@@ -435,7 +446,8 @@ def test_short_options_are_settings() -> None:
     assert [one["direction"] for one in shaken["excitation"]] == [[1.0, 0.0], [0.0, 1.0]]
     assert [one["scale"] for one in shaken["excitation"]] == [3.0, 3.0] and shaken["run"] == {"dt": 0.1}
     assert shaken["excitation"][1]["record"] == {"path": str(Path("v.at2").absolute())}
-    assert shaken["model"]["sides"] == {"type": "TiedSides"} and tables["run"]["t_end"] == 1.0
+    assert shaken["system"] == {"tied": {"first": "left_side", "second": "right_side"}}
+    assert tables["run"]["t_end"] == 1.0
     for wrong, said in (
         (ShortOptions(scale=2.0), "nothing shakes it"), (ShortOptions(motion="a,b,c"), "give FILE, or FILE,FILE"),
     ):

@@ -268,7 +268,10 @@ def of_the_mesh() -> Table:
         (fem.read_mesh, {"path": "wall.msh", "comm": MPI.COMM_SELF}, {"path": {"none": None, "number": 3},
          "comm": NEEDED}),
         (vc.with_weight, {"system": b.system}, {"system": NEEDED, "acceleration": NUMBER,
-                                                "direction": but(VECTOR, "none") | {"long": (2.0, 0.0)}}),
+                                                "direction": but(VECTOR, "none") | {"long": (2.0, 0.0)},
+                                                "bodies": {"number": 1, "text": "soil", "unknown": (7,)}}),
+        (fem.bodies_of, {"system": b.system, "cells": fem.Cells("all", np.arange(16), b.mesh)}, {
+            "system": NEEDED, "cells": groups(cells=True)}),
         (engineering.lowest_frequency, {"system": b.system}, {"system": NEEDED, "max_iterations": COUNT}),
         (fem.release, {"static": b.problem, "state": b.state, "problem": b.problem},
          {"static": NEEDED, "problem": NEEDED, "state": states()}),

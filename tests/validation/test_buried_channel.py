@@ -15,8 +15,8 @@ import pytest
 from channel_runs import CHANNEL, DT, EXACT, FRICTION, SCHEME, follow, model, moved, shaken
 
 import vi_contact as vc
+from demos.problems.channel import REFERENCE
 from vi_contact.core.algebra import Array
-from vi_contact.models.channel.model import REFERENCE
 
 pytestmark = pytest.mark.serial  # whole runs; test_channel.py shows that ranks do not matter
 

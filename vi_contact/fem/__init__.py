@@ -38,6 +38,7 @@ _CONTENTS = {
     "output.section_forces": ("SectionForces",),
     "petsc_system": ("system_from_matrices",),
     "released_supports": ("release",),
+    "space": ("bodies_of",),
     "ties": ("Tied",),
 }
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -28,6 +28,7 @@ from .output.reactions import Reactions as Reactions
 from .output.section_forces import SectionForces as SectionForces
 from .petsc_system import system_from_matrices as system_from_matrices
 from .released_supports import release as release
+from .space import bodies_of as bodies_of
 from .ties import Tied as Tied
 
-__all__: list[str] = ['BodyForce', 'Cells', 'CompliantBase', 'Dashpots', 'DualMortar', 'Facets', 'Forms', 'Heterogeneous', 'LinearForm', 'NodeToNode', 'Prescribed', 'Reactions', 'SectionForces', 'Tags', 'TangentialTraction', 'Tied', 'Traction', 'XDMF', 'as_function', 'assemble', 'build_mesh', 'contact_pair', 'contact_surface', 'joined_surfaces', 'node_numbers', 'read_function', 'read_mesh', 'release', 'system_from_matrices']
+__all__: list[str] = ['BodyForce', 'Cells', 'CompliantBase', 'Dashpots', 'DualMortar', 'Facets', 'Forms', 'Heterogeneous', 'LinearForm', 'NodeToNode', 'Prescribed', 'Reactions', 'SectionForces', 'Tags', 'TangentialTraction', 'Tied', 'Traction', 'XDMF', 'as_function', 'assemble', 'bodies_of', 'build_mesh', 'contact_pair', 'contact_surface', 'joined_surfaces', 'node_numbers', 'read_function', 'read_mesh', 'release', 'system_from_matrices']

@@ -9,16 +9,17 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
-from ..core.algebra import Array, Indices, Mask, total
+from ..core.algebra import Array, Indices, Mask, from_each, total
 from ..core.checks import instance, refuse
 from ..core.errors import InputError
 from ..core.system import SemiDiscreteSystem
 from . import compat
 from .communicators import MpiComm, kept
 from .dirichlet import GivenValues
+from .groups import cells_of
 from .hierarchical import Hierarchy, needs_hierarchy
 from .loads import Prescribed
-from .mesh import Facets, node_numbers
+from .mesh import Cells, Facets, node_numbers
 from .nodal_space import NodalSpace, bounding_box, parts_of
 from .numbering import facet_rows, numbered
 from .petsc_algebra import PetscAlgebra, PetscMatrix, triple_product
@@ -44,6 +45,22 @@ def space_of(owner: str, system: Any) -> "FemSpace":
     if not isinstance(system.space, FemSpace) or system.space.forms is None:
         raise InputError(f"{owner} needs a system made by fem.assemble")
     return system.space
+
+
+def bodies_of(system: SemiDiscreteSystem, cells: Cells) -> tuple[int, ...]:
+    """Return the numbers of the bodies that a cell group is, parts of the mesh that share no node. Collective.
+
+    They are those of ``with_weight(system, bodies=…)``. InputError for a group that is only a part of a body.
+    """
+    space = space_of("bodies_of", system)
+    cells_of("bodies_of", "cells", cells, space.mesh)
+    body = body_numbers(space.mesh)[compat.geometry_dofmap(space.mesh)[:, 0]]
+    inside = np.isin(np.arange(len(body)), cells.indices)
+    mine, rest = (np.unique(np.concatenate(from_each(space.comm, body[part]))) for part in (inside, ~inside))
+    if np.isin(mine, rest).any():
+        raise InputError(f"bodies_of: the cell group '{cells.name}' is a part of a body, and shares nodes with other "
+                         "cells; give a group of whole bodies")
+    return tuple(mine.tolist())
 
 
 def known_matrices(owner: str, system: SemiDiscreteSystem, names: str) -> None:

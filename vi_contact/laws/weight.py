@@ -1,25 +1,35 @@
 """Make the weight of a body a load on its unknowns."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ..core.algebra import Array
-from ..core.checks import array, instance, number
+from ..core.checks import array, instance, number, several, whole
 from ..core.errors import InputError
 from ..core.system import SemiDiscreteSystem
 from ..core.units import STANDARD_GRAVITY
+from .free_motions import bodies_in
 
 
 def with_weight(
-    system: SemiDiscreteSystem, *, acceleration: float = STANDARD_GRAVITY, direction: tuple[float, ...] | None = None
+    system: SemiDiscreteSystem, *, acceleration: float = STANDARD_GRAVITY, direction: tuple[float, ...] | None = None,
+    bodies: Sequence[int] | None = None,
 ) -> SemiDiscreteSystem:
     """Return the same system under its own weight, f + M r g: whatever its materials and densities.
 
     acceleration: g [m/s²]; direction: where it acts, of length one, (0, -1) or (0, 0, -1) by default, in one dimension
-    (-1,). It is the load of ``BodyForce`` with the density of every material. InputError as for ``own_weight``.
+    (-1,). bodies: the numbers of those that have weight (``fem.bodies_of``), all by default. It is the load of
+    ``BodyForce`` with the density of every material. InputError as for ``own_weight``.
     """
     weight = own_weight(system, acceleration, direction)  # first: it checks what is given
+    if bodies is not None:
+        numbers = np.asarray(system.space.bodies)
+        last = bodies_in(system.algebra.comm, numbers) - 1
+        given = several("with_weight", "bodies", bodies, "give numbers such as fem.bodies_of returns, or None")
+        heavy = [whole("with_weight", "the number of a body", one, most=last) for one in given]
+        weight = np.where(np.isin(numbers, heavy), weight, 0.0)
     return system.changed(load=replace(system.load, constant=system.load.constant + weight))
 
 

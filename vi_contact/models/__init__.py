@@ -11,5 +11,5 @@ Problems of single demos stand in ``demos/problems``.
 
 from ..core.lazy import lazy
 
-_CONTENTS = {"channel": (), "wall": ()}  # modules that are handed on whole
+_CONTENTS = {"wall": ()}  # modules that are handed on whole
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

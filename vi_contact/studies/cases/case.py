@@ -26,10 +26,8 @@ from ...core.surfaces import ContactSurface, empty_surface
 from ...fem.assembly import assemble
 from ...fem.contact.joined import joined_surfaces
 from ...fem.mesh import Tags, build_mesh, read_mesh
-from ...fem.released_supports import release
 from ...laws.materials import LinearElastic
 from ...laws.orthotropic import Orthotropic
-from ...laws.weight import with_weight
 from ...meshes.gmsh_session import MeshScript
 from ...run.cross_check import CrossChecked
 from ...run.files.folder import locked, run_folder
@@ -39,12 +37,12 @@ from ...run.recorders import Contact, Energy, Steps
 from ...run.simulate import Solution, simulate
 from ...run.time_steps import step_plan
 from ...solvers.automatic import Automatic
-from .library import base_folder, check_format, keep_copy, refuse_retired
+from .library import base_folder, check_format, keep_copy, refuse_retired, refuse_retired_model
 from .own_classes import packages
 from .parsing import Words, arguments, nearest, read
 from .table_calls import Call, Callee, Group, Node, Spot, build, callee, needs_body, nodes_in
 from .toml_file import read_toml, with_settings
-from .vocabulary import MeshFile, Parts, words
+from .vocabulary import MeshFile, Parts, weight, words
 
 _TABLES: dict[str, Any] = {  # in the order in which they are read: type of what a table makes, or the one call it is
     "title": str,
@@ -53,7 +51,7 @@ _TABLES: dict[str, Any] = {  # in the order in which they are read: type of what
     "material": Mapping[str, LinearElastic | Orthotropic],
     "system": callee(assemble),
     "contact": ContactSurface | Sequence[ContactSurface],
-    "gravity": callee(with_weight),
+    "gravity": callee(weight, name="with_weight"),
     "friction": FrictionLaw,
     "impact": ImpactLaw,
     "mass": MassLaw,
@@ -188,11 +186,11 @@ class Case:
     def parts(self, comm: Any) -> Parts:
         """Return what the problem is made of; collective."""
         if "model" in self.nodes:
-            parts: Parts = self._made("model", comm=comm, run_dt=self._plain("dt"), **self._shaking())
+            parts: Parts = self._made("model", comm=comm)
             return parts
         mesh, tags = self._mesh(comm)
         system = self._made("system", mesh=mesh, tags=tags, **self._shaking())
-        system = self._made("gravity", system=system) if "gravity" in self.nodes else system
+        system = self._made("gravity", system=system, tags=tags) if "gravity" in self.nodes else system
         none = empty_surface(system.algebra.comm, system.space.dimension)
         surfaces = self._several("contact", system=system, tags=tags) or (none,)
         surface = joined_surfaces(*surfaces) if len(surfaces) > 1 else surfaces[0]
@@ -216,22 +214,19 @@ class Case:
     def _problem(self, parts: Parts) -> ContactProblem:
         return ContactProblem(
             parts.system, parts.surface, friction=self._made("friction") or Frictionless(), impact=self._made("impact"),
-            excitation=() if parts.moved else self.excitations(system=parts.system), mass=self._made("mass"),
+            excitation=self.excitations(system=parts.system), mass=self._made("mass"),
         )
 
     def _at_rest(
         self, parts: Parts, problem: ContactProblem, solver: Solver | None
     ) -> tuple[ContactProblem, State | None]:
-        """Return the problem and its equilibrium under its weight, supports that hold no static load released there."""
+        """Return the problem and its equilibrium under its weight."""
         own = (solver.primary if isinstance(solver, CrossChecked) else solver) or Automatic()
         if not parts.weighted:
             return problem, None
         from ...run.static import static_equilibrium  # late: other runs need none of it
 
-        if parts.firm is None:
-            return problem, static_equilibrium(problem, solver=own)
-        static = replace(self._problem(parts.firm), excitation=())
-        return release(static, static_equilibrium(static, solver=own), problem)
+        return problem, static_equilibrium(problem, solver=own)
 
     def _duration(self, parts: Parts) -> float:
         """Return the time until the last excitation ends [s]."""
@@ -254,6 +249,7 @@ def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence
     known = words(base_folder(path), allowed)
     check_format(path, tables)
     refuse_retired(tables)
+    refuse_retired_model(path, tables.get("model"))
     for name in tables:
         if name not in ("format", *_TABLES):
             raise InputError(f"{path}: unknown table [{name}]: {nearest(name, ('format', *_TABLES))}")

@@ -17,6 +17,12 @@ COPY = "case.toml"
 FORMAT = 1  # of case files
 _SET = "# set "  # before a setting, in the copy
 _RETIRED = {"beam": "timoshenko_beam", "layer": "particle_layer"}  # cases of before -> demos that draw the same
+_SUPPORTS = "clamped, prescribed, tied and dashpots in [system]"
+_OF_CHANNEL = {  # keys of its model of before -> where they are in the case file that ships
+    "type": "the tables", "shape": "[mesh]", "soil": "material.soil", "concrete": "material.channel",
+    "damping": "system.damping", "held": "held in each [[contact]]", "weighing": "gravity.cells",
+    "sides": _SUPPORTS, "base": _SUPPORTS, "rock": _SUPPORTS,
+}
 
 
 def builtin_cases() -> dict[str, str]:
@@ -41,6 +47,16 @@ def refuse_retired(names: Iterable[str]) -> None:
         if name in _RETIRED:
             raise InputError(f"the case '{name}' is retired: bash demos/run.sh {_RETIRED[name]} computes and draws "
                              f"the same, with its parameters on top of demos/{_RETIRED[name]}.py")
+
+
+def refuse_retired_model(path: Path, model: Any) -> None:
+    """Raise InputError, which names what is in its place, for the model of the channel and settings of it."""
+    given = model if isinstance(model, dict) else {}
+    if given.get("type") != "Channel" and path != FOLDER / "channel.toml":
+        return
+    for key in sorted(given, key=lambda one: one == "type"):  # which says least
+        raise InputError(f"{path}: [model] {key} was of the model Channel, which is retired: give "
+                         f"{_OF_CHANNEL.get(key, f'mesh.{key}')} of the case 'channel', {FOLDER / 'channel.toml'}")
 
 
 def check_format(path: Path, tables: Mapping[str, Any]) -> None:

@@ -11,10 +11,8 @@ from ...core.errors import InputError
 from .parsing import nearest
 from .toml_file import toml_value, with_settings
 
-OF_MOTION = {  # settings of a model that come with records: with any, with a vertical one
-    "Wall": ({"model.base_inertia": "whole"}, {}),
-    "Channel": ({}, {"model.sides": {"type": "TiedSides"}}),
-}
+ROLLERS = [{"facets": side, "components": [1]} for side in ("left_side", "right_side")]  # of a layer shaken sideways
+TIED = ["system.prescribed=", 'system.tied={first="left_side", second="right_side"}']  # of one shaken both ways
 REFERENCE = {"type": "Volume", "method": {"type": "ReducedNewton"}}
 IMPULSIVE = ("ZienkiewiczWoodTaylor", "SS22")  # whose contact points have mass: they take an impact law
 
@@ -58,10 +56,12 @@ class ShortOptions:
             axis = 0 if number == 0 else axes - 1
             motions.append({"type": "GroundMotion", "direction": [float(k == axis) for k in range(axes)]} | old | {
                 "record": (record if isinstance(record, dict) else {}) | {"path": str(Path(file).absolute())}})
-        models = [str(one.get("type")) for one in _tables(tables.get("model"))]
-        with_any, vertical = OF_MOTION.get(models[0] if models else "", ({}, {}))
-        settings = {"excitation": motions} | with_any | (vertical if len(files) == 2 else {})
-        return [*(f"{key}={toml_value(value)}" for key, value in settings.items()), "run.steps=", "run.t_end="]
+        found = [f"excitation={toml_value(motions)}"]
+        if any(one.get("type") == "Wall" for one in _tables(tables.get("model"))):
+            found.append('model.base_inertia="whole"')
+        if len(files) == 2 and any(one.get("prescribed") == ROLLERS for one in _tables(tables.get("system"))):
+            found += TIED
+        return [*found, "run.steps=", "run.t_end="]
 
     def _step(self) -> list[str]:
         found = [] if self.dt is None else [f"run.dt={self.dt!r}"]

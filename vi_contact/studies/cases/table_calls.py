@@ -6,8 +6,8 @@
 
 ``read`` turns a value of the file into a node by the type hint of the parameter it is for, and refuses what does not
 fit in one sentence with file, table and key. ``build(node, context)`` makes the calls; the context supplies what no
-file holds: communicator, mesh, its groups, system; excitations, time step and scheme for what must know them. Nothing
-of the file is ever evaluated as code.
+file holds: communicator, mesh, its groups, system; excitations for what must know them. Nothing of the file is ever
+evaluated as code.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,7 +19,7 @@ from ...core.errors import InputError
 
 Context = Mapping[str, Any]
 Node = Any  # what has been read: a Group or Call, a tuple or dict of nodes; all else stands for itself
-GIVEN = ("comm", "mesh", "system", "excitations", "run_dt")  # parameters that the context supplies
+GIVEN = ("comm", "mesh", "system", "excitations")  # parameters that the context supplies
 
 
 @dataclass(frozen=True)

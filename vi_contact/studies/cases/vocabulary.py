@@ -6,7 +6,7 @@ of a function here that takes none.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 from types import MappingProxyType, ModuleType
@@ -17,6 +17,7 @@ from ...core import ContactSurface, Excitation, FrictionLaw, ImpactLaw, MassLaw,
 from ...core.checks import number
 from ...core.corners import FEATURE_ANGLE
 from ...core.system import SemiDiscreteSystem
+from ...core.units import STANDARD_GRAVITY
 from ...fem import BodyForce, Cells, CompliantBase, Dashpots, Facets, Prescribed, Traction
 from ...fem.contact.matching import Matching
 from ...ground_motion.record import LARGEST_PEAK, Record
@@ -24,7 +25,7 @@ from ...laws.impact import VelocityUpdate
 from ...laws.materials import Damping, LinearElastic, Section
 from ...laws.orthotropic import Orthotropic
 from ...meshes.gmsh_session import MeshScript
-from ...models import channel, wall
+from ...models import wall
 from ...run import HalvedAtImpact, Schedule
 from ...run.files.writer import FieldWriter
 from ...soil import UpgoingVelocity
@@ -47,7 +48,6 @@ _KINDS: Mapping[ModuleType, tuple[Any, ...]] = {  # room -> the kinds of things 
     schemes: (Scheme,),
     run: (Solver, Schedule, HalvedAtImpact, Recorder),
     engineering: (Recorder,),
-    channel: (channel.Sides,),
 }
 
 
@@ -90,6 +90,15 @@ def pair(
     return found.bilateral_everywhere() if held else found
 
 
+def weight(
+    system: SemiDiscreteSystem, *, acceleration: float = STANDARD_GRAVITY, direction: tuple[float, ...] | None = None,
+    cells: Cells | None = None,
+) -> SemiDiscreteSystem:
+    """Return the system ``with_weight``; cells: a group of whole bodies, which alone have weight."""
+    bodies = None if cells is None else fem.bodies_of(system, cells)
+    return laws.with_weight(system, acceleration=acceleration, direction=direction, bodies=bodies)
+
+
 def first_mode_harmonic(
     system: SemiDiscreteSystem, *, amplitude: float, ratio: float = 0.5, direction: tuple[float, ...] = (1.0, 0.0)
 ) -> laws.Harmonic:
@@ -100,11 +109,6 @@ def first_mode_harmonic(
 def first_mode_period(system: SemiDiscreteSystem, *, parts: float) -> float:
     """Return the time step that divides the body's longest period into so many parts [s]."""
     return 1.0 / (number("the period", "parts", parts, positive=True) * engineering.lowest_frequency(system))
-
-
-def free_field_sides() -> "channel.FreeFieldSides":
-    """Return free-field ends of the channel's layer, on the base that the model has."""
-    return channel.FreeFieldSides(base=())
 
 
 def compliant_base(
@@ -128,8 +132,7 @@ class Parts:
     """Hold what a problem is made of.
 
     tags: groups of the mesh; weighted: it carries its weight, and starts from its equilibrium; recorders: of a case
-    that names none; firm: the same body on supports that hold static loads, for the gravity stage, where its own do
-    not; moved: the excitations move its boundary, and are no inertia load.
+    that names none.
     """
 
     system: SemiDiscreteSystem
@@ -137,13 +140,11 @@ class Parts:
     tags: Any
     weighted: bool = False
     recorders: tuple[Recorder, ...] | None = None
-    firm: "Parts | None" = None
-    moved: bool = False
 
     @property
     def steady(self) -> bool:
         """Say whether they serve other excitations too: nothing in them moves with these."""
-        return not (self.system.companions or self.surface.companions or self.moved or self.firm)
+        return not (self.system.companions or self.surface.companions)
 
 
 def _wall(shape: wall.Wall, comm: Any, *, case: str = "b", weight: bool = False, base_inertia: str = "whole") -> Parts:
@@ -152,37 +153,17 @@ def _wall(shape: wall.Wall, comm: Any, *, case: str = "b", weight: bool = False,
     return Parts(model.system, model.surface(case), model.tags, weight, recorders)
 
 
-def _channel(
-    shape: "channel.Channel", comm: Any, *, excitations: tuple[Excitation, ...], run_dt: float | None,
-    sides: channel.Sides | None = None, weighing: Sequence[str] = ("channel",), held: bool = False,
-    base: str = "relative", rock: LinearElastic | None = None,
-) -> Parts:
-    bottom = channel.bedrock(base, excitations, dt=run_dt, rock=rock)
-    ends = replace(sides, base=bottom or excitations) if isinstance(sides, channel.FreeFieldSides) else sides
-
-    def parts(model: "channel.ChannelModel", firm: Parts | None = None) -> Parts:
-        surface = model.surface.bilateral_everywhere() if held else model.surface
-        return Parts(model.system, surface, model.tags, bool(weighing), model.recorders(), firm, bottom is not None)
-
-    model, firm = channel.staged(shape, comm, sides=ends, weighing=weighing, base=bottom)
-    return parts(model, None if firm is None else parts(firm))
-
-
-def _model(shape: type, build: Callable[..., Parts], inner: str = "") -> Callee:
-    """Return the call of a model: its keys are the fields of its shape, and what ``build`` takes by keyword;
-    inner: a field of the shape whose own fields are keys, too."""
+def _model(shape: type, build: Callable[..., Parts]) -> Callee:
+    """Return the call of a model: its keys are the fields of its shape, and what ``build`` takes by keyword."""
     of_shape, target = callee(shape).hints, callee(build)
-    of_inner = callee(of_shape[inner]).hints if inner else {}
     extra = {key: hint for key, hint in target.hints.items() if key != "shape"}
 
     def made(**values: Any) -> Parts:
-        own, parts, more = ({key: values[key] for key in names if key in values}
-                            for names in (of_shape, of_inner, (*extra, *target.given)))
-        if parts:
-            own[inner] = replace(own[inner], **parts) if inner in own else of_shape[inner](**parts)
+        own, more = ({key: values[key] for key in names if key in values}
+                     for names in (of_shape, (*extra, *target.given)))
         return build(shape(**own), **more)
 
-    return Callee(shape.__name__, made, {**of_inner, **of_shape, **extra}, given=target.given)
+    return Callee(shape.__name__, made, {**of_shape, **extra}, given=target.given)
 
 
 _FUNCTIONS: Mapping[Any, Mapping[str, Callable[[], Any]]] = {  # kind -> word -> what it calls, when asked
@@ -191,7 +172,6 @@ _FUNCTIONS: Mapping[Any, Mapping[str, Callable[[], Any]]] = {  # kind -> word ->
     CompliantBase: {"CompliantBase": lambda: compliant_base},
     UpgoingVelocity: {"upgoing": lambda: soil.upgoing},
     ContactSurface: {"contact_surface": lambda: surface, "contact_pair": lambda: pair},
-    channel.Sides: {"FreeFieldSides": lambda: free_field_sides},
     ImpactLaw: {"Elastic": lambda: laws.Elastic},
     Record: {"read_record": lambda: record, "synthetic": lambda: ground_motion.synthetic},
     Excitation: {"FirstModeHarmonic": lambda: first_mode_harmonic},
@@ -220,10 +200,8 @@ class _Listed(Mapping[str, Callee]):
     def _found(self, names: Sequence[str] | None = None) -> dict[str, Callee]:
         """What words with these names before the dot call; None: all."""
         found: dict[str, Callee] = {}
-        if self._kind is Parts:
-            models = {"Wall": lambda: _model(wall.Wall, _wall),
-                      "Channel": lambda: _model(channel.Channel, _channel, inner="shape")}
-            found |= {name: model() for name, model in models.items() if names is None or name in names}
+        if self._kind is Parts and (names is None or "Wall" in names):
+            found["Wall"] = _model(wall.Wall, _wall)
         for room in self._rooms:
             own = room.__all__ if names is None else [name for name in names if name in room.__all__]
             found |= {one.name: one for one in _callees(room, self._kind, own)}
