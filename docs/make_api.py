@@ -23,8 +23,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, PAGE = ROOT / "vi_contact", ROOT / "docs" / "reference" / "api.md"
 ROOMS = (
-    "core", "laws", "fem", "solvers", "vi", "schemes", "run", "soil", "engineering", "ground_motion", "bem", "beam",
-    "boundary_layer", "meshes", "models", "studies", "plots",
+    "core", "laws", "fem", "solvers", "vi", "schemes", "run", "soil", "engineering", "engineering.checks",
+    "ground_motion", "bem", "beam", "boundary_layer", "meshes", "models", "studies", "plots",
 )
 CONTRACT = (
     ("core.step", ("Scheme", "Solver", "PreparedSolver", "Recorder")),

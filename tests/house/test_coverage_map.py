@@ -34,6 +34,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "core/test_identity.py": "run.method",
     "core/test_step.py": "core.errors core.problem",
     "core/test_surfaces.py": "core.obstacles",
+    "engineering/test_checks.py": "engineering.checks.comparison engineering.checks.earth_pressure_static",
     "engineering/test_resultants.py":
         "engineering.floor_spectra engineering.peak_values engineering.racking plots.maps",
     "fem/test_assembly.py": "fem.assembly_checks",
@@ -107,6 +108,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "solvers/test_volume_system.py": "solvers.volume.bounded_system solvers.volume.scaled_step",
     "studies/test_case.py":
         "cli.case studies.cases.parsing studies.cases.toml_file studies.cases.vocabulary",
+    "studies/test_case_checks.py": "studies.cases.checks",
     "studies/test_case_inputs.py": "studies.cases.table_calls",
     "studies/test_ida.py":
         "cli.batch cli.ida plots.studies studies.ida.measures studies.ida.processes studies.ida.runs",

@@ -24,7 +24,7 @@ Balance Begin Bind Bound Bring Build
 Calculate Call Carry Change Check Choose Clamp Clean Close Collect Combine Compare Complete Compute Condense Connect
 Constrain Continue Convert Copy Correct Count Create Cut
 Damp Decide Define Deliver Describe Detect Differentiate Discretise Distribute Divide Do Double Draw Drop
-Eliminate Embed End Estimate Evaluate Exchange Expand Explain Extend Extract Extrapolate
+Eliminate Embed End Estimate Evaluate Exchange Expand Expect Explain Extend Extract Extrapolate
 Factor Factorise Fill Filter Find Finish Fit Follow Forget Format Free
 Gather Generate Give Go Group Guess
 Halve Hand Handle Hold

@@ -1,4 +1,4 @@
-"""``vi-contact report`` and ``vi-contact post peaks|spectrum|transfer|loop``: options and what each does."""
+"""``vi-contact report`` and ``vi-contact post peaks|spectrum|transfer|loop|checks``: options and what each does."""
 
 import argparse
 from pathlib import Path
@@ -32,6 +32,7 @@ def add_report_commands(commands: Any) -> None:
         "peaks": (_peaks, "largest and smallest value of every column, as a table"),
         "spectrum": (_spectrum, "floor response spectra of recorded accelerations, as CSV and picture"),
         "transfer": (_transfer, "transfer function of two recorded accelerations, as CSV and picture"),
+        "checks": (_checks, "what the run found beside the formulas of its [[check]] tables"),
         "loop": (_loop, "a force over a deformation, with the work in it, as CSV and picture"),
     })
     for name, one in parsers.items():
@@ -139,6 +140,22 @@ def _loop(options: argparse.Namespace) -> str:
     x, y = ((name, run.columns[name][0]) for name in (options.deformation, options.force))
     picture = plot_loop(loop, table.with_suffix(".png"), x=x, y=y)
     return f"work: {loop.work[-1]:.6g} J, secant stiffness {loop.stiffness:.6g}\ntable: {table}\npicture: {picture}"
+
+
+def _checks(options: argparse.Namespace) -> str:
+    """Print a block of lines for each check, and write them as a table."""
+    from ..studies.cases.checks import comparisons
+
+    found, table = comparisons(options.folder), _table_path(options)
+    if not found:
+        raise InputError(f"{options.folder}: its case has no [[check]] tables: docs/guide/checks.md lists the checks")
+    rows = [[one.name, one.formula, one.source, "; ".join(f"{name} = {x:.6g} {unit}" for name, (x, unit) in
+             one.inputs.items()), one.expected, one.found, one.unit, one.ratio, one.applies] for one in found]
+    write_csv(table, ["name", "formula", "source", "inputs", "expected", "found", "unit", "ratio", "applies"], rows)
+    said = [f"{one.name}: " + (f"does not apply: {one.applies}" if one.applies else
+            f"expected {one.expected:.5g} {one.unit}, found {one.found:.5g} {one.unit}, ratio {one.ratio:.4g}")
+            + f"\n    {one.formula}   ({one.source})\n    {row[3]}" for one, row in zip(found, rows, strict=True)]
+    return "\n".join([*said, f"table: {table}"])
 
 
 def _table_path(options: argparse.Namespace) -> Path:

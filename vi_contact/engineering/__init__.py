@@ -1,6 +1,7 @@
 """Answer what engineers ask of a run: resultants, racking, floor spectra, peaks, frequencies.
 
-``Resultants`` and ``Racking`` record; the functions take the ``history`` of a run: docs/guide/outputs.md.
+``Resultants`` and ``Racking`` record; the functions take the ``history`` of a run: docs/guide/outputs.md; ``checks``
+compare it with formulas: docs/guide/checks.md.
 >>> import numpy as np
 >>> from vi_contact.engineering import hysteresis
 >>> hysteresis({"u": np.array([0.0, 1.0, 2.0]), "F": np.array([0.0, 3.0, 6.0])}, "u", "F").work
@@ -10,6 +11,7 @@ array([0. , 1.5, 6. ])
 from ..core.lazy import lazy
 
 _CONTENTS = {
+    "checks.comparison": ("Check", "Comparison"),
     "floor_spectra": ("TransferFunction", "floor_spectrum", "recorded_motion", "transfer_function"),
     "modal": ("lowest_frequency",),
     "peak_values": ("Loop", "Peak", "hysteresis", "peaks", "write_peaks"),

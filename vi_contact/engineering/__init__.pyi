@@ -1,5 +1,7 @@
 # ruff: noqa
 # Made from __init__.py by docs/make_api.py, for checkers of types and editors.
+from .checks.comparison import Check as Check
+from .checks.comparison import Comparison as Comparison
 from .floor_spectra import TransferFunction as TransferFunction
 from .floor_spectra import floor_spectrum as floor_spectrum
 from .floor_spectra import recorded_motion as recorded_motion
@@ -14,4 +16,4 @@ from .racking import Racking as Racking
 from .resultants import Resultants as Resultants
 from .resultants import contact_summary as contact_summary
 
-__all__: list[str] = ['Loop', 'Peak', 'Racking', 'Resultants', 'TransferFunction', 'contact_summary', 'floor_spectrum', 'hysteresis', 'lowest_frequency', 'peaks', 'recorded_motion', 'transfer_function', 'write_peaks']
+__all__: list[str] = ['Check', 'Comparison', 'Loop', 'Peak', 'Racking', 'Resultants', 'TransferFunction', 'contact_summary', 'floor_spectrum', 'hysteresis', 'lowest_frequency', 'peaks', 'recorded_motion', 'transfer_function', 'write_peaks']

@@ -10,5 +10,5 @@
 
 from ..core.lazy import lazy
 
-_CONTENTS = {"cases.case": ("Case", "read_case"), "ida.ida": ("IDA", "run_ida")}
+_CONTENTS = {"cases.case": ("Case", "read_case"), "cases.checks": ("comparisons",), "ida.ida": ("IDA", "run_ida")}
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -2,7 +2,8 @@
 # Made from __init__.py by docs/make_api.py, for checkers of types and editors.
 from .cases.case import Case as Case
 from .cases.case import read_case as read_case
+from .cases.checks import comparisons as comparisons
 from .ida.ida import IDA as IDA
 from .ida.ida import run_ida as run_ida
 
-__all__: list[str] = ['Case', 'IDA', 'read_case', 'run_ida']
+__all__: list[str] = ['Case', 'IDA', 'comparisons', 'read_case', 'run_ida']

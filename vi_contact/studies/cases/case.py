@@ -5,6 +5,7 @@
     [system]          fem.assemble                         [run]      the other arguments of simulate
     [[contact]]       fem.contact_surface, .contact_pair   [gravity]  with_weight, then static_equilibrium
     [friction] [impact] [mass] [[excitation]]              [model]    instead of mesh, material, system, contact
+    [[check]]  engineering.checks, formulas to compare the run with
 """
 
 import math
@@ -23,6 +24,7 @@ from ...core.protocols import Excitation, FrictionLaw, Frictionless, ImpactLaw, 
 from ...core.state_checks import initial_state
 from ...core.step import Recorder, Scheme, Solver, State
 from ...core.surfaces import ContactSurface, empty_surface
+from ...engineering.checks.comparison import Check
 from ...fem.assembly import assemble
 from ...fem.contact.joined import joined_surfaces
 from ...fem.mesh import Tags, build_mesh, read_mesh
@@ -64,6 +66,7 @@ _TABLES: dict[str, Any] = {  # in the order in which they are read: type of what
     ),
     "record": Recorder | Sequence[Recorder],
     "fields": FieldWriter,
+    "check": Check | Sequence[Check],
 }
 _OF_A_BODY = ("material", "system", "contact", "gravity")  # which a model has itself
 

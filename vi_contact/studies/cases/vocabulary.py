@@ -18,6 +18,8 @@ from ...core.checks import number
 from ...core.corners import FEATURE_ANGLE
 from ...core.system import SemiDiscreteSystem
 from ...core.units import STANDARD_GRAVITY
+from ...engineering import checks
+from ...engineering.checks.comparison import Check
 from ...fem import BodyForce, Cells, CompliantBase, Dashpots, Facets, Prescribed, Traction
 from ...fem.contact.matching import Matching
 from ...ground_motion.record import LARGEST_PEAK, Record
@@ -47,7 +49,7 @@ _KINDS: Mapping[ModuleType, tuple[Any, ...]] = {  # room -> the kinds of things 
     solvers: (Solver,), normal: (SmallMethod,), friction: (FrictionMethod, Extrapolation), volume: (Method,),
     schemes: (Scheme,),
     run: (Solver, Schedule, HalvedAtImpact, Recorder),
-    engineering: (Recorder,),
+    engineering: (Recorder,), checks: (Check,),
 }
 
 

@@ -1,0 +1,91 @@
+"""Tables [[check]] of case files: read as calls, compared from the run folder alone, printed by ``vi-contact post``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("dolfinx")
+
+from mpi4py import MPI
+
+from vi_contact.cli.entry import main
+from vi_contact.core.errors import InputError
+from vi_contact.studies import comparisons, read_case
+
+pytestmark = pytest.mark.serial
+LAYER = """
+[mesh]
+type = "BlockMesh"
+lengths = [2.0, 1.0]
+divisions = [4, 4]
+
+[material.soil]
+E = 1e8
+nu = 0.25
+rho = 2000
+
+[system]
+prescribed = [{facets = "bottom", components = [1]}, {facets = "right", components = [0]}]
+
+[gravity]
+acceleration = 10.0
+
+[[contact]]
+facets = "left"
+held = true
+
+[[record]]
+type = "Resultants"
+name = "stem"
+centre = [0.0, 0.0]
+
+[run]
+dt = 0.01
+steps = 1
+
+[[check]]
+type = "AtRest"
+height = 1.0
+rho = 2000
+gravity = 10.0
+nu = 0.25
+part = "stem"
+"""
+RANKINE = '\n[[check]]\ntype = "Rankine"\nheight = 1.0\nrho = 2000\npart = "stem"\nphi = 0.5\nslope = 0.6\n'
+
+
+def test_checks_of_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A layer at rest between smooth walls: rho g H²/2 nu/(1-nu) exactly, on any mesh; the other does not apply."""
+    (tmp_path / "layer.toml").write_text(LAYER + RANKINE, encoding="utf-8")
+    out = tmp_path / "out"
+    read_case(tmp_path / "layer.toml").run(MPI.COMM_SELF, out=out, progress=False)
+    rest, active = comparisons(out)
+    assert rest.expected == pytest.approx(1e4 / 3.0, rel=1e-14) and rest.ratio == pytest.approx(1.0, rel=1e-9)
+    assert active.found == rest.found and np.isnan(active.expected) and "steeper" in active.applies
+    assert main(["post", "checks", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert "AtRest: expected 3333.3 N/m, found 3333.3 N/m, ratio 1\n" in said and "K0 = ν/(1-ν)" in said
+    assert "Rankine: does not apply: the ground is steeper" in said and "nu = 0.25 -" in said
+    assert (out / "checks.csv").read_text(encoding="utf-8").count("\n") == 3
+
+
+@pytest.mark.parametrize(("change", "words"), [
+    (("AtRest", "Okabe"), "unknown type 'Okabe'"), (("nu = 0.25\npart", "mu = 0.25\npart"), "unknown key 'mu'"),
+    (("nu = 0.25\npart", "nu = 0.75\npart"), "nu is 0.75: give a Poisson's ratio"),
+    (("AtRest", "mine.checks:Own"), "takes no classes but its own"),
+])
+def test_wrong_tables_are_refused_before_the_run(tmp_path: Path, change: tuple[str, str], words: str) -> None:
+    (tmp_path / "layer.toml").write_text(LAYER.replace(*change), encoding="utf-8")
+    with pytest.raises(InputError, match=rf"\[check\[1\].*{words}"):
+        read_case(tmp_path / "layer.toml").check()
+
+
+def test_a_run_without_checks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "layer.toml").write_text(LAYER[: LAYER.index("[[check]]")], encoding="utf-8")
+    read_case(tmp_path / "layer.toml").run(MPI.COMM_SELF, out=tmp_path / "out", progress=False)
+    assert comparisons(tmp_path / "out") == ()
+    assert main(["post", "checks", str(tmp_path / "out")]) == 1
+    assert "has no [[check]] tables" in capsys.readouterr().err
