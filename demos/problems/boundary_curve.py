@@ -3,7 +3,8 @@
 import numpy as np
 import numpy.typing as npt
 
-from vi_contact.bem.boundary_mesh import BoundaryMesh, from_segments
+from demos.problems.loose_segments import from_segments
+from vi_contact.bem.boundary_mesh import BoundaryMesh
 from vi_contact.core.errors import InputError
 from vi_contact.fem import compat
 from vi_contact.fem.groups import facets_of

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vi_contact.bem import BoundaryMesh, circle, from_segments, polygon
+from demos.problems.loose_segments import from_segments
+from vi_contact.bem import BoundaryMesh, circle, polygon
 from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial

@@ -10,6 +10,7 @@ import pytest
 from bem_rod import rod, smooth_integral, smooth_load
 from plane_waves import MATERIAL, SQUARE, pulse
 
+from demos.problems.loose_segments import from_segments
 from demos.problems.stored_blocks import stored_blocks
 from vi_contact import LinearElastic
 from vi_contact.bem import (
@@ -19,7 +20,6 @@ from vi_contact.bem import (
     PoincareSteklov,
     circle,
     energetic_blocks,
-    from_segments,
     polygon,
     traction_forces,
 )

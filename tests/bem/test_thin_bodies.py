@@ -163,7 +163,7 @@ def test_ordinary_bodies_keep_their_points():
 
 
 @pytest.mark.parametrize(("mesh", "words"), [
-    (slab(H / 21), r"comes near itself at \(-0\.002976, .* 1/20 of the 0\.125 m .* at most 0\.119 m"),
+    (slab(H / 21), r"comes near itself at \(-0\.00297619, .* 1/20 of the 0\.125 m .* at most 0\.119 m"),
     (wedge(0.04), "comes near itself .* widen the angle"),
     (polygon([(0, 0), (1, 0), (1, 0.04)], (1, 1, 1)), r"sharp or uneven corner at \(1, 0\.04\).* more equal"),
     (polygon(SQUARE, (50, 50, 2, 2)), "elements .* are 0.02 m apart, less than 1/20 of the 0.5 m"),

@@ -16,6 +16,7 @@ import vi_contact as vc
 from demos.problems.boundary_elements import disk_contact, disk_problem, embedded_problem, square_problem
 from demos.problems.disk import Disk, Push
 from demos.problems.embedded import Embedded
+from demos.problems.loose_segments import from_segments
 from demos.problems.published_beam import readings
 from demos.problems.square import Square
 from vi_contact import beam, bem
@@ -61,7 +62,7 @@ def meshes() -> Table:
             "radius": but(POSITIVE, "list", "complex") | {"endless": 1e200}, "exterior": FLAG,
             "count": COUNT | {"two": 2, "endless": 10**9},
             "centre": {"text": "ab", "number": 1.0, "nan": (nan, 0.0)} | RAGGED}),
-        (bem.from_segments, {"points": SQUARE, "segments": [(0, 1), (1, 2), (2, 3), (3, 0)]}, {
+        (from_segments, {"points": SQUARE, "segments": [(0, 1), (1, 2), (2, 3), (3, 0)]}, {
             "points": {"text": "ab", "flat": [1.0, 2.0], "nan": [(nan, 0.0)] * 4}, "labels": {"text": "ab", "one": [1]},
             "segments": RAGGED | {"text": "ab", "far": [(0, 9), (9, 0)], "negative": [(0, -1)], "half": [(0, 0.5)]}}),
         (mesh.nodes_of, {"elements": np.ones(8, bool)}, {"elements": MASK}),

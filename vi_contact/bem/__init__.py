@@ -10,7 +10,7 @@ In this order: a ``BoundaryMesh``, ``energetic_blocks``, ``PoincareSteklov``, ``
 from ..core.lazy import lazy
 
 _CONTENTS = {
-    "boundary_mesh": ("BoundaryMesh", "circle", "from_segments", "polygon"),
+    "boundary_mesh": ("BoundaryMesh", "circle", "polygon"),
     "boundary_operators": ("Galerkin", "OperatorMatrices"),
     "contact": ("BoundaryContact", "Conditions", "conditions_on"),
     "contact_run": ("ContactRun", "march_contact"),

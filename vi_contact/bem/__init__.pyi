@@ -2,7 +2,6 @@
 # Made from __init__.py by docs/make_api.py, for checkers of types and editors.
 from .boundary_mesh import BoundaryMesh as BoundaryMesh
 from .boundary_mesh import circle as circle
-from .boundary_mesh import from_segments as from_segments
 from .boundary_mesh import polygon as polygon
 from .boundary_operators import Galerkin as Galerkin
 from .boundary_operators import OperatorMatrices as OperatorMatrices
@@ -23,4 +22,4 @@ from .quadrature import Orders as Orders
 from .two_bodies import TwoBodies as TwoBodies
 from .uzawa_space_time import SpaceTimeUzawa as SpaceTimeUzawa
 
-__all__: list[str] = ['BoundaryContact', 'BoundaryMesh', 'BoundaryMotion', 'BoundaryProblem', 'CondensedCompliance', 'Conditions', 'ContactRun', 'EnergeticBlocks', 'Galerkin', 'OperatorMatrices', 'Orders', 'PoincareSteklov', 'SpaceTimeUzawa', 'TimeKernels', 'TwoBodies', 'circle', 'conditions_on', 'energetic_blocks', 'from_segments', 'march_contact', 'polygon', 'traction_forces']
+__all__: list[str] = ['BoundaryContact', 'BoundaryMesh', 'BoundaryMotion', 'BoundaryProblem', 'CondensedCompliance', 'Conditions', 'ContactRun', 'EnergeticBlocks', 'Galerkin', 'OperatorMatrices', 'Orders', 'PoincareSteklov', 'SpaceTimeUzawa', 'TimeKernels', 'TwoBodies', 'circle', 'conditions_on', 'energetic_blocks', 'march_contact', 'polygon', 'traction_forces']

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..core.algebra import Array
 from ..core.checks import array, counted, flag, function, integers, mask, number, shape_of, whole
 from ..core.errors import InputError
-from .loops import check_orientation, check_simple, check_size, ordered_loops
+from .loops import check_orientation, check_simple, check_size
 
 MOST_ELEMENTS = 3000  # elements: the matrices of one time step take 2 GB
 P1_MASS = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
@@ -181,21 +181,3 @@ def circle(radius: float, count: int, *, centre: ArrayLike = (0.0, 0.0), exterio
     counted("circle", "count", whole("circle", "count", count, least=3), "elements", most=MOST_ELEMENTS)
     angle = (-2.0 * np.pi if exterior else 2.0 * np.pi) * (np.arange(count) / count) - 0.5 * np.pi
     return BoundaryMesh(middle + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1), exterior=exterior)
-
-
-def from_segments(
-    points: ArrayLike, segments: ArrayLike, *, labels: ArrayLike | None = None, exterior: bool = False
-) -> BoundaryMesh:
-    """Join loose segments to a mesh, for example the facets of a finite element boundary, in any order and direction.
-
-    points: (p, 2) or (p, 3) coordinates [m]; segments: (n, 2) indices of points; labels: (n,) e.g. facet tags. Loops
-    are joined and turned so that the body is on the left. Raises InputError when a curve is open or branches.
-    """
-    coordinates = array("from_segments", "points", points, (None, None), unit="m")[:, :2]
-    pairs = integers("from_segments", "segments", segments, (None, 2))
-    if len(pairs) and not 0 <= pairs.min() <= pairs.max() < len(coordinates):
-        raise InputError(f"from_segments: segments name the points {pairs.min()} to {pairs.max()}, there are "
-                         f"{len(coordinates)}; number points from 0 on")
-    order, sizes = ordered_loops(coordinates, pairs, exterior=exterior)
-    tags = integers("from_segments", "labels", np.zeros(len(pairs)) if labels is None else labels, (len(pairs),))
-    return BoundaryMesh(coordinates[order[:, 0]], sizes, tags[order[:, 1]], exterior)

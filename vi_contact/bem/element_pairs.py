@@ -3,10 +3,10 @@
 import numpy as np
 
 from ..core.algebra import Array, Indices
-from ..core.checks import instance
+from ..core.checks import at, instance
 from ..core.errors import InputError
 from .boundary_mesh import BoundaryMesh
-from .loops import distances, point_at
+from .loops import distances
 
 NEAR_LENGTHS = 3.0  # pairs closer than this many element lengths get the finer rule
 CLOSE = 0.9  # pairs whose elements are this share of the longer one's length apart are integrated with their feet
@@ -60,7 +60,7 @@ class ElementPairs:
                                              "angle if two sides meet near by")
         if self.corner[pair]:
             near, remedy = "has a sharp or uneven corner", "widen its angle or make its two elements more equal"
-        raise InputError(f"boundary elements: the boundary {near} at {point_at(mesh.points[second])}, where elements "
+        raise InputError(f"boundary elements: the boundary {near} at {at(mesh.points[second])}, where elements "
                          f"{first} and {second} are {apart:.3g} m apart, less than 1/20 of the {h:.3g} m of the longer "
                          f"one; {remedy}")
 

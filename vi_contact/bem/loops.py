@@ -1,8 +1,9 @@
-"""Put closed loops of segments in order, turn them the right way round, check them for crossings."""
+"""Check closed loops of segments: which way round they run, what they enclose, whether they cross."""
 
 import numpy as np
 
 from ..core.algebra import Array, Indices
+from ..core.checks import at
 from ..core.errors import InputError
 
 TOUCHING = 1e-12  # of the size of the boundary: nearer is the same place
@@ -19,8 +20,8 @@ def inside(point: Array, loop: Array) -> bool:
     a, b = loop, np.roll(loop, -1, axis=0)
     spans = (a[:, 1] > point[1]) != (b[:, 1] > point[1])
     a, b = a[spans], b[spans]
-    at = a[:, 0] + (point[1] - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
-    return bool(np.count_nonzero(at > point[0]) % 2)
+    crossing = a[:, 0] + (point[1] - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
+    return bool(np.count_nonzero(crossing > point[0]) % 2)
 
 
 def should_run_forward(loops: list[Array], *, exterior: bool) -> list[bool]:
@@ -56,7 +57,7 @@ def check_simple(points: Array, after: Indices) -> None:
     distance[index, index] = distance[after, index] = np.inf
     node, element = np.unravel_index(int(distance.argmin()), distance.shape)
     if distance[node, element] <= TOUCHING * np.hypot(*np.ptp(points, axis=0)):
-        raise InputError(f"BoundaryMesh: the boundary crosses or touches itself at {point_at(points[node])}, where "
+        raise InputError(f"BoundaryMesh: the boundary crosses or touches itself at {at(points[node])}, where "
                          f"node {node} lies on element {element}; give a boundary that does not meet itself")
 
     def side(p: Array, q: Array, x: Array) -> Array:
@@ -68,7 +69,7 @@ def check_simple(points: Array, after: Indices) -> None:
     crossing = splits & splits.T & ~neighbours
     if crossing.any():
         i, j = np.argwhere(crossing)[0]
-        raise InputError(f"BoundaryMesh: the boundary crosses itself near {point_at(a[i])}, where elements {i} and "
+        raise InputError(f"BoundaryMesh: the boundary crosses itself near {at(a[i])}, where elements {i} and "
                          f"{j} cross; give a boundary that does not meet itself")
 
 
@@ -77,40 +78,3 @@ def distances(x: Array, start: Array, end: Array) -> Array:
     along = end - start
     share = np.clip(((x - start) * along).sum(-1) / (along**2).sum(-1), 0.0, 1.0)
     return np.hypot(*np.moveaxis(x - start - share[..., None] * along, -1, 0))
-
-
-def point_at(point: Array) -> str:
-    """Format a point for a sentence."""
-    return f"({point[0]:.4g}, {point[1]:.4g})"
-
-
-def ordered_loops(points: Array, segments: Indices, *, exterior: bool) -> tuple[Indices, tuple[int, ...]]:
-    """Return ((n, 2) start point and number of each segment, loop after loop; sizes of the loops), body on the left."""
-    ends = np.bincount(segments.ravel(), minlength=len(points))
-    if len(segments) == 0 or (ends[np.unique(segments)] != 2).any():
-        bad = int(np.argmax((ends != 2) & (ends > 0)))
-        raise InputError(f"the boundary curve is open or branches at point {bad} ({points[bad].tolist()}), where "
-                         f"{int(ends[bad])} segments meet; give every segment of closed curves")
-    at_point: dict[int, list[int]] = {}
-    for number, pair in enumerate(segments.tolist()):
-        for point in pair:
-            at_point.setdefault(point, []).append(number)
-    left = set(range(len(segments)))
-    loops: list[list[tuple[int, int]]] = []
-    while left:
-        number = min(left)
-        point, loop = int(segments[number, 0]), []
-        while number in left:
-            left.discard(number)
-            loop.append((point, number))
-            point = int(segments[number].sum()) - point
-            number = next((n for n in at_point[point] if n != number), number)
-        loops.append(loop)
-    chains = [np.array(loop, np.int64) for loop in loops]
-    curves = [points[chain[:, 0]] for chain in chains]
-    turned = []
-    for chain, curve, forward in zip(chains, curves, should_run_forward(curves, exterior=exterior), strict=True):
-        if (signed_area(curve) > 0.0) != forward:
-            chain = np.stack([np.roll(chain[::-1, 0], 1), chain[::-1, 1]], axis=1)
-        turned.append(chain)
-    return np.concatenate(turned), tuple(len(chain) for chain in turned)

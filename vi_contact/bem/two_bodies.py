@@ -16,7 +16,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from ..core.algebra import Array, Indices, Mask
-from ..core.checks import array, mask, optional, provides
+from ..core.checks import array, at, mask, optional, provides
 from ..core.errors import InputError
 from .contact import SUPPORTED
 from .energetic import summed
@@ -88,8 +88,8 @@ def matching(points: Array, others: Array) -> Indices:
     away = distance.min(axis=1)
     worst = int(away.argmax())
     if len(points) != len(others) or away[worst] > MATCH * np.ptp(points, axis=0).max():
-        raise InputError(f"TwoBodies: the node at ({points[worst, 0]:g}, {points[worst, 1]:g}) has no partner on the "
-                         "other body; give both interfaces the same nodes")
+        raise InputError(f"TwoBodies: the node at {at(points[worst])} has no partner on the other body; give both "
+                         "interfaces the same nodes")
     return nearest
 
 

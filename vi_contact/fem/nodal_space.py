@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..core.algebra import Algebra, Array, Comm, Indices, Mask, from_each, largest
+from ..core.checks import at
 from ..core.errors import InputError
 
 MEANT = 0.05  # of the size of a body: how far from it a point may be that stands for the nearest node
@@ -78,8 +79,8 @@ class NodalSpace:
             distance = np.linalg.norm(self.points - point, axis=1)
             nearest = -largest(self.comm, -np.min(distance, initial=np.inf))
             if nearest > MEANT * self.size:
-                raise InputError(f"point ({', '.join(f'{x:g}' for x in point)}) is {nearest:.3g} m away from the "
-                                 "nearest node: give a point of the body")
+                raise InputError(f"point {at(point)} is {nearest:.3g} m away from the nearest node: give a point of "
+                                 "the body")
             close = self.nodes[distance <= nearest + 1e-9 * self.size]
             found[i] = -int(largest(self.comm, -float(np.min(close, initial=np.iinfo(np.int64).max))))
         return found
