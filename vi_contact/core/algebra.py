@@ -93,7 +93,9 @@ class Factor(Protocol):
 
 
 class Algebra(Protocol):
-    """Make matrices out of matrices. ``symmetric`` operators only: M, C, K and their combinations."""
+    """Make matrices out of matrices: of M, C, K and their combinations, all of them ``symmetric`` or not."""
+
+    symmetric: bool
 
     @property
     def comm(self) -> Comm: ...
@@ -236,6 +238,8 @@ class SerialFactor:
 
 class SerialAlgebra:
     """Combine matrices of scipy.sparse on one process."""
+
+    symmetric = True
 
     def __init__(self) -> None:
         self.comm: Comm = SerialComm()

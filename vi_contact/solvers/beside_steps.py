@@ -15,7 +15,7 @@ def solver_beside_steps(A: EffectiveMatrix, surface: ContactSurface) -> Solver:
     """Return Condensed() for a problem that is small (``core.sizes``), else conjugate gradients, which factorise
     nothing: these matrices, of mass or of a layer of nodes, are well-conditioned. Volume() for systems that are not
     symmetric. Collective."""
-    if not getattr(A.algebra, "symmetric", True):
+    if not A.algebra.symmetric:
         from .volume import Volume
 
         return Volume()

@@ -79,7 +79,7 @@ def check_laws(owner: str, problem: ContactProblem, *, unsymmetric: bool = False
     """Raise InputError for friction without a tangential direction, or of a wrong number of values, and for matrices
     that are not symmetric unless the owner solves with them. Collective."""
     surface, law = problem.surface, problem.friction
-    if not unsymmetric and not getattr(problem.system.algebra, "symmetric", True):
+    if not unsymmetric and not problem.system.algebra.symmetric:
         raise InputError(f"{owner} needs symmetric matrices and those of the system are not: use "
                          "solver=Volume(), whose ReducedNewton and SemismoothNewton do not")
     if problem.frictional and surface.tangents.shape[1] == 0:

@@ -44,8 +44,7 @@ def identity(problem: ContactProblem, scheme: Scheme, dt: TimeSteps, *, start: f
     """Name -> number, text or numbers with sizes, of all ranks; histories from ``start`` to ``end`` [s]. Collective."""
     system, surface = problem.system, problem.surface
     probes = [probe(np.asarray(system.space.ids), j) for j in range(PROBES)]
-    symmetric = getattr(system.algebra, "symmetric", True)
-    pairs = [(w, w) for w in probes] + ([] if symmetric else [(probes[0], probes[1])])
+    pairs = [(w, w) for w in probes] + ([] if system.algebra.symmetric else [(probes[0], probes[1])])
     first = min(end - start, STEPS * min(pieces_of(dt))[0])
     early = [start + first * i / EARLY for i in range(EARLY + 1)]
     times = start + (end - start) * (np.arange(SAMPLES) + probe(np.arange(SAMPLES), 0) + 0.5) / SAMPLES

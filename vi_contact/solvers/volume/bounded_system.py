@@ -36,7 +36,7 @@ class BoundedSystem:
     def __init__(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
         self.A, self.surface, self.scale = A, surface, scale
         self.rows = A.matrix.rows
-        self.symmetric = bool(getattr(A.algebra, "symmetric", True))
+        self.symmetric = A.algebra.symmetric
         self.soft: Mask = surface.compliance > 0.0
         self.spring = scale / surface.compliance[self.soft]
         self.feet = surface.owned[self.soft]
