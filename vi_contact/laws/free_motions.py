@@ -33,7 +33,8 @@ def free_motions(system: SemiDiscreteSystem) -> Iterator[FreeMotions]:
     """Yield every body: its rigid motions w with K w = 0, those of a mass without a stiffness too. Unknowns that are no
     displacements, such as rotations, which no ``influence`` moves, take the values that cost the least energy.
     Collective."""
-    comm, bodies, motions = system.algebra.comm, rows_of_bodies(system), _rigid(system)
+    comm, bodies = system.algebra.comm, rows_of_bodies(system)
+    motions = _rigid(system, bodies)
     stiffness, mass = np.abs(system.K.diagonal())[:, None], system.M.diagonal()[:, None]
     pulls = np.column_stack([system.K @ w for w in motions.T])
     for rows in bodies:
@@ -52,10 +53,10 @@ def rows_of_bodies(system: SemiDiscreteSystem) -> list[Indices]:
     return np.split(np.argsort(numbers, kind="stable"), np.cumsum(counts)[:-1])
 
 
-def _rigid(system: SemiDiscreteSystem) -> Array:
+def _rigid(system: SemiDiscreteSystem, bodies: list[Indices]) -> Array:
     """Rigid motions of all bodies about their middles, in one vector each: bodies share no unknown. Each moves by
     another amount, so that what K ties to another body does not go with it."""
-    comm, points, bodies = system.algebra.comm, system.space.coordinates, rows_of_bodies(system)
+    comm, points = system.algebra.comm, system.space.coordinates
     place, amount = np.zeros_like(points), np.zeros((system.rows, 1))
     for rows, factor in zip(bodies, np.random.default_rng(0).uniform(1.0, 2.0, len(bodies)), strict=True):
         high = comm.max(np.max(points[rows], axis=0, initial=-NOWHERE))
