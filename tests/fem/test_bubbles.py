@@ -90,6 +90,19 @@ def test_a_uniform_pressure_is_exact(curved: bool) -> None:
     assert max_over_ranks(COMM, problem.cartesian(state.u) - exact) < 1e-10 * max_over_ranks(COMM, exact)
 
 
+def at_rest(
+    system: vc.SemiDiscreteSystem, surface: vc.ContactSurface, limit: float, slip: float, tolerance: float
+) -> tuple[vc.ContactProblem, vc.State]:
+    """The equilibrium: its pressure and shear are uniform to 1e-10, its slip is this to the tolerance."""
+    problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(limit))
+    state = vc.static_equilibrium(problem, tolerance=1e-13)
+    assert np.allclose(state.r_n, P * surface.weights, rtol=1e-10, atol=0.0)
+    assert state.r_t is not None
+    assert np.allclose(np.linalg.norm(state.r_t, axis=1), MU * P * surface.weights, rtol=1e-10, atol=0.0)
+    assert np.allclose(np.linalg.norm(surface.slip(state.u, 0.0), axis=1), slip, rtol=0.0, atol=tolerance)
+    return problem, state
+
+
 @curved
 @pytest.mark.parametrize("limit", [2.0 * MU, MU], ids=["sticks", "slides"])
 def test_pressure_and_shear_are_exact_with_friction(curved: bool, limit: float) -> None:
@@ -102,12 +115,7 @@ def test_pressure_and_shear_are_exact_with_friction(curved: bool, limit: float) 
     loads = [fem.Traction(tags["top"], (0.0, -P, 0.0)), *side_loads(tags, ("",))]
     system = fem.assemble(mesh, STIFF, prescribed=held, loads=loads, degree=2)
     surface = fem.contact_surface(system, tags["bottom"])
-    problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(limit))
-    state = vc.static_equilibrium(problem, tolerance=1e-13)
-    assert np.allclose(state.r_n, P * surface.weights, rtol=1e-10, atol=0.0)
-    assert state.r_t is not None
-    assert np.allclose(np.linalg.norm(state.r_t, axis=1), MU * P * surface.weights, rtol=1e-10, atol=0.0)
-    assert np.allclose(np.linalg.norm(surface.slip(state.u, 0.0), axis=1), slip, rtol=0.0, atol=1e-9 * top)
+    problem, state = at_rest(system, surface, limit, slip, 1e-9 * top)
     exact = nodal(system, lambda x: sheared(x) + np.array([slip, 0.0, 0.0]))
     assert max_over_ranks(COMM, problem.cartesian(state.u) - exact) < 1e-9 * max_over_ranks(COMM, exact)
 
@@ -133,12 +141,7 @@ def test_pressure_and_shear_go_through_two_bodies(curved: bool, limit: float) ->
     loads = [fem.Traction(tags["upper_top"], (0.0, -P, 0.0)), *side_loads(tags, ("lower_", "upper_"))]
     system = fem.assemble(mesh, STIFF, prescribed=held, loads=loads, degree=2)
     surface = fem.contact_pair(system, *(tags[side] for side in both.interface))
-    problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(limit))
-    state = vc.static_equilibrium(problem, tolerance=1e-13)
-    assert np.allclose(state.r_n, P * surface.weights, rtol=1e-10, atol=0.0)
-    assert state.r_t is not None
-    assert np.allclose(np.linalg.norm(state.r_t, axis=1), MU * P * surface.weights, rtol=1e-10, atol=0.0)
-    assert np.allclose(np.linalg.norm(surface.slip(state.u, 0.0), axis=1), slip, rtol=0.0, atol=1e-9 * top)
+    problem, state = at_rest(system, surface, limit, slip, 1e-9 * top)
 
     def moved(x: Array, way: float) -> Array:
         return sheared(x - np.array([0.0, low, 0.0])) + np.array([way, 0.0, 0.0])
