@@ -16,7 +16,8 @@ from .products import Remembered
 class Space(Protocol):
     """Say what the unknowns mean: how an owned vector of unknowns becomes displacements of points.
 
-    ``ids``: numbers of the owned unknowns on any ranks, node * dimension + component; ``coordinates`` (rows, d) [m].
+    ``ids``: numbers of the owned unknowns on any ranks, node * dimension + component; ``coordinates`` (rows, d) [m];
+    ``hierarchy``: of displacements whose contact conditions need one, else None.
     """
 
     dimension: int
@@ -28,6 +29,8 @@ class Space(Protocol):
     def coordinates(self) -> Array: ...
     @property
     def bodies(self) -> np.ndarray: ...
+    @property
+    def hierarchy(self) -> Any: ...
 
     def find_nodes(self, points: Array) -> np.ndarray:
         """Return the node numbers nearest to the points (k, d); InputError for a point outside the body."""

@@ -64,7 +64,7 @@ class Redistributed:
         algebra, nodal, own = system.algebra, _row_sums(system), system.M.diagonal()
         still = (own > 0.0) & ~system.influence.any(axis=1)  # no translation moves them
         lumping = self.lumping
-        if getattr(system.space, "hierarchy", None) is not None:
+        if system.space.hierarchy is not None:
             lumping = 0.0
         elif largest(algebra.comm, still.any()):
             raise InputError("redistributed mass has no place for the inertia of rotations, or of what else is no "
