@@ -100,7 +100,8 @@ def test_the_limit_of_poisson_s_ratio_is_sharp() -> None:
 
 
 def test_one_retardation_time_is_stiffness_proportional() -> None:
-    damping, tau = KelvinVoigt.from_retardation_time(STEEL, 1e-3), 1e-3
+    tau, G = 1e-3, STEEL.shear_modulus
+    damping = KelvinVoigt(tau * G, tau * (STEEL.lame_lambda + 2.0 / 3.0 * G))
     lame, shear = damping.viscosities
     assert (lame, shear) == pytest.approx((tau * STEEL.lame_lambda, tau * STEEL.shear_modulus), rel=1e-14)
     assert damping.coefficients(STEEL) == (0.0, 0.0) and Rayleigh(0.0, tau).ratio(1.0 / pi) == pytest.approx(tau)

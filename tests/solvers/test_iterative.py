@@ -125,7 +125,7 @@ def test_work_is_counted(parallel: bool) -> None:
         result, work = solver.solve(replace(c.step, active=np.full_like(c.step.active, start))), solver.work
         assert result.iterations >= 1
         assert work.products == work.linear_iterations + extra * result.iterations + 2
-        assert 0 <= work.renewals <= 4 and work.set_up_seconds > 0.0 and work.product_seconds >= 0.0
+        assert 0 <= work.renewals <= 4
 
 
 class Counting:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from ..core.checks import attributes, instance, number
+from ..core.checks import attributes
 from .materials import LinearElastic
 
 
@@ -15,7 +15,8 @@ class KelvinVoigt:
     Rigid motions feel nothing of it, and materials are not asked. A wave or a mode of one kind of strain has the
     damping ratio ½ w tau at w [rad/s], with tau = shear / G in shear, and (bulk + 4/3 shear) / (lambda + 2 mu) in a bar
     without lateral strain. Not for PlaneStress, where the strain across the panel would have a motion of its own
-    (``assemble`` refuses it; Rayleigh(0, beta) is the solid of one retardation time beta there).
+    (``assemble`` refuses it). With viscosities beta times the shear and bulk moduli, mu and lambda + 2/3 mu, it is
+    Rayleigh(0, beta), the solid of one retardation time, which goes with PlaneStress too.
     Raises InputError for a viscosity that is negative or not finite.
     """
 
@@ -24,15 +25,6 @@ class KelvinVoigt:
 
     def __post_init__(self) -> None:
         attributes(self, not_negative=("shear", "bulk"))
-
-    @classmethod
-    def from_retardation_time(cls, material: LinearElastic, time: float) -> "KelvinVoigt":
-        """Return the viscosities ``time`` [s] times the shear and bulk moduli of a material: C = time K of it."""
-        owner = "KelvinVoigt.from_retardation_time"
-        instance(owner, "the material", material, LinearElastic, "give a LinearElastic")
-        number(owner, "the time [s]", time, not_negative=True)
-        shear = time * material.shear_modulus
-        return cls(shear, time * material.lame_lambda + 2.0 / 3.0 * shear)
 
     def coefficients(self, material: LinearElastic) -> tuple[float, float]:
         """Return (0, 0): nothing is proportional to the mass or the stiffness of a material."""

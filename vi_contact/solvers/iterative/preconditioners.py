@@ -96,12 +96,12 @@ class Inverse:
     """Hold M⁻¹ as the PETSc preconditioner ``pc``: Jacobi and ICC, which do not depend on the contact set; made of the
     matrix with a diagonal larger by the factor 1 + ``raised``."""
 
-    def __init__(self, matrix: Any, layers: OptionLayers, work: Work, raised: float = 0.0) -> None:
+    def __init__(self, matrix: Any, layers: OptionLayers, raised: float = 0.0) -> None:
         made_of = matrix
         if raised:
             made_of, diagonal = matrix.duplicate(copy=True), matrix.getDiagonal()
             made_of.setDiagonal(diagonal * (1.0 + raised))
-        self.pc = made(made_of, layers, work)
+        self.pc = made(made_of, layers)
 
     def begin(self) -> None:
         """Begin a step."""
@@ -118,12 +118,11 @@ class Multigrid(Inverse):
 
     def __init__(self, nodewise: Nodewise, surface: ContactSurface, layers: OptionLayers, work: Work) -> None:
         self._nodewise, self._work, self._comm = nodewise, work, surface.comm
-        with work.set_up():
-            self._matrix = nodewise.entries()
-            if nodewise.A.space is not None:
-                modes = rigid_modes(nodewise.A, surface, nodewise.layout, self._matrix.createVecLeft())
-                self._matrix.setNearNullSpace(PETSc.NullSpace().create(vectors=modes, comm=self._matrix.comm))
-        super().__init__(self._matrix, layers, work)
+        self._matrix = nodewise.entries()
+        if nodewise.A.space is not None:
+            modes = rigid_modes(nodewise.A, surface, nodewise.layout, self._matrix.createVecLeft())
+            self._matrix.setNearNullSpace(PETSc.NullSpace().create(vectors=modes, comm=self._matrix.comm))
+        super().__init__(self._matrix, layers)
         self._built: Mask = np.zeros(nodewise.layout.size, dtype=bool)
         self._left = RENEWALS
 
@@ -142,24 +141,23 @@ class Multigrid(Inverse):
             self._renew(held)
 
     def _renew(self, held: Indices) -> None:
-        matrix, work = self._matrix, self._work
-        with work.set_up():
-            self._nodewise.entries(matrix)
-            diagonal = matrix.getDiagonal()
-            rows = matrix.getOwnershipRange()[0] + held
-            matrix.zeroRowsColumns(rows.astype(PETSc.IntType), diag=1.0)
-            matrix.setDiagonal(diagonal)
-            self.pc.setOperators(matrix)
-            self.pc.setUp()
-        work.renewals += 1
+        matrix = self._matrix
+        self._nodewise.entries(matrix)
+        diagonal = matrix.getDiagonal()
+        rows = matrix.getOwnershipRange()[0] + held
+        matrix.zeroRowsColumns(rows.astype(PETSc.IntType), diag=1.0)
+        matrix.setDiagonal(diagonal)
+        self.pc.setOperators(matrix)
+        self.pc.setUp()
+        self._work.renewals += 1
 
 
-def made(matrix: Any, layers: OptionLayers, work: Work) -> Any:
+def made(matrix: Any, layers: OptionLayers) -> Any:
     """Return a PETSc preconditioner of a matrix, from the options. InputError when PETSc does not take them."""
     pc = PETSc.PC().create(matrix.comm)
     pc.setOptionsPrefix(layers.prefix)
     pc.setOperators(matrix)
-    with work.set_up(), layers.in_force():
+    with layers.in_force():
         try:
             pc.setFromOptions()
             pc.setUp()

@@ -94,14 +94,13 @@ class PreparedIterative:
         nodewise = Nodewise(A)
         self._layout = layout = nodewise.layout
         self.kind = self._chosen(A)
-        with self.work.set_up():
-            blocks = nodewise.blocks()
+        blocks = nodewise.blocks()
         PETSc.garbage_cleanup(blocks.comm)
         self._operator = Operator(blocks, self.work)
         self._layers = OptionLayers(settings.prefix, defaults(self.kind, A.algebra.comm.size), settings.petsc_options)
         self._blocks, self._raised = blocks, False
         self._take(Multigrid(nodewise, surface, self._layers, self.work) if self.kind == GAMG
-                   else Inverse(blocks, self._layers, self.work))
+                   else Inverse(blocks, self._layers))
         self._diagonal = np.array(blocks.getDiagonal().array_r)
         self._contact = Contact(surface, scale, layout.places[surface.owned], self._diagonal, layout.missing)
         self._norm: float | None = None
@@ -139,7 +138,7 @@ class PreparedIterative:
             if self._surface.comm.rank == 0:
                 log.info("%s: tried again with incomplete factors of a larger diagonal", error)
         self._raised = True
-        self._take(Inverse(self._blocks, self._layers, self.work, RAISED))
+        self._take(Inverse(self._blocks, self._layers, RAISED))
         return self._attempt(step)
 
     def _attempt(self, step: StepProblem) -> StepResult:
