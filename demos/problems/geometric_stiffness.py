@@ -24,7 +24,6 @@ from vi_contact.core.step import State
 from vi_contact.core.system import Load, SemiDiscreteSystem
 from vi_contact.fem import compat
 from vi_contact.fem.petsc_algebra import PetscMatrix
-from vi_contact.fem.quadrature import compiled
 from vi_contact.fem.space import FemSpace, known_matrices, space_of
 
 
@@ -71,7 +70,7 @@ def initial_stress_matrix(space: FemSpace, nodal: Array) -> Any:
     u, v = ufl.TrialFunction(space.V), ufl.TestFunction(space.V)
     sigma = forms.stress(u0)
     form = ufl.inner(ufl.dot(ufl.grad(u), sigma), ufl.grad(v)) * ufl.dx
-    return compat.assemble_matrix(compiled(space, form))
+    return compat.assemble_matrix(space.compiled(form))
 
 
 def _with_prescribed(space: FemSpace, full: PetscMatrix, load: Load, t0: float) -> Load:

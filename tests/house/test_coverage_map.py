@@ -42,7 +42,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "fem/test_corners.py": "core.corners laws.mass_transfer",
     "fem/test_forces_in_space.py": "fem.output.cut_cells",
     "fem/test_forms.py": "fem.form_checks fem.own_forms",
-    "fem/test_heterogeneous.py": "fem.quadrature laws.kelvin_voigt",
+    "fem/test_heterogeneous.py": "laws.kelvin_voigt",
     "fem/test_mortar_in_space.py": "fem.contact.clipping fem.contact.sight",
     "fem/test_pairs.py": "fem.contact.matching",
     "fem/test_second_order.py": "fem.numbering",

@@ -140,31 +140,6 @@ def open_hdf5(path: Path) -> Any:
     return h5py.File(path, "r")
 
 
-def make_dataset(file: Any, name: str, shape: tuple[int, ...], kind: Any, **texts: str) -> Any:
-    """Return the number of a new HDF5 dataset with texts as attributes; the short way of h5py takes twice as long."""
-    from h5py import h5a, h5d, h5p, h5s, h5t, string_dtype
-
-    plan, link, text_kind = h5p.create(h5p.DATASET_CREATE), h5p.create(h5p.LINK_CREATE), string_dtype()
-    plan.set_obj_track_times(False)
-    link.set_create_intermediate_group(True)
-    types = [h5t.py_create(np.dtype(one), logical=True) for one in (kind, text_kind)]
-    dataset = h5d.create(file.id, name.encode(), types[0], h5s.create_simple(shape), plan, link)
-    for attribute, text in texts.items():
-        made = h5a.create(dataset, attribute.encode(), types[1], h5s.create(h5s.SCALAR))
-        made.write(np.array(text, dtype=text_kind))
-    return dataset
-
-
-def put_rows(dataset: Any, first: int, rows: np.ndarray) -> None:
-    """Write rows from this one on; for all of them there is a way in a sixth of the time."""
-    from h5py import Dataset, h5s
-
-    if rows.size and rows.shape == dataset.shape:
-        dataset.write(h5s.ALL, h5s.ALL, np.ascontiguousarray(rows))
-    else:
-        Dataset(dataset)[first : first + len(rows)] = rows
-
-
 def hdf5_atomically(path: Path, fill: Callable[[Any], None]) -> None:
     """Write an HDF5 file likewise, which need not fit the memory."""
     import h5py  # late: the package is imported without it

@@ -32,7 +32,6 @@ from .mesh import Cells, Facets
 from .own_forms import Forms, OwnForms
 from .petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
 from .petsc_rows import moved
-from .quadrature import compiled
 from .space import FemSpace
 from .ties import Tied
 
@@ -181,7 +180,7 @@ def _integrated(space: FemSpace, section: Section, load: AnyLoad) -> Callable[[f
         return lambda t: space.pull(full(t))
     g, v = ufl.TrialFunction(space.V), ufl.TestFunction(space.V)
     form = ufl.inner(load.acting(g, space.mesh), v) * load.measure(space.mesh)
-    matrix = PetscMatrix(compat.assemble_matrix(compiled(space, form)))
+    matrix = PetscMatrix(compat.assemble_matrix(space.compiled(form)))
 
     def at(t: float) -> Array:
         values = evaluate(type(load).__name__, load.value, space.points, t, space.comm)

@@ -29,7 +29,6 @@ from . import compat
 from .groups import facets_of
 from .mesh import Facets
 from .petsc_algebra import PetscMatrix
-from .quadrature import compiled
 from .space import FemSpace
 
 log = logging.getLogger(__name__)
@@ -128,7 +127,7 @@ class DashpotMatrix:
         along = ufl.dot(u, n) * ufl.dot(v, n)
         density = self._normal * along + self._tangential * (ufl.inner(u, v) - along)
         measure = compat.measure(self.space.mesh, self.space.mesh.topology.dim - 1, facets)
-        return compat.assemble_matrix(compiled(self.space, density * measure))
+        return compat.assemble_matrix(self.space.compiled(density * measure))
 
     def _resistance(self, mat: Any) -> Array:
         """∫ e_c·D e_c of every direction c, on all ranks."""

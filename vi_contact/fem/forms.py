@@ -22,7 +22,6 @@ from .dashpots import Dashpots
 from .dilatation import MeanDilatation
 from .heterogeneous import Heterogeneous
 from .mesh import Cells
-from .quadrature import compiled
 from .space import FemSpace
 
 Material = LinearElastic | Orthotropic | Heterogeneous
@@ -148,7 +147,7 @@ class ElasticForms:
 
     def matrix(self, name: str) -> Any:
         """Assemble the full matrix M, K, or C of the materials (PETSc), before elimination."""
-        matrix = compat.assemble_matrix(compiled(self.space, self.bilinear(name)))
+        matrix = compat.assemble_matrix(self.space.compiled(self.bilinear(name)))
         if self.dilatation is not None and name != "M":
             self.dilatation.add(matrix, self.fields["lame"], self.fields["beta"] if name == "C" else None)
         return matrix

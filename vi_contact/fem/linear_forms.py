@@ -14,7 +14,6 @@ from ..core.errors import InputError
 from . import compat
 from .form_checks import form_of
 from .loads import BodyForce, Traction
-from .quadrature import compiled
 from .space import FemSpace
 
 NAME = "LinearForm"
@@ -63,7 +62,7 @@ class LinearForm:
             return lambda t: np.asarray(self._once[space])
         name, v = f"{NAME}: form", ufl.TestFunction(space.V)
         form = form_of(name, self.form, space, v)
-        vector_of = on_all(space.comm, name, lambda: compiled(space, form))
+        vector_of = on_all(space.comm, name, lambda: space.compiled(form))
         update = self.update
 
         def at(t: float) -> Array:

@@ -3,11 +3,11 @@
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 
 from ..core.algebra import Algebra, Array, Comm, Indices, Mask, from_each, largest
 from ..core.checks import at
 from ..core.errors import InputError
+from ..meshes.rows import connected
 
 MEANT = 0.05  # of the size of a body: how far from it a point may be that stands for the nearest node
 
@@ -109,10 +109,7 @@ def parts_of(comm: Comm, first: Any, second: Any, numbers: Indices, shared: Indi
 
 def _smallest(first: Any, second: Any, numbers: Indices) -> Indices:
     """The smallest number (n,) among those that edges first-second join each one to."""
-    graph = sp.coo_matrix((np.ones(len(first)), (first, second)), shape=(len(numbers), len(numbers)))
-    from scipy.sparse.csgraph import connected_components  # late: it takes a while
-
-    _, part = connected_components(graph, directed=False)
+    part = connected(len(numbers), first, second)
     smallest = np.full(part.max(initial=-1) + 1, np.iinfo(np.int64).max)
     np.minimum.at(smallest, part, numbers)
     return smallest[part]

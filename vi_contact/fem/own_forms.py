@@ -12,7 +12,6 @@ from ..laws.materials import Damping, PlaneStrain, Rayleigh, Section
 from . import compat
 from .form_checks import form_of, is_symmetric, matrix_of, refuse_masses, refuse_stress, takes
 from .forms import ElasticForms, Material
-from .quadrature import compiled
 from .space import FemSpace
 
 Bilinear = Callable[[Any, Any], Any]
@@ -80,7 +79,7 @@ class OwnForms(ElasticForms):
         if dampers:
             self._forms["C"] = sum(dampers[1:], dampers[0])
         self._full = {
-            name: matrix_of(ROLES[name], space, partial(compiled, space, form)) for name, form in self._forms.items()
+            name: matrix_of(ROLES[name], space, partial(space.compiled, form)) for name, form in self._forms.items()
         }
         refuse_masses(self._full["M"], space)
         self.symmetric = all(is_symmetric(one, space) for one in self._full.values())

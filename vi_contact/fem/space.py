@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+import ufl
 from petsc4py import PETSc
 
 from ..core.algebra import Array, Indices, Mask, from_each, total
@@ -124,6 +125,16 @@ class FemSpace(NodalSpace):
         self._P = PetscMatrix(self._selection()) if tied else None
         self.forms: Any = None  # the ElasticForms of the system made on it; stress output needs them
         self.quadrature_degree: int | None = None  # of all its forms; None: as UFL estimates it
+
+    def compiled(self, form: Any) -> Any:
+        """Compile a form, its integrals with the quadrature degree of the space, if any, unless they say their own."""
+        degree = self.quadrature_degree
+        if degree is None:
+            return compat.compile_form(form)
+        return compat.compile_form(ufl.Form([
+            one if "quadrature_degree" in one.metadata()
+            else one.reconstruct(metadata={**one.metadata(), "quadrature_degree": degree}) for one in form.integrals()
+        ]))
 
     @property
     def translations(self) -> list[Array]:

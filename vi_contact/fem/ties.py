@@ -12,11 +12,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 
 from ..core.algebra import Array, Indices
 from ..core.checks import at
 from ..core.errors import InputError
+from ..meshes.rows import connected
 from .groups import components_given, components_of, facets_of
 from .mesh import Facets
 
@@ -62,14 +62,10 @@ def linked(tied: Sequence[Tied], dimension: int, near: float, nodes: NodesOf) ->
     """
     if not tied:
         return Links(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
-    from scipy.sparse.csgraph import connected_components  # late: it takes a while
-
     pairs = [_pairs(tie, dimension, near, nodes) for tie in tied]
     first, second = (np.concatenate(side) for side in zip(*pairs, strict=True))
     members, index = np.unique(np.concatenate([first, second]), return_inverse=True)
-    ends = index.ravel().reshape(2, -1)
-    graph = sp.coo_matrix((np.ones(len(first)), (ends[0], ends[1])), shape=(len(members), len(members)))
-    _, part = connected_components(graph, directed=False)
+    part = connected(len(members), *index.ravel().reshape(2, -1))
     order = np.lexsort((members, np.isin(members, second), part))  # of every part the leader first
     _, start = np.unique(part[order], return_index=True)
     leaders = members[order[start]][part]

@@ -9,14 +9,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.checks import at
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.extract import MeshArrays, Source, add_arrays, arrays_of
-from vi_contact.meshes.rows import Mask, Rows, cell_sides, number_alike, vertex_count
+from vi_contact.meshes.rows import Mask, Rows, cell_sides, connected, number_alike, vertex_count
 
 
 @dataclass(frozen=True)
@@ -156,8 +154,7 @@ def _doubled(arrays: MeshArrays, nodes: Rows, sides: Rows, owner: Rows, one: Row
         return order[np.searchsorted(key[order], (owner[rows][:, None] * n + vertices)[np.isin(vertices, nodes)])]
 
     links = place(one), place(other)
-    graph = sp.coo_matrix((np.ones(len(links[0])), links), shape=(len(key), len(key)))
-    _, part = connected_components(graph, directed=False)
+    part = connected(len(key), *links)
     _, first = np.unique(node, return_index=True)
     keeps = np.isin(part, part[first])  # the part of the first cell around a node keeps it
     _, number = np.unique(node[~keeps] * len(key) + part[~keeps], return_inverse=True)  # new nodes in order of the old

@@ -1,7 +1,8 @@
-"""Handle rows of vertices: the sides of cells, and which rows have the same members."""
+"""Handle rows of vertices: the sides of cells, which rows have the same members, and what hangs together."""
 
 import numpy as np
 import numpy.typing as npt
+from scipy.sparse import coo_matrix
 
 Rows = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
@@ -55,3 +56,11 @@ def found_in(numbers: Rows, among: Rows) -> Mask:
     known = np.zeros(max(numbers.max(initial=0), among.max(initial=0)) + 1, dtype=bool)
     known[among] = True
     return known[numbers]
+
+
+def connected(count: int, one: Rows, other: Rows) -> Rows:
+    """Return the number of the part (count,) that each of so many things belongs to when pairs one-other are linked."""
+    graph = coo_matrix((np.ones(len(one)), (one, other)), shape=(count, count))
+    from scipy.sparse.csgraph import connected_components  # late: it takes a while
+
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)

@@ -11,8 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..core.algebra import Array, Indices
@@ -20,6 +18,7 @@ from ..core.checks import array
 from ..core.errors import InputError
 from ..core.files import FIELDS, frames_of, open_hdf5
 from ..engineering.resultants import Geometry, tangent_vectors
+from ..meshes.rows import connected
 from ..run.files.reading import RunFolder, read_run
 
 OPEN, STICK, SLIP = 1, 2, 3  # as contact_status in fields.xdmf
@@ -56,8 +55,7 @@ class StoredFrames:
         """Return the number (c,) of the body of each cell: cells that share nodes are of one body."""
         count, corners = self.cells.shape
         links = np.repeat(np.arange(count), corners), count + self.cells.ravel()  # from cells to their nodes
-        graph = coo_matrix((np.ones(count * corners), links), (count + len(self.points),) * 2)
-        return np.asarray(connected_components(graph, directed=False)[1][:count])
+        return connected(count + len(self.points), *links)[:count]
 
     @cached_property
     def boundary(self) -> tuple[Indices, Indices]:

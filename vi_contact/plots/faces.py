@@ -6,8 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..core.algebra import Array, Indices
@@ -16,6 +14,7 @@ from ..core.errors import InputError
 from ..core.files import frames_of
 from ..core.step import AXES
 from ..engineering.resultants import Geometry, tangent_vectors
+from ..meshes.rows import connected
 from ..run.files.reading import RunFolder
 from .deformed import OPEN, SAME, SLIP, STICK, contact_states, nearest, read_frames, stored_tangents
 from .histories import STYLE, History, length_unit, plain, save, scale
@@ -50,7 +49,7 @@ def faces_of(contact: Geometry, sides: Indices) -> list[Face]:
     near = cKDTree(points).query(points, k=min(NEIGHBOURS, m))[1].reshape(m, -1)
     alike = np.einsum("mki,mi->mk", normals[near], normals) > np.cos(FEATURE_ANGLE)
     rows = np.repeat(np.arange(m), alike.sum(axis=1))
-    piece = connected_components(coo_matrix((np.ones(len(rows)), (rows, near[alike])), (m, m)), directed=False)[1]
+    piece = connected(m, rows, near[alike])
     planes: dict[Any, list[Indices]] = {}
     for own in (np.flatnonzero(piece == number) for number in range(piece.max() + 1)):
         normal = normals[own[0]]

@@ -10,13 +10,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 import ufl
 
 from ...core.algebra import Array, Indices, Mask, from_each
 from ...core.checks import at, number
 from ...core.errors import InputError
-from ...meshes.rows import number_alike
+from ...meshes.rows import connected, number_alike
 from .. import compat
 from ..mesh import Facets
 from ..numbering import facet_rows, is_curved
@@ -58,13 +57,14 @@ class Boundary:
             turn = _turn(normals[one], normals[other])
             close = turn <= angle * (1.0 + 1e-9)
             links.append(np.stack([one[close], other[close]]))
-        return components(len(node), links).reshape(self.vertices.shape)
+        pairs = np.concatenate([np.zeros((2, 0), dtype=np.int64), *links], axis=1)
+        return connected(len(node), *pairs).reshape(self.vertices.shape)
 
     def faces(self, angle: float) -> Indices:
         """Number the face (k,) of each facet over the whole boundary."""
         k, v = self.vertices.shape
-        of_facet = np.stack([np.repeat(np.arange(k), v), k + self.corner_faces(angle).ravel()])
-        return np.unique(components(k + k * v, [of_facet])[:k], return_inverse=True)[1].ravel()
+        of_facet = np.repeat(np.arange(k), v), k + self.corner_faces(angle).ravel()
+        return np.unique(connected(k + k * v, *of_facet)[:k], return_inverse=True)[1].ravel()
 
 
 def checked_angle(owner: str, value: Any) -> float:
@@ -154,15 +154,6 @@ def _curved(space: FemSpace, facets: Any, plane: Array) -> Array:
 def _turn(one: Array, other: Array) -> Array:
     """Angles between unit vectors (k, d)."""
     return np.asarray(2.0 * np.arctan2(np.linalg.norm(one - other, axis=1), np.linalg.norm(one + other, axis=1)))
-
-
-def components(count: int, links: list[Indices]) -> Indices:
-    """Return the number of the connected part of each of ``count`` things, of which pairs are linked."""
-    one, other = np.concatenate([np.zeros((2, 0), dtype=np.int64), *links], axis=1)
-    graph = sp.coo_matrix((np.ones(len(one)), (one, other)), shape=(count, count))
-    from scipy.sparse.csgraph import connected_components  # late: it takes a while
-
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
 def integrals(space: FemSpace, indices: Any) -> Array:

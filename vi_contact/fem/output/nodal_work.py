@@ -24,7 +24,6 @@ from ..contact.surface import moved_by_held
 from ..groups import facets_of
 from ..linear_forms import AnyLoad, LinearForm, Loads
 from ..loads import BodyForce, Traction, as_tuple, evaluate
-from ..quadrature import compiled
 from ..space import known_matrices, space_of
 
 log = logging.getLogger(__name__)
@@ -64,13 +63,13 @@ class NodalWork:
             raise InputError(f"gravity has {self._gravity.size} components: give {space.dimension}")
         self._r, self._inside = compat.function(space.V), compat.function(compat.cell_space(space.mesh))
         self._forms = [
-            compiled(space, space.forms.against(name, self._r, self._inside))
+            space.compiled(space.forms.against(name, self._r, self._inside))
             if name != "C" or space.forms.damped else None for name in ("K", "C", "M")
         ]
         g, mesh, h = ufl.TestFunction(space.V), space.mesh, space.forms.section.thickness
         self._load_forms = [  # their products with nodal values of the loads are rᵀf
             None if isinstance(load, LinearForm)
-            else compiled(space, h * self._inside * ufl.inner(self._r, load.acting(g, mesh)) * load.measure(mesh))
+            else space.compiled(h * self._inside * ufl.inner(self._r, load.acting(g, mesh)) * load.measure(mesh))
             for load in self._loads
         ]
         self._nodal = {k: one.full(space, h) for k, one in enumerate(self._loads) if isinstance(one, LinearForm)}

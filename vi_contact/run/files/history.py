@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.files import hdf5_atomically, make_dataset, open_hdf5, push, put_rows, to_json, write_all, write_atomically
+from ...core.files import hdf5_atomically, open_hdf5, push, to_json, write_all, write_atomically
 from ...core.step import Row
 from .folder import COLUMNS, FORMAT, HISTORY_CSV, HISTORY_H5, JOURNAL
 from .stored_rows import StoredArrays, StoredRows, lines_of, read_blocks, records_of
@@ -128,21 +128,21 @@ class HistoryFiles:
         found = {}
         for name, (unit, meaning) in self._table.columns.items():
             sample = self._table.arrays.get(name, np.zeros(()))
-            shape = (self._rows, *sample.shape)
-            found[name] = make_dataset(file, name, shape, sample.dtype, unit=unit, meaning=meaning), sample.nbytes
+            dataset = file.create_dataset(name, (self._rows, *sample.shape), sample.dtype)
+            dataset.attrs.update(unit=unit, meaning=meaning)
+            found[name] = dataset, sample.nbytes
         if kept:
             with open_hdf5(self._folder / HISTORY_H5) as old:
                 for name, (dataset, size) in found.items():
                     step = max(1, STRIDE // max(size, 1))
                     for i in range(0, kept, step):
-                        put_rows(dataset, i, old[name][i : min(i + step, kept)])
+                        dataset[i : min(i + step, kept)] = old[name][i : min(i + step, kept)]
         for block in blocks:
             for name, (dataset, _) in found.items():
-                put_rows(dataset, kept, block[name])
+                dataset[kept : kept + len(block["k"])] = block[name]
             kept += len(block["k"])
         for name, unit in GEOMETRY.items():
-            values = self._geometry[name]
-            put_rows(make_dataset(file, f"contact/{name}", values.shape, values.dtype, unit=unit), 0, values)
+            file.create_dataset(f"contact/{name}", data=self._geometry[name]).attrs["unit"] = unit
 
     def close(self) -> None:
         """Write all rows into history.h5 and leave no journal; what cannot be written stays in the other files."""
