@@ -127,7 +127,7 @@ class FemSpace(NodalSpace):
         self.quadrature_degree: int | None = None  # of all its forms; None: as UFL estimates it
 
     def compiled(self, form: Any) -> Any:
-        """Compile a form, its integrals with the quadrature degree of the space, if any, unless they say their own."""
+        """Return a form compiled, its integrals with the degree of the space, if any, unless they say their own."""
         degree = self.quadrature_degree
         if degree is None:
             return compat.compile_form(form)
