@@ -15,7 +15,7 @@ SECOND_ORDER = {  # the same of cells with a node in the middle of every edge, s
     "interval": (8, 15), "triangle": (9, 8), "quadrilateral": (10, 8), "tetrahedron": (11, 9), "hexahedron": (12, 10),
 }
 
-_SIDES: dict[str, list[tuple[int, ...]]] = {
+SIDES: dict[str, list[tuple[int, ...]]] = {  # of a cell, its corners in the order of VTK
     "interval": [(0,), (1,)],
     "triangle": [(0, 1), (1, 2), (2, 0)],
     "quadrilateral": [(0, 1), (1, 2), (2, 3), (3, 0)],
@@ -26,12 +26,12 @@ _SIDES: dict[str, list[tuple[int, ...]]] = {
 
 def vertex_count(cell: str) -> int:
     """Return how many vertices a cell has: the first of its nodes."""
-    return len({vertex for side in _SIDES[cell] for vertex in side})
+    return len({vertex for side in SIDES[cell] for vertex in side})
 
 
 def cell_sides(cells: Rows, cell: str) -> tuple[Rows, Rows]:
     """Return all sides (n_cells * n_sides, n_side_vertices), vertices ascending, and the cell of each side."""
-    sides = np.array(_SIDES[cell])
+    sides = np.array(SIDES[cell])
     rows = np.sort(cells[:, sides].reshape(-1, sides.shape[1]), axis=1)
     return rows, np.repeat(np.arange(len(cells)), len(sides))
 

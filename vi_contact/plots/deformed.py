@@ -18,17 +18,13 @@ from ..core.checks import array
 from ..core.errors import InputError
 from ..core.files import FIELDS, frames_of, open_hdf5
 from ..engineering.resultants import Geometry, tangent_vectors
-from ..meshes.rows import connected
+from ..meshes.rows import SIDES, connected
 from ..run.files.reading import RunFolder, read_run
 
 OPEN, STICK, SLIP = 1, 2, 3  # as contact_status in fields.xdmf
 SAME = 1e-6  # of the size of what is drawn: what lies at one place or in one plane
 FACING = 0.5  # least cosine between the contact direction of a node and the normals of its facets
-_SIDES = {  # the sides of a cell by (dimension, corners), its corners in the order of VTK
-    (2, 3): ((0, 1), (1, 2), (2, 0)), (2, 4): ((0, 1), (1, 2), (2, 3), (3, 0)),
-    (3, 4): ((0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)),
-    (3, 8): ((0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
-}
+CELLS = {(2, 3): "triangle", (2, 4): "quadrilateral", (3, 4): "tetrahedron", (3, 8): "hexahedron"}  # dimension, corners
 
 
 @dataclass(frozen=True)
@@ -60,7 +56,7 @@ class StoredFrames:
     @cached_property
     def boundary(self) -> tuple[Indices, Indices]:
         """Return the sides of cells (s, corners) that are no other cell's, and the cell (s,) of each."""
-        sides = self.cells[:, np.array(_SIDES[self.points.shape[1], self.cells.shape[1]])]
+        sides = self.cells[:, np.array(SIDES[CELLS[self.points.shape[1], self.cells.shape[1]]])]
         rows = np.sort(sides.reshape(-1, sides.shape[2]), axis=1)
         _, first, counts = np.unique(rows, axis=0, return_index=True, return_counts=True)
         alone = np.sort(first[counts == 1])

@@ -13,7 +13,7 @@ from typing import Any, Protocol, cast
 
 from petsc4py import PETSc
 
-from ...core.algebra import Array, EffectiveMatrix
+from ...core.algebra import EffectiveMatrix
 from ...core.checks import instance, provides, real, shown
 from ...core.errors import InputError, StepFailure
 from ...core.problem import ContactProblem
@@ -26,42 +26,21 @@ from .friction import VolumeFriction
 from .friction_system import FrictionSystem, ScaledFrictionStep
 from .options import OptionLayers, Options
 from .scaled_step import ScaledStep
-from .snes import ReducedNewton, SemismoothNewton
-from .tao import TaoTron
+from .snes import ReducedNewton, SemismoothNewton, SnesDriver
+from .tao import TaoDriver, TaoTron
 
 __all__ = ["ReducedNewton", "SemismoothNewton", "TaoTron", "Volume"]
 
 
-class Driver(Protocol):
-    """Run a PETSc solver bound to a ScaledStep."""
-
-    solver: Any
-    reasons: type
-
-    def run(self) -> tuple[Array, Array, int, int]:
-        """Return (y, F(y), PETSc's reason, iterations) of the scaled step."""
-
-    def destroy(self) -> None: ...
-
-
 class Method(Protocol):
-    """Say how the bounded problem is solved: settings that make a driver.
-
-    One that ``carries_friction`` is a FrictionMethod.
-    """
+    """Say how the bounded problem is solved: settings that make a driver. One that ``carries_friction`` makes two, as
+    ReducedNewton does."""
 
     @property
     def carries_friction(self) -> bool: ...
 
     def defaults(self, ranks: int) -> Options: ...
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> Any: ...
-
-
-class FrictionMethod(Method, Protocol):
-    """Solve with friction too: its settings for the larger system."""
-
-    def friction_defaults(self) -> Options: ...
-    def friction_driver(self, scaled: ScaledFrictionStep, layers: OptionLayers) -> Any: ...
 
 
 @dataclass(frozen=True)
@@ -118,7 +97,7 @@ class PreparedVolume:
         self._scaled = ScaledStep(self._system, settings.tolerance)
         self._name = f"Volume({type(settings.method).__name__})"
         self._friction: VolumeFriction | None = None
-        self._driver: Driver | None = self._method.driver(self._scaled, self._layers)
+        self._driver: SnesDriver | TaoDriver | None = self._method.driver(self._scaled, self._layers)
 
     def _layered(self, defaults: Options) -> OptionLayers:
         return OptionLayers(self._settings.prefix, defaults, self._settings.petsc_options)
@@ -127,7 +106,7 @@ class PreparedVolume:
         """The problem with friction, made at the first step that has some, in the place of the other one."""
         if self._friction is None:
             self.close()
-            method, tolerance = cast(FrictionMethod, self._method), self._settings.tolerance
+            method, tolerance = cast(ReducedNewton, self._method), self._settings.tolerance
             scaled = ScaledFrictionStep(FrictionSystem(self._system), tolerance)
             self._driver = method.friction_driver(scaled, self._layered(method.friction_defaults()))
             self._friction = VolumeFriction(scaled, self._driver, self._name)
