@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.algebra import Array
 from ..core.checks import array, instance, number, several, whole
 from ..core.errors import InputError
 from ..core.system import SemiDiscreteSystem
@@ -21,24 +20,8 @@ def with_weight(
 
     acceleration: g [m/s²]; direction: where it acts, of length one, (0, -1) or (0, 0, -1) by default, in one dimension
     (-1,). bodies: the numbers of those that have weight (``fem.bodies_of``), all by default. It is the load of
-    ``BodyForce`` with the density of every material. InputError as for ``own_weight``.
-    """
-    weight = own_weight(system, acceleration, direction)  # first: it checks what is given
-    if bodies is not None:
-        numbers = np.asarray(system.space.bodies)
-        last = bodies_in(system.algebra.comm, numbers) - 1
-        given = several("with_weight", "bodies", bodies, "give numbers such as fem.bodies_of returns, or None")
-        heavy = [whole("with_weight", "the number of a body", one, most=last) for one in given]
-        weight = np.where(np.isin(numbers, heavy), weight, 0.0)
-    return system.changed(load=replace(system.load, constant=system.load.constant + weight))
-
-
-def own_weight(
-    system: SemiDiscreteSystem, acceleration: float = STANDARD_GRAVITY, direction: tuple[float, ...] | None = None
-) -> Array:
-    """Return M r g [N] on the unknowns; see ``with_weight``.
-
-    InputError for a direction of another length, and a system without ``base_inertia``: it lost the mass at held nodes.
+    ``BodyForce`` with the density of every material. InputError for a direction of another length, and a system without
+    ``base_inertia``: it lost the mass at held nodes.
     """
     instance("with_weight", "system", system, SemiDiscreteSystem, "give a system, such as fem.assemble returns")
     number("with_weight", "acceleration", acceleration, unit="m/s²")
@@ -49,4 +32,11 @@ def own_weight(
         raise InputError(f"the direction {tuple(way)} of gravity: give {d} components of a vector of length one")
     if system.base_mass is None:
         raise InputError("the weight needs the mass at held nodes: assemble with base_inertia=True")
-    return system.inertia(acceleration * way)
+    weight = system.inertia(acceleration * way)
+    if bodies is not None:
+        numbers = np.asarray(system.space.bodies)
+        last = bodies_in(system.algebra.comm, numbers) - 1
+        given = several("with_weight", "bodies", bodies, "give numbers such as fem.bodies_of returns, or None")
+        heavy = [whole("with_weight", "the number of a body", one, most=last) for one in given]
+        weight = np.where(np.isin(numbers, heavy), weight, 0.0)
+    return system.changed(load=replace(system.load, constant=system.load.constant + weight))
