@@ -11,6 +11,8 @@ from ..core.lazy import lazy
 
 _CONTENTS = {
     "companion": ("CompanionRun",),
+    "curves": ("SoilCurves",),
+    "equivalent_linear": ("SiteResponse", "equivalent_linear"),
     "free_field": ("FreeField",),
     "moving_base": ("BaseMotion", "base_motion"),
     "soil_column": ("SoilColumn",),

@@ -1,6 +1,9 @@
 # ruff: noqa
 # Made from __init__.py by docs/make_api.py, for checkers of types and editors.
 from .companion import CompanionRun as CompanionRun
+from .curves import SoilCurves as SoilCurves
+from .equivalent_linear import SiteResponse as SiteResponse
+from .equivalent_linear import equivalent_linear as equivalent_linear
 from .free_field import FreeField as FreeField
 from .moving_base import BaseMotion as BaseMotion
 from .moving_base import base_motion as base_motion
@@ -8,4 +11,4 @@ from .soil_column import SoilColumn as SoilColumn
 from .upgoing_wave import UpgoingVelocity as UpgoingVelocity
 from .upgoing_wave import upgoing as upgoing
 
-__all__: list[str] = ['BaseMotion', 'CompanionRun', 'FreeField', 'SoilColumn', 'UpgoingVelocity', 'base_motion', 'upgoing']
+__all__: list[str] = ['BaseMotion', 'CompanionRun', 'FreeField', 'SiteResponse', 'SoilColumn', 'SoilCurves', 'UpgoingVelocity', 'base_motion', 'equivalent_linear', 'upgoing']
