@@ -20,16 +20,17 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the sou
 import numpy as np
 
 from demos.pictures.layer import plot_bounces_of_body, plot_thin_limit
+from demos.problems.rigid_body import Ellipsoid, RigidBody
 from vi_contact import boundary_layer
 from vi_contact.cli import status_of
 
 # Parameters ----------------------------------------------------------------------------------------------------------
-BODY = boundary_layer.RigidBody(mass=2.0, inertia=(0.2, 0.3, 0.4), point=(0.3, -0.2, -0.5))
+BODY = RigidBody(mass=2.0, inertia=(0.2, 0.3, 0.4), point=(0.3, -0.2, -0.5))
 BEFORE = np.array([0.3, 0.0, -1.0, 0.5, -0.4, 0.2])  # velocity of the mass centre, spin in the body
 RESTITUTION = 0.593624
 WIDTHS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)  # b [m]
-EGG = boundary_layer.RigidBody(
-    mass=2.0, inertia=(0.1, 0.136, 0.164), point=boundary_layer.Ellipsoid((0.5, 0.4, 0.3)), gravity=(0.0, 0.0, -9.81)
+EGG = RigidBody(
+    mass=2.0, inertia=(0.1, 0.136, 0.164), point=Ellipsoid((0.5, 0.4, 0.3)), gravity=(0.0, 0.0, -9.81)
 )
 START = np.array([0.0, 0.0, 1.5, 0.92, 0.25, -0.2, 0.2])  # mass centre, quaternion
 THROW = np.array([0.3, 0.0, 0.0, 0.5, -0.4, 3.0])

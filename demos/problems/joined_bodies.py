@@ -15,12 +15,12 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from ..core.algebra import Array, Indices, Mask
-from ..core.checks import array, at, mask, optional, provides
-from ..core.errors import InputError
-from .contact import SUPPORTED
-from .energetic import summed
-from .poincare_steklov import BoundaryMotion, BoundaryProblem, CondensedCompliance
+from vi_contact.bem.contact import SUPPORTED
+from vi_contact.bem.energetic import summed
+from vi_contact.bem.poincare_steklov import BoundaryMotion, BoundaryProblem, CondensedCompliance
+from vi_contact.core.algebra import Array, Indices, Mask
+from vi_contact.core.checks import array, at, mask, optional, provides
+from vi_contact.core.errors import InputError
 
 MATCH = 1e-9  # of the extent of the interface: distance of matching nodes
 

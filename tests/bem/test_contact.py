@@ -12,6 +12,7 @@ from convolution_operator import convolution_operator
 import vi_contact as vc
 from demos.problems.boundary_elements import pressed, square_problem, steklov, unloaded
 from demos.problems.contact_ledger import ledger
+from demos.problems.joined_bodies import TwoBodies
 from demos.problems.whole_runs import Reference, compare_runs
 from vi_contact import solvers
 from vi_contact.bem import (
@@ -21,7 +22,6 @@ from vi_contact.bem import (
 )
 from vi_contact.bem.contact import BoundaryContact, conditions_on
 from vi_contact.bem.contact_run import ContactRun, march_contact
-from vi_contact.bem.two_bodies import TwoBodies
 from vi_contact.bem.uzawa_space_time import SpaceTimeUzawa
 from vi_contact.core.errors import InputError, StepFailure
 

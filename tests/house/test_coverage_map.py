@@ -18,13 +18,12 @@ TESTS = Path(__file__).parents[1]
 COVERS = {  # test file -> modules without a test file of their own; tests reach some of them through their users
     "beam/test_algorithm.py": "beam.tip beam.values",
     "bem/test_boundary_operators.py": "bem.loops",
-    "bem/test_contact.py": "bem.contact_run bem.two_bodies bem.uzawa_space_time",
+    "bem/test_contact.py": "bem.contact_run bem.uzawa_space_time",
     "bem/test_energetic.py": "bem.loads bem.poincare_steklov",
     "bem/test_fundamental_solution.py": "bem.rules",
     "bem/test_thin_bodies.py": "bem.element_pairs bem.quadrature",
     "boundary_layer/test_constrained_motion.py":
-        "boundary_layer.bilateral boundary_layer.metric boundary_layer.motion boundary_layer.rigid_body "
-        "boundary_layer.trajectory",
+        "boundary_layer.bilateral boundary_layer.metric boundary_layer.motion boundary_layer.trajectory",
     "boundary_layer/test_contact_law.py": "boundary_layer.layer boundary_layer.scheme",
     "cli/test_fuzz_cli.py": "cli.errors",
     "cli/test_entry.py": "cli.options studies.cases.library",

@@ -18,6 +18,7 @@ from demos.problems.disk import Disk, Push
 from demos.problems.embedded import Embedded
 from demos.problems.loose_segments import from_segments
 from demos.problems.published_beam import readings
+from demos.problems.rigid_body import Ellipsoid, RigidBody
 from demos.problems.square import Square
 from vi_contact import beam, bem
 from vi_contact.boundary_layer.bilateral import bilateral_motion
@@ -25,7 +26,6 @@ from vi_contact.boundary_layer.contact_law import ContactLayer, contact_layer
 from vi_contact.boundary_layer.layer import Layer
 from vi_contact.boundary_layer.motion import ConstrainedSystem
 from vi_contact.boundary_layer.particle import ParticleImpact, damping_ratio, layer_for, restitution
-from vi_contact.boundary_layer.rigid_body import Ellipsoid, RigidBody
 from vi_contact.boundary_layer.scheme import BoundaryLayer
 from vi_contact.boundary_layer.trajectory import layer_motion
 

@@ -19,7 +19,6 @@ _CONTENTS = {
     "loads": ("traction_forces",),
     "poincare_steklov": ("BoundaryMotion", "BoundaryProblem", "CondensedCompliance", "PoincareSteklov"),
     "quadrature": ("Orders",),
-    "two_bodies": ("TwoBodies",),
     "uzawa_space_time": ("SpaceTimeUzawa",),
 }
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -19,7 +19,6 @@ from .poincare_steklov import BoundaryProblem as BoundaryProblem
 from .poincare_steklov import CondensedCompliance as CondensedCompliance
 from .poincare_steklov import PoincareSteklov as PoincareSteklov
 from .quadrature import Orders as Orders
-from .two_bodies import TwoBodies as TwoBodies
 from .uzawa_space_time import SpaceTimeUzawa as SpaceTimeUzawa
 
-__all__: list[str] = ['BoundaryContact', 'BoundaryMesh', 'BoundaryMotion', 'BoundaryProblem', 'CondensedCompliance', 'Conditions', 'ContactRun', 'EnergeticBlocks', 'Galerkin', 'OperatorMatrices', 'Orders', 'PoincareSteklov', 'SpaceTimeUzawa', 'TimeKernels', 'TwoBodies', 'circle', 'conditions_on', 'energetic_blocks', 'march_contact', 'polygon', 'traction_forces']
+__all__: list[str] = ['BoundaryContact', 'BoundaryMesh', 'BoundaryMotion', 'BoundaryProblem', 'CondensedCompliance', 'Conditions', 'ContactRun', 'EnergeticBlocks', 'Galerkin', 'OperatorMatrices', 'Orders', 'PoincareSteklov', 'SpaceTimeUzawa', 'TimeKernels', 'circle', 'conditions_on', 'energetic_blocks', 'march_contact', 'polygon', 'traction_forces']

@@ -1,8 +1,9 @@
 """Model contact in a thin layer before the obstacle, as a smooth force: b-geometry.
 
 Begin with ``layer`` (force, cut-off) and ``particle`` (closed form). ``motion`` and ``trajectory`` take any constrained
-system, ``rigid_body`` an ellipsoid, ``bilateral`` equality constraints; ``metric``: b-metric and b-affinities;
-``contact_law``, ``scheme``: contact nodes of finite element bodies. See docs/theory/boundary_layer.md.
+system, such as the rigid bodies of demos/problems/rigid_body.py, ``bilateral`` equality constraints; ``metric``:
+b-metric and b-affinities; ``contact_law``, ``scheme``: contact nodes of finite element bodies. See
+docs/theory/boundary_layer.md.
 >>> from vi_contact.boundary_layer import ParticleImpact, layer_for
 >>> round(ParticleImpact(layer_for(0.5, mass=1.0, speed=2.0, width=1e-3), mass=1.0, speed=2.0).restitution, 9)
 0.5
@@ -17,7 +18,6 @@ _CONTENTS = {
     "metric": ("Metric",),
     "motion": ("ConstrainedSystem",),
     "particle": ("ParticleImpact", "layer_for"),
-    "rigid_body": ("Ellipsoid", "RigidBody"),
     "scheme": ("BoundaryLayer",),
     "trajectory": ("layer_motion",),
 }

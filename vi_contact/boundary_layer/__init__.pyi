@@ -8,9 +8,7 @@ from .metric import Metric as Metric
 from .motion import ConstrainedSystem as ConstrainedSystem
 from .particle import ParticleImpact as ParticleImpact
 from .particle import layer_for as layer_for
-from .rigid_body import Ellipsoid as Ellipsoid
-from .rigid_body import RigidBody as RigidBody
 from .scheme import BoundaryLayer as BoundaryLayer
 from .trajectory import layer_motion as layer_motion
 
-__all__: list[str] = ['BoundaryLayer', 'ConstrainedSystem', 'ContactLayer', 'Ellipsoid', 'Layer', 'Metric', 'ParticleImpact', 'RigidBody', 'bilateral_motion', 'contact_layer', 'layer_for', 'layer_motion']
+__all__: list[str] = ['BoundaryLayer', 'ConstrainedSystem', 'ContactLayer', 'Layer', 'Metric', 'ParticleImpact', 'bilateral_motion', 'contact_layer', 'layer_for', 'layer_motion']

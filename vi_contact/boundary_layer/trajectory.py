@@ -63,7 +63,7 @@ def layer_motion(
         StepFailure: the integrator stopped, or did not come to an end; the message names the time.
     """
     owner = "layer_motion"
-    instance(owner, "system", system, ConstrainedSystem, "give one, for example RigidBody(...).system()")
+    instance(owner, "system", system, ConstrainedSystem, "give one, such as those of demos/problems/rigid_body.py")
     instance(owner, "layer", layer, Layer, "give a Layer")
     instance(owner, "metric", metric, Metric, "give Metric.DOMINANT, FULL, BLENDED or FLAT")
     q, v = array(owner, "q0", q0, (None,)), array(owner, "v0", v0, (None,))
