@@ -16,6 +16,7 @@ import vi_contact as vc
 from demos.problems.boundary_elements import disk_contact, disk_problem, embedded_problem, square_problem
 from demos.problems.disk import Disk, Push
 from demos.problems.embedded import Embedded
+from demos.problems.joined_bodies import TwoBodies
 from demos.problems.loose_segments import from_segments
 from demos.problems.published_beam import readings
 from demos.problems.rigid_body import Ellipsoid, RigidBody
@@ -124,7 +125,7 @@ def contacts() -> Table:
         (bem.SpaceTimeUzawa, {}, {"tolerance": POSITIVE, "rho": but(POSITIVE, "none"), "max_iterations": COUNT,
                                   "window": COUNT}),
         (bem.SpaceTimeUzawa().solve, {"contact": contact}, {"contact": OTHER}),
-        (bem.TwoBodies, {"one": problem, "two": problem}, {"one": NEEDED, "two": NEEDED, "welded": MASK}),
+        (TwoBodies, {"one": problem, "two": problem}, {"one": NEEDED, "two": NEEDED, "welded": MASK}),
     ]
 
 
