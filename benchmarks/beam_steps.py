@@ -22,6 +22,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import vi_contact as vc  # noqa: E402
 from demos.problems import published_beam as source  # noqa: E402
+from demos.problems.beam_contract import beam_problem  # noqa: E402
 from vi_contact import beam  # noqa: E402
 
 STEPS, DT = 1000, 0.002
@@ -42,7 +43,7 @@ def runs(count: int) -> list[Callable[[], object]]:
     elements, start = source.published_elements(count), source.published_start()
     body = beam.TimoshenkoBeam(viscosity=0.001)
     law = vc.Coulomb(0.3)
-    problem = beam.beam_problem(body, elements, normal_force=lambda t: 100.0, friction=law, start=start)
+    problem = beam_problem(body, elements, normal_force=lambda t: 100.0, friction=law, start=start)
 
     def algorithm(name: str, friction: beam.TipFriction) -> object:
         stepper = beam.BeamStepper(body, elements, DT, source.readings(DT)[name], source.published_mu, friction)

@@ -22,6 +22,7 @@ import numpy as np
 
 import vi_contact as vc
 from demos.pictures.beam import plot_beam_energies, plot_regularisation, plot_rubbing, plot_shapes, plot_tips
+from demos.problems.beam_contract import beam_problem, rubbing_problem
 from demos.problems.published_beam import published_elements, published_mu, published_start, readings
 from vi_contact import beam
 from vi_contact.cli import status_of
@@ -91,7 +92,7 @@ def exact(count: int, dt: float, out: Path) -> dict[str, float]:
         return beam.run_beam(stepper, start, steps=steps)
 
     law = algorithm(beam.ExactFriction()).history
-    problem = beam.beam_problem(body, elements, normal_force=lambda t: FORCE, friction=vc.Coulomb(MU), start=start)
+    problem = beam_problem(body, elements, normal_force=lambda t: FORCE, friction=vc.Coulomb(MU), start=start)
     tips = np.array([state.u[-1] for state, _ in vc.march(problem, scheme=vc.Midpoint(), dt=dt, steps=steps)])
     apart = float(np.max(np.abs(tips - law["u_tip"][1:])))
     runs = {eps: algorithm(beam.RegularisedFriction(eps)).history for eps in EPS}
@@ -109,7 +110,7 @@ def exact(count: int, dt: float, out: Path) -> dict[str, float]:
 
 def rubbing(count: int, dt: float, out: Path, progress: bool) -> dict[str, float]:
     """Run rod and beam as one contact problem, with impulses on velocities: their forces do not ring."""
-    problem = beam.rubbing_problem(
+    problem = rubbing_problem(
         ROD, beam.TimoshenkoBeam(viscosity=VISCOSITIES[0]), beam.Elements(count), friction=vc.Coulomb(MU),
         start=published_start(),
     )

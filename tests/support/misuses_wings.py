@@ -13,6 +13,7 @@ import numpy as np
 from misuses_core import COUNT, FLAG, FUNCTION, NEEDED, NOT_NEGATIVE, NUMBER, POSITIVE, THING, Table, but, calls, rights
 
 import vi_contact as vc
+from demos.problems.beam_contract import StepForces, beam_problem, rod_forces, rod_problem, rubbing_problem
 from demos.problems.boundary_elements import disk_contact, disk_problem, embedded_problem, square_problem
 from demos.problems.disk import Disk, Push
 from demos.problems.embedded import Embedded
@@ -170,14 +171,14 @@ def beams() -> Table:
             "friction": NEEDED | {"Coulomb": vc.Coulomb(0.3)}}),
         (beam.run_beam, {"stepper": ready, "start": start, "steps": 2}, {
             "stepper": OTHER, "start": NEEDED, "steps": STEPS | {"endless": 10**15}, "every": but(COUNT, "zero")}),
-        (beam.rod_problem, {"rod": rod, "elements": few}, runs),
-        (beam.beam_problem, {"beam": line, "elements": few, "normal_force": lambda t: 1.0, "friction": vc.Coulomb(0.3)},
+        (rod_problem, {"rod": rod, "elements": few}, runs),
+        (beam_problem, {"beam": line, "elements": few, "normal_force": lambda t: 1.0, "friction": vc.Coulomb(0.3)},
          {"beam": OTHER, "normal_force": FUNCTION, "friction": NEEDED, "load": FUNCTION, "elements": OTHER}),
-        (beam.rubbing_problem, {"rod": rod, "beam": line, "elements": few, "friction": vc.Coulomb(0.3)},
+        (rubbing_problem, {"rod": rod, "beam": line, "elements": few, "friction": vc.Coulomb(0.3)},
          runs | {"beam": OTHER, "friction": NEEDED, "rod_start": THING, "load": FUNCTION}),
-        (beam.rod_forces, {"rod": rod, "elements": few, "dt": 0.01, "steps": 2},
+        (rod_forces, {"rod": rod, "elements": few, "dt": 0.01, "steps": 2},
          runs | {"dt": POSITIVE, "steps": STEPS, "scheme": but(THING, "list")}),
-        (beam.StepForces, {"dt": 0.1, "forces": (1.0, 2.0)},
+        (StepForces, {"dt": 0.1, "forces": (1.0, 2.0)},
          {"dt": POSITIVE, "forces": RAGGED | {"text": "ab", "nan": (nan,), "number": 1.0}}),
         (readings, {"dt": 0.1}, {"dt": POSITIVE}),
     ]
