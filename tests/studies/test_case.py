@@ -326,7 +326,7 @@ MISTAKES = {  # what is replaced in demos/cases/wall.toml, by what, what the sen
     "list": ("steps = 400", "steps = [400]", ": [run] steps is a list: give a whole number"),
     "name": ('clamped = "base"', 'clamped = "base"\nmaterial = "steel"', ": [system] material names 'steel', which is "
              "not there: Known: concrete"),
-    "function": ('"HalfSpace"', '"AnalyticGap"', ": [contact[1].obstacle] has the unknown type 'AnalyticGap'"),
+    "function": ('"HalfSpace"', '"AnalyticGap"', ": [contact[1].obstacle] has the unknown key 'point' for AnalyticGap"),
     "inner table": ('section = {type = "PlaneStress", thickness = 0.20}', "section = {type = 'PlaneStress', depth = 1}",
                     ": [system.section] has the unknown key 'depth' for PlaneStress"),
     "no dt": ("dt = 0.0017857142857142857", "", ": [run] lacks 'dt', which simulate needs"),

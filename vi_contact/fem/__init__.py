@@ -29,7 +29,7 @@ _CONTENTS = {
     "dashpots": ("CompliantBase", "Dashpots"),
     "heterogeneous": ("Heterogeneous",),
     "linear_forms": ("LinearForm",),
-    "loads": ("BodyForce", "Prescribed", "TangentialTraction", "Traction"),
+    "loads": ("BodyForce", "Prescribed", "Pressure", "TangentialTraction", "Traction"),
     "mesh": ("Cells", "Facets", "Tags", "build_mesh", "node_numbers", "read_mesh"),
     "own_forms": ("Forms",),
     "output.fields": ("XDMF",),

@@ -12,6 +12,7 @@ from .heterogeneous import Heterogeneous as Heterogeneous
 from .linear_forms import LinearForm as LinearForm
 from .loads import BodyForce as BodyForce
 from .loads import Prescribed as Prescribed
+from .loads import Pressure as Pressure
 from .loads import TangentialTraction as TangentialTraction
 from .loads import Traction as Traction
 from .mesh import Cells as Cells
@@ -31,4 +32,4 @@ from .released_supports import release as release
 from .space import bodies_of as bodies_of
 from .ties import Tied as Tied
 
-__all__: list[str] = ['BodyForce', 'Cells', 'CompliantBase', 'Dashpots', 'DualMortar', 'Facets', 'Forms', 'Heterogeneous', 'LinearForm', 'NodeToNode', 'Prescribed', 'Reactions', 'SectionForces', 'Tags', 'TangentialTraction', 'Tied', 'Traction', 'XDMF', 'as_function', 'assemble', 'bodies_of', 'build_mesh', 'contact_pair', 'contact_surface', 'joined_surfaces', 'node_numbers', 'read_function', 'read_mesh', 'release', 'system_from_matrices']
+__all__: list[str] = ['BodyForce', 'Cells', 'CompliantBase', 'Dashpots', 'DualMortar', 'Facets', 'Forms', 'Heterogeneous', 'LinearForm', 'NodeToNode', 'Prescribed', 'Pressure', 'Reactions', 'SectionForces', 'Tags', 'TangentialTraction', 'Tied', 'Traction', 'XDMF', 'as_function', 'assemble', 'bodies_of', 'build_mesh', 'contact_pair', 'contact_surface', 'joined_surfaces', 'node_numbers', 'read_function', 'read_mesh', 'release', 'system_from_matrices']

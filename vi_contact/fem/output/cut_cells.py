@@ -13,14 +13,14 @@ import numpy as np
 
 from ...core.algebra import Array, Indices, Mask, from_each
 from .. import compat
-from ..loads import BodyForce, TangentialTraction, Traction
+from ..loads import BodyForce, FacetLoad, Pressure, TangentialTraction
 from ..mesh import node_numbers
 from ..space import FemSpace
 
 
 def work_beyond(
     space: FemSpace, crossed: Mask, level: Callable[[Array], Array], motion: Callable[[Array], Array],
-    density: Array | float, load: Traction | BodyForce | None,
+    density: Array | float, load: FacetLoad | BodyForce | None,
 ) -> Array:
     """Return (motions, owned components) ∫ density motion·phi_i over parts of cells, or of the facets of a traction.
 
@@ -29,14 +29,19 @@ def work_beyond(
     Collective.
     """
     d = space.dimension
-    cells, nodes = _entities(space.mesh, crossed, load.facets.indices if isinstance(load, Traction) else None)
+    cells, nodes = _entities(space.mesh, crossed, load.facets.indices if isinstance(load, FacetLoad) else None)
     whole = space.mesh.geometry.x[nodes][:, :, :d]
-    corners, owner = parts(simplices(nodes.shape[1], d - isinstance(load, Traction)), level(whole))
+    corners, owner = parts(simplices(nodes.shape[1], d - isinstance(load, FacetLoad)), level(whole))
     at = np.matmul(corners, whole[owner])
     edges, r = at[:, 1:] - at[:, :1], motion(at.reshape(-1, d))
     r = r.reshape(len(r), *at.shape)
     if isinstance(load, TangentialTraction):
         r = r @ (np.linalg.pinv(edges) @ edges)
+    if isinstance(load, Pressure):  # which is the first component of its field
+        centres = space.mesh.geometry.x[compat.geometry_dofmap(space.mesh)[cells]].mean(axis=1)[owner, None, :d]
+        sides, away = np.diff(whole, axis=1)[owner], whole[owner, :1] - centres
+        outward = away - away @ np.linalg.pinv(sides) @ sides
+        r = -(r @ (outward / np.linalg.norm(outward, axis=2, keepdims=True)).swapaxes(1, 2)) * np.eye(d)[0]
     n = corners.shape[1]  # ∫ f g over a simplex of n corners: (Σf Σg + Σ f g) of its size / (n (n + 1))
     size = np.sqrt(np.abs(np.linalg.det(edges @ edges.swapaxes(1, 2)))) / factorial(n + 1)
     size = size * np.broadcast_to(density, len(crossed))[cells[owner]]

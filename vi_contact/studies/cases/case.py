@@ -27,6 +27,7 @@ from ...core.surfaces import ContactSurface, empty_surface
 from ...engineering.checks.comparison import Check
 from ...fem.assembly import assemble
 from ...fem.contact.joined import joined_surfaces
+from ...fem.heterogeneous import Heterogeneous
 from ...fem.mesh import Tags, build_mesh, read_mesh
 from ...laws.materials import LinearElastic
 from ...laws.orthotropic import Orthotropic
@@ -50,7 +51,7 @@ _TABLES: dict[str, Any] = {  # in the order in which they are read: type of what
     "title": str,
     "model": Parts,
     "mesh": MeshScript | MeshFile,
-    "material": Mapping[str, LinearElastic | Orthotropic],
+    "material": Mapping[str, LinearElastic | Orthotropic | Heterogeneous],
     "system": callee(assemble),
     "contact": ContactSurface | Sequence[ContactSurface],
     "gravity": callee(weight, name="with_weight"),

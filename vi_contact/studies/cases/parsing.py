@@ -12,6 +12,7 @@ from typing import Any, Union, get_args, get_origin
 from ...core.checks import SHOWN, shown
 from ...core.errors import InputError
 from .own_classes import own_class
+from .quantities import FIELD, HISTORY, Expression, list_node, text_node, unit_of
 from .table_calls import GROUP, Call, Callee, Group, Node, Spot, callee
 
 
@@ -35,17 +36,21 @@ class Words:
 
 def read(value: Any, hint: Any, spot: Spot, words: Words) -> Node:
     """Return the node of a value for a parameter with this hint. InputError when it does not fit."""
-    members = _members(hint)
-    if any(_is_path(member) for member in members):  # a text is the path then, and belongs to the case file's folder
+    members = members_of(hint)
+    if any(is_path(member) for member in members):  # a text is the path then, and belongs to the case file's folder
         members = [member for member in members if member is not str]
     if isinstance(value, dict):
         return _table(value, members, spot, words)
     if isinstance(value, list):
-        return _list(value, members, spot, words)
+        field = list_node(value, members, spot)
+        return _list(value, members, spot, words) if field is None else field
     for member in members:
         node = _scalar(value, member, spot, words)
         if node is not None:
             return node
+    text = text_node(value, members, spot) if isinstance(value, str) else None
+    if text is not None:
+        return text
     raise spot.wrong(f"is {_shown(value)}: give {_expected(members, words)}")
 
 
@@ -58,7 +63,8 @@ def arguments(table: Mapping[str, Any], target: Callee, spot: Spot, words: Words
     missing = sorted(target.required - set(given))
     if missing:
         raise spot.inside(f"lacks '{missing[0]}', which {target.name} needs")
-    nodes = {key: read(value, target.hints[key], spot.at(key), words) for key, value in given.items()}
+    nodes = {key: read(value, target.hints[key], spot.at(key, unit_of(target.name, key)), words)
+             for key, value in given.items()}
     return Call(target, nodes, spot)
 
 
@@ -71,7 +77,7 @@ def nearest(word: Any, known: Iterable[str]) -> str:
     return (f"did you mean {' or '.join(near)}? " if near else "") + f"Known: {', '.join(names)}"
 
 
-def _members(hint: Any) -> list[Any]:
+def members_of(hint: Any) -> list[Any]:
     """Return the types of a union, or the one type."""
     kinds = get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
     return [one for one in kinds if one is not type(None)]
@@ -97,14 +103,15 @@ def _scalar(value: Any, member: Any, spot: Spot, words: Words) -> Node | None:
         return words.named[member][value]
     if member in words.short:
         return _table({words.short[member]: value}, [member], spot, words)
-    if _is_path(member):
+    if is_path(member):
         if not value.strip():
             raise spot.wrong("is empty: give the path of a file or folder")
         return words.folder / value
     return value if member is str else None
 
 
-def _is_path(member: Any) -> bool:
+def is_path(member: Any) -> bool:
+    """Tell whether values for this type are paths."""
     origin = get_origin(member) or member
     return isinstance(origin, type) and issubclass(origin, os.PathLike)
 
@@ -112,7 +119,7 @@ def _is_path(member: Any) -> bool:
 def _list(value: list[Any], members: list[Any], spot: Spot, words: Words) -> Node:
     wrong: InputError | None = None
     for member in members:
-        if _is_list(member):
+        if is_list(member):
             try:
                 return _items(value, get_args(member), get_origin(member) is tuple, spot, words)
             except InputError as error:
@@ -124,7 +131,8 @@ def _list(value: list[Any], members: list[Any], spot: Spot, words: Words) -> Nod
     raise spot.wrong(f"is a list: give {_expected(members, words)}")
 
 
-def _is_list(member: Any) -> bool:
+def is_list(member: Any) -> bool:
+    """Tell whether values for this type are lists."""
     return get_origin(member) in (tuple, list, Sequence)
 
 
@@ -138,7 +146,7 @@ def _items(value: list[Any], kinds: tuple[Any, ...], fixed: bool, spot: Spot, wo
 
 
 def _table(value: dict[str, Any], members: list[Any], spot: Spot, words: Words) -> Node:
-    found: list[Any] = [one for one in (_choices(member, words) for member in members) if one]
+    found: list[Any] = [one for one in (choices_of(member, words) for member in members) if one]
     if found:
         choices = ChainMap(*found[::-1])  # in which words come in the order of ``found``, and are looked up one by one
         word = value.get("type", next((words.default[member] for member in members if member in words.default), None))
@@ -148,7 +156,7 @@ def _table(value: dict[str, Any], members: list[Any], spot: Spot, words: Words) 
     for member in members:
         if get_origin(member) in (Mapping, dict):
             kind = get_args(member)[1]
-            return {key: read(one, kind, spot.at(key), words) for key, one in value.items()}
+            return {key: read(one, kind, spot.at(key, spot.unit), words) for key, one in value.items()}
     raise spot.wrong(f"is a table: give {_expected(members, words)}")
 
 
@@ -163,7 +171,7 @@ def _chosen(word: Any, choices: Mapping[str, Callee], kinds: Sequence[Any], spot
     return choices[word]
 
 
-def _choices(member: Any, words: Words) -> Mapping[str, Callee]:
+def choices_of(member: Any, words: Words) -> Mapping[str, Callee]:
     """Return what a table may make for this type: as listed, or an object of the value class itself."""
     if member in words.choices:
         return words.choices[member]
@@ -190,18 +198,20 @@ def _expected(members: Sequence[Any], words: Words) -> str:
             found.append(_EXPECTED[member])
         elif member in words.groups:
             found.append(f"the name of {GROUP[member.__name__]}")
-        elif _is_path(member):
+        elif is_path(member):
             found.append("the path of a file")
-        elif _choices(member, words):
-            found.append(f"a table with type = one of {', '.join(_choices(member, words))}")
+        elif choices_of(member, words):
+            found.append(f"a table with type = one of {', '.join(choices_of(member, words))}")
             if words.named.get(member):
                 found.append(f"one of the names {', '.join(words.named[member])}")
-        elif _is_list(member):
+        elif is_list(member):
             inner = [one for one in get_args(member) if one is not Ellipsis]
             found.append(f"a list of {_expected(inner[:1], words).removeprefix('a ')}s" if _EXPECTED.get(inner[0])
                          else "a list")
         elif get_origin(member) in (Mapping, dict):
             found.append("a table of names")
+        elif member in (FIELD, HISTORY, Expression):
+            found.append("an expression of t" if member == HISTORY else "expressions of x, y, z, t, one per dimension")
     if not found or any(get_origin(member) is Callable or member is Callable for member in members):
         found.append("a function, which only the Python interface takes")
     return " or ".join(dict.fromkeys(found))

@@ -29,17 +29,18 @@ class Spot:
     file: str
     table: str = ""
     key: str = ""
+    unit: str | None = None  # of the key, where it is known
 
     def __str__(self) -> str:
         return f"[{self.table}] {self.key}".strip() if self.table else f"[{self.key}]"
 
-    def at(self, key: str) -> "Spot":
+    def at(self, key: str, unit: str | None = None) -> "Spot":
         """Return the spot of a key of the table that is here."""
-        return Spot(self.file, self._here(), key)
+        return Spot(self.file, self._here(), key, unit)
 
     def entry(self, number: int) -> "Spot":
         """Return the spot of an entry of the list that is here, counted from 1."""
-        return Spot(self.file, self.table, f"{self.key}[{number}]")
+        return Spot(self.file, self.table, f"{self.key}[{number}]", self.unit)
 
     def _here(self) -> str:
         return f"{self.table}.{self.key}" if self.table and self.key else self.table or self.key

@@ -20,7 +20,7 @@ from ...core.system import SemiDiscreteSystem
 from ...core.units import STANDARD_GRAVITY
 from ...engineering import checks
 from ...engineering.checks.comparison import Check
-from ...fem import BodyForce, Cells, CompliantBase, Dashpots, Facets, Prescribed, Traction
+from ...fem import BodyForce, Cells, CompliantBase, Dashpots, Facets, Heterogeneous, Prescribed, Traction
 from ...fem.contact.matching import Matching
 from ...ground_motion.record import LARGEST_PEAK, Record
 from ...laws.impact import VelocityUpdate
@@ -36,6 +36,7 @@ from ...solvers.condensed import SmallMethod
 from ...solvers.friction.extrapolation import Extrapolation
 from ...solvers.friction.problem import FrictionMethod
 from ...solvers.volume.route import Method
+from .expressions import Expression, Places
 from .own_classes import defect, is_protocol
 from .parsing import Words
 from .table_calls import Callee, callee
@@ -113,6 +114,17 @@ def first_mode_period(system: SemiDiscreteSystem, *, parts: float) -> float:
     return 1.0 / (number("the period", "parts", parts, positive=True) * engineering.lowest_frequency(system))
 
 
+def heterogeneous(E: float | Expression, nu: float | Expression, rho: float | Expression) -> Heterogeneous:
+    def of(value: float | Expression) -> Any:
+        return (lambda x, own=Places(value): own(x.T)) if isinstance(value, Expression) else value
+
+    return Heterogeneous(of(E), of(nu), of(rho))
+
+
+def analytic_gap(function: Expression) -> core.AnalyticGap:
+    return core.AnalyticGap(Places(function))
+
+
 def compliant_base(
     facets: Facets, *, motion: UpgoingVelocity, material: LinearElastic | None = None, normal: float = 1.0,
     tangential: float = 1.0,
@@ -178,6 +190,8 @@ _FUNCTIONS: Mapping[Any, Mapping[str, Callable[[], Any]]] = {  # kind -> word ->
     Record: {"read_record": lambda: record, "synthetic": lambda: ground_motion.synthetic},
     Excitation: {"FirstModeHarmonic": lambda: first_mode_harmonic},
     Schedule: {"FirstModePeriod": lambda: first_mode_period},
+    Heterogeneous: {"Heterogeneous": lambda: heterogeneous},
+    Obstacle: {"AnalyticGap": lambda: analytic_gap},
 }
 
 

@@ -1,0 +1,124 @@
+"""Read texts where numbers or functions are asked for: "30 MPa", "2*9.81", "9810*max(0, 35 - y)".
+
+A unit is a product of powers, as "kN/m3", "kg/m^3", "Pa*s", "1/s"; its dimension must be that of the key, whose unit
+one table here tells.
+"""
+
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, get_origin
+
+from ...core.algebra import Array
+from ...core.checks import shown
+from ...core.errors import InputError
+from ...core.units import STANDARD_GRAVITY
+from .expressions import LENGTH, Expression, Places
+from .table_calls import Spot
+
+FIELD, AT_START, HISTORY = Callable[[Array, float], Array], Callable[[Array], Array], Callable[[float], float]
+"""Functions of points and time, of points, of the time, for which expressions may stand."""
+Dimension = tuple[int, ...]  # exponents of metre, kilogram, second, radian
+_NUMBER, _NAME = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", "[A-Za-zµμ°%]+"
+_VALUE = re.compile(rf"\s*((?>{_NUMBER}))\s*((?:1\s*/\s*)?{_NAME}[^()+]*)")
+_FACTOR = re.compile(rf"([*·/ ]?)\s*(1(?=\s*/|$)|{_NAME})(?:\^?(-?\d)|([²³]))?\s*")
+_PREFIXES = {"": 1.0, "G": 1e9, "M": 1e6, "k": 1e3, "d": 1e-1, "c": 1e-2, "m": 1e-3, "µ": 1e-6, "μ": 1e-6, "n": 1e-9}
+_WITH_PREFIX: Mapping[str, Dimension] = {
+    "m": (1, 0, 0, 0), "s": (0, 0, 1, 0), "N": (1, 1, -2, 0), "Pa": (-1, 1, -2, 0), "Hz": (0, 0, -1, 0),
+}
+_ALONE: dict[str, tuple[float, Dimension]] = {
+    "1": (1.0, (0, 0, 0, 0)), "%": (1e-2, (0, 0, 0, 0)), "kg": (1.0, (0, 1, 0, 0)), "t": (1e3, (0, 1, 0, 0)),
+    "g": (STANDARD_GRAVITY, (1, 0, -2, 0)), "rad": (1.0, (0, 0, 0, 1)), "deg": (math.pi / 180.0, (0, 0, 0, 1)),
+    "°": (math.pi / 180.0, (0, 0, 0, 1)),
+}
+_UNITS = {start + name: (factor, dimension) for start, factor in _PREFIXES.items()
+          for name, dimension in _WITH_PREFIX.items()} | _ALONE
+_KEYS: Mapping[str, str] = {  # unit -> keys in it wherever they stand, and of what a table calls, as CALLEE.KEY
+    "m": "height width thickness depth outer_width wall slab left size far lengths corner offset gap point points cuts "
+         "frames centre initial_displacement Prescribed.displacement AnalyticGap.function BlockMesh.deform",
+    "Pa": "E E1 E2 E3 G12 G13 G23 Tresca.threshold Traction.value TangentialTraction.value Pressure.value surcharge",
+    "Pa/m": "springs", "Pa*s": "KelvinVoigt.shear KelvinVoigt.bulk", "N/m3": "BodyForce.value",
+    "kg/m3": "rho",
+    "m/s": "c_p c_s v_c initial_velocity Prescribed.velocity Processing.arias",
+    "m/s2": "amplitude pga gravity largest with_weight.acceleration Prescribed.acceleration Tabulated.values",
+    "s": "dt t_end resample_dt duration delay times trim pad resample rise end Rayleigh.beta",
+    "1/s": "Rayleigh.alpha MassProportional.c decay", "Hz": "frequency f1 f2 low high", "m2/s3": "s0",
+    "rad/s": "omega_g omega_f", "rad": "phase angle feature_angle phi delta slope batter",
+    "1": "nu nu12 nu13 nu23 mu mu_s mu_k e xi1 xi2 zeta_g zeta_f scale ratio taper direction",
+    "": "Uzawa.rho ZienkiewiczWoodTaylor.phi",  # numbers of methods
+}
+_UNIT_OF = {key: unit for unit, keys in _KEYS.items() for key in keys.split()}
+
+
+def unit_of(name: str, key: str) -> str | None:
+    """Return the unit of a key of what a table calls; None where none is known."""
+    return _UNIT_OF.get(f"{name}.{key}", _UNIT_OF.get(key)) or None
+
+
+def text_node(text: str, members: Sequence[Any], spot: Spot) -> Any:
+    """Return the number or function that a text stands for; None where a key of these types takes neither.
+
+    InputError: no arithmetic, a unit of another dimension than that of the key, a value that is not finite or whole.
+    """
+    one_value = not any(get_origin(member) in (tuple, list, Sequence) for member in members)
+    kinds = ((FIELD, "xyzt"), (Expression, "xyz"), (HISTORY, "t"))
+    kind, letters = next((one for one in kinds if one[0] in members and one_value), (None, ""))
+    if kind is None and float not in members and int not in members:
+        return None
+    expression = _expression(text, letters, spot)
+    if kind is None or (float in members and not expression.used):
+        value = float(expression())
+        if not math.isfinite(value) or (float not in members and value != int(value)):
+            raise spot.wrong(f"is {shown(text)}, which is {value:g}: give a finite number, a whole one of things")
+        return value if float in members else int(value)
+    return Places(expression) if kind == FIELD else expression
+
+
+def list_node(values: list[Any], members: Sequence[Any], spot: Spot) -> Places | None:
+    """Return the vector field that a list stands for; None where none is asked for or nothing in it has variables."""
+    letters = "xyzt" if FIELD in members else "xyz" if AT_START in members and spot.unit in ("m", "m/s") else ""
+    if not letters or not any(isinstance(one, str) for one in values):
+        return None
+    texts = [one if isinstance(one, str) else repr(one) for one in values if isinstance(one, str | int | float)]
+    found = tuple(_expression(one, letters, spot.entry(number)) for number, one in enumerate(texts, start=1))
+    return Places(found) if len(found) == len(values) and any(one.used for one in found) else None
+
+
+def _expression(text: str, letters: str, spot: Spot) -> Expression:
+    """Return the arithmetic of a text, or the number with a unit that it is, in the unit of the key."""
+    found = _VALUE.fullmatch(text.rstrip()) if len(text) <= LENGTH else None
+    try:
+        if found is None or found[2] in tuple(letters):
+            return Expression(text, letters)
+        if spot.unit is None:
+            raise InputError(f"no unit is known for it here: leave {shown(found[2])} away")
+        (factor, dimension), (own, asked) = _unit(found[2]), _unit(spot.unit)
+        if dimension != asked:
+            proper = "% or as a plain number" if spot.unit == "1" else spot.unit
+            raise InputError(f"{shown(found[2])} is no unit of it: give it in {proper}")
+        return Expression(repr(float(found[1]) * (factor / own)))
+    except InputError as error:
+        arithmetic = f" of {', '.join(letters)}" if letters else ""
+        ask = f"give a number, one with its unit, or arithmetic{arithmetic}; " if found is None else ""
+        raise spot.wrong(f"is {shown(text)}: {ask}{error}") from None
+
+
+def _unit(text: str) -> tuple[float, Dimension]:
+    """Return the factor to SI units and the dimension of a product; after a "/" all divides up to the next "*"."""
+    size, place, below = 1.0, 0, False
+    total: Dimension = (0, 0, 0, 0)
+    while place < len(text):
+        found = _FACTOR.match(text, place)
+        if found is None:
+            raise InputError(f"{shown(text)} is no unit: write one as kN/m3, cm/s^2 or Pa*s")
+        sign, name, digits, raised = found.groups()
+        below = sign == "/" or (below and sign in ("", " "))
+        power = (int(digits) if digits else {"²": 2, "³": 3}.get(raised, 1)) * (-1 if below else 1)
+        if name not in _UNITS:
+            known = ", ".join((*_WITH_PREFIX, *_ALONE))
+            raise InputError(f"{shown(name)} is no unit here: there are {known}, kPa, mm")
+        factor, dimension = _UNITS[name]
+        size *= factor**power
+        total = tuple(a + power * b for a, b in zip(total, dimension, strict=True))
+        place = found.end()
+    return size, total
