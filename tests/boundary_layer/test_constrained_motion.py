@@ -7,9 +7,9 @@ import pytest
 from layer_numbers import DEEPEST, DURATION, RESTITUTION, C, K
 from scipy.special import ellipk
 
+from demos.problems.bilateral_motion import bilateral_motion
 from demos.problems.rigid_body import Ellipsoid, RigidBody, rotation
 from vi_contact.boundary_layer import motion as layer_motions
-from vi_contact.boundary_layer.bilateral import bilateral_motion
 from vi_contact.boundary_layer.layer import Layer
 from vi_contact.boundary_layer.metric import Metric
 from vi_contact.boundary_layer.motion import ConstrainedSystem

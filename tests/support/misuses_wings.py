@@ -14,6 +14,7 @@ from misuses_core import COUNT, FLAG, FUNCTION, NEEDED, NOT_NEGATIVE, NUMBER, PO
 
 import vi_contact as vc
 from demos.problems.beam_contract import StepForces, beam_problem, rod_forces, rod_problem, rubbing_problem
+from demos.problems.bilateral_motion import bilateral_motion
 from demos.problems.boundary_elements import disk_contact, disk_problem, embedded_problem, square_problem
 from demos.problems.disk import Disk, Push
 from demos.problems.embedded import Embedded
@@ -23,7 +24,6 @@ from demos.problems.published_beam import readings
 from demos.problems.rigid_body import Ellipsoid, RigidBody
 from demos.problems.square import Square
 from vi_contact import beam, bem
-from vi_contact.boundary_layer.bilateral import bilateral_motion
 from vi_contact.boundary_layer.contact_law import ContactLayer, contact_layer
 from vi_contact.boundary_layer.layer import Layer
 from vi_contact.boundary_layer.motion import ConstrainedSystem

@@ -1,9 +1,8 @@
 """Model contact in a thin layer before the obstacle, as a smooth force: b-geometry.
 
 Begin with ``layer`` (force, cut-off) and ``particle`` (closed form). ``motion`` and ``trajectory`` take any constrained
-system, such as the rigid bodies of demos/problems/rigid_body.py, ``bilateral`` equality constraints; ``metric``:
-b-metric and b-affinities; ``contact_law``, ``scheme``: contact nodes of finite element bodies. See
-docs/theory/boundary_layer.md.
+system, such as the rigid bodies of demos/problems/rigid_body.py; ``metric``: b-metric and b-affinities;
+``contact_law``, ``scheme``: contact nodes of finite element bodies. See docs/theory/boundary_layer.md.
 >>> from vi_contact.boundary_layer import ParticleImpact, layer_for
 >>> round(ParticleImpact(layer_for(0.5, mass=1.0, speed=2.0, width=1e-3), mass=1.0, speed=2.0).restitution, 9)
 0.5
@@ -12,7 +11,6 @@ docs/theory/boundary_layer.md.
 from ..core.lazy import lazy
 
 _CONTENTS = {
-    "bilateral": ("bilateral_motion",),
     "contact_law": ("ContactLayer", "contact_layer"),
     "layer": ("Layer",),
     "metric": ("Metric",),

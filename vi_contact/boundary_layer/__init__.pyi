@@ -1,6 +1,5 @@
 # ruff: noqa
 # Made from __init__.py by docs/make_api.py, for checkers of types and editors.
-from .bilateral import bilateral_motion as bilateral_motion
 from .contact_law import ContactLayer as ContactLayer
 from .contact_law import contact_layer as contact_layer
 from .layer import Layer as Layer
@@ -11,4 +10,4 @@ from .particle import layer_for as layer_for
 from .scheme import BoundaryLayer as BoundaryLayer
 from .trajectory import layer_motion as layer_motion
 
-__all__: list[str] = ['BoundaryLayer', 'ConstrainedSystem', 'ContactLayer', 'Layer', 'Metric', 'ParticleImpact', 'bilateral_motion', 'contact_layer', 'layer_for', 'layer_motion']
+__all__: list[str] = ['BoundaryLayer', 'ConstrainedSystem', 'ContactLayer', 'Layer', 'Metric', 'ParticleImpact', 'contact_layer', 'layer_for', 'layer_motion']
