@@ -16,9 +16,9 @@ _CONTENTS = {
         "Touching", "ViContactError",
     ),
     "laws": (
-        "ComponentReset", "ConsistentMass", "Coulomb", "Elastic", "ExponentialDecay", "FullSine", "HalfSine",
-        "Harmonic", "ImpulseUpdate", "Inelastic", "KelvinVoigt", "LinearElastic", "MassProportional", "Newton",
-        "NoDamping", "Orthotropic", "PlaneStrain", "PlaneStress", "Rayleigh", "Rectangular", "Redistributed",
+        "ComponentReset", "ConsistentMass", "Coulomb", "DampingRatio", "Elastic", "ExponentialDecay", "FullSine",
+        "HalfSine", "Harmonic", "ImpulseUpdate", "Inelastic", "KelvinVoigt", "LinearElastic", "MassProportional",
+        "Newton", "NoDamping", "Orthotropic", "PlaneStrain", "PlaneStress", "Rayleigh", "Rectangular", "Redistributed",
         "Ricker", "SlipRateCoulomb", "Solid", "StaticKinetic", "Tabulated", "Tresca", "with_weight",
     ),
     "ground_motion": ("GroundMotion", "read_record"),

@@ -34,6 +34,7 @@ _CONTENTS = {
     "own_forms": ("Forms",),
     "output.fields": ("XDMF",),
     "output.functions": ("as_function", "read_function"),
+    "output.largest_strain": ("LargestStrain",),
     "output.reactions": ("Reactions",),
     "output.section_forces": ("SectionForces",),
     "petsc_system": ("system_from_matrices",),

@@ -25,6 +25,7 @@ from .own_forms import Forms as Forms
 from .output.fields import XDMF as XDMF
 from .output.functions import as_function as as_function
 from .output.functions import read_function as read_function
+from .output.largest_strain import LargestStrain as LargestStrain
 from .output.reactions import Reactions as Reactions
 from .output.section_forces import SectionForces as SectionForces
 from .petsc_system import system_from_matrices as system_from_matrices
@@ -32,4 +33,4 @@ from .released_supports import release as release
 from .space import bodies_of as bodies_of
 from .ties import Tied as Tied
 
-__all__: list[str] = ['BodyForce', 'Cells', 'CompliantBase', 'Dashpots', 'DualMortar', 'Facets', 'Forms', 'Heterogeneous', 'LinearForm', 'NodeToNode', 'Prescribed', 'Pressure', 'Reactions', 'SectionForces', 'Tags', 'TangentialTraction', 'Tied', 'Traction', 'XDMF', 'as_function', 'assemble', 'bodies_of', 'build_mesh', 'contact_pair', 'contact_surface', 'joined_surfaces', 'node_numbers', 'read_function', 'read_mesh', 'release', 'system_from_matrices']
+__all__: list[str] = ['BodyForce', 'Cells', 'CompliantBase', 'Dashpots', 'DualMortar', 'Facets', 'Forms', 'Heterogeneous', 'LargestStrain', 'LinearForm', 'NodeToNode', 'Prescribed', 'Pressure', 'Reactions', 'SectionForces', 'Tags', 'TangentialTraction', 'Tied', 'Traction', 'XDMF', 'as_function', 'assemble', 'bodies_of', 'build_mesh', 'contact_pair', 'contact_surface', 'joined_surfaces', 'node_numbers', 'read_function', 'read_mesh', 'release', 'system_from_matrices']

@@ -12,7 +12,7 @@ from weakref import WeakSet
 import numpy as np
 import ufl
 
-from ..core.algebra import Array
+from ..core.algebra import Array, largest
 from ..core.errors import InputError
 from ..core.system import SemiDiscreteSystem
 from ..laws.materials import Damping, ElasticValues, LinearElastic, Section
@@ -59,7 +59,8 @@ class ElasticForms:
         names = ("lame", "shear", "rho", "alpha_rho", "beta", "lame_out")
         values = [_constants(cells, where, one) for where, one in materials]
         self.viscous = _viscous(damping)
-        self.damped = self.viscous is not None or any(np.any(damping.coefficients(one)) for one in values)
+        damped = self.viscous is not None or any(np.any(one) for each in values for one in damping.coefficients(each))
+        self.damped = bool(largest(space.comm, damped))  # a ratio may be zero in all cells of some ranks
         self.fields = {name: compat.function(cells) for name in names} if materials else {}
         if not self.damped and materials:
             self.fields["alpha_rho"] = self.fields["beta"]  # zeros
@@ -151,6 +152,17 @@ class ElasticForms:
         if self.dilatation is not None and name != "M":
             self.dilatation.add(matrix, self.fields["lame"], self.fields["beta"] if name == "C" else None)
         return matrix
+
+
+def cell_constants(space: Any, material: Materials) -> Array:
+    """Return E, nu and rho of the local cells, (3, cells), NaN where it is Orthotropic; space: DG0. Collective."""
+    place = compat.cell_blocks(space)[:, 0]
+    found = np.empty((3, len(place)))
+    for where, one in cell_materials(space.mesh, material):
+        known = _constants(space, where, one)
+        for row, value in zip(found, (known.E, known.nu, known.rho), strict=True):
+            row[where] = value[place[where]] if np.ndim(value) else value
+    return found
 
 
 def _constants(space: Any, cells: Any, material: Material) -> Any:

@@ -21,12 +21,13 @@ RANGES: dict[str, tuple[str, float, float, str]] = {
     "E": ("Young's modulus E [Pa]", 0.0, np.inf, "values above zero"),
     "nu": ("Poisson's ratio nu", -1.0, 0.5, "values between -1 and 0.5, both excluded"),
     "rho": ("the mass density rho [kg/m³]", 0.0, np.inf, "values above zero"),
+    "xi": ("the damping ratio xi", np.nextafter(0.0, -1.0), 1.0, "ratios from 0 to less than 1, not per cent"),
 }
 
 
 @dataclass(frozen=True)
 class Heterogeneous:
-    """Describe isotropic elasticity with E(x) [Pa], nu(x) and rho(x) [kg/m³].
+    """Describe isotropic elasticity with E(x) [Pa], nu(x) and rho(x) [kg/m³], and xi(x), which DampingRatio damps by.
 
     Each is a number, a scalar DOLFINx Function on the mesh of the body, an expression of UFL there, or a function of
     points x (3, k) [m] that returns values (k,), as ``Function.interpolate`` takes it.
@@ -38,12 +39,13 @@ class Heterogeneous:
     section forces through elements take means over cells.
 
     Raises InputError: neither number nor function; and when a body is assembled, values outside E > 0, -1 < nu < 1/2,
-    rho > 0, with the first place of them, and Functions or expressions of another mesh.
+    rho > 0, 0 <= xi < 1, with the first place of them, and Functions or expressions of another mesh.
     """
 
     E: Values
     nu: Values
     rho: Values
+    xi: Values = 0.0
 
     def __post_init__(self) -> None:
         for name, (words, low, high, remedy) in RANGES.items():
@@ -60,7 +62,7 @@ class Heterogeneous:
     @property
     def varies(self) -> bool:
         """Return whether something changes inside of cells."""
-        return any(callable(one) and not _on_cells(one) for one in (self.E, self.nu, self.rho))
+        return any(callable(one) and not _on_cells(one) for one in (self.E, self.nu, self.rho, self.xi))
 
     def at(self, space: Any, cells: Indices) -> ElasticValues:
         """Return the constants at all unknowns of a DG0 or DG1 space. InputError, on all ranks, for values on these

@@ -14,7 +14,10 @@ _CONTENTS = {
     "impact": ("ComponentReset", "Elastic", "ImpulseUpdate", "Inelastic", "Newton"),
     "kelvin_voigt": ("KelvinVoigt",),
     "mass": ("ConsistentMass", "Redistributed"),
-    "materials": ("LinearElastic", "MassProportional", "NoDamping", "PlaneStrain", "PlaneStress", "Rayleigh", "Solid"),
+    "materials": (
+        "DampingRatio", "LinearElastic", "MassProportional", "NoDamping", "PlaneStrain", "PlaneStress", "Rayleigh",
+        "Solid",
+    ),
     "orthotropic": ("Orthotropic",),
     "weight": ("with_weight",),
 }

@@ -19,6 +19,7 @@ from .impact import Newton as Newton
 from .kelvin_voigt import KelvinVoigt as KelvinVoigt
 from .mass import ConsistentMass as ConsistentMass
 from .mass import Redistributed as Redistributed
+from .materials import DampingRatio as DampingRatio
 from .materials import LinearElastic as LinearElastic
 from .materials import MassProportional as MassProportional
 from .materials import NoDamping as NoDamping
@@ -29,4 +30,4 @@ from .materials import Solid as Solid
 from .orthotropic import Orthotropic as Orthotropic
 from .weight import with_weight as with_weight
 
-__all__: list[str] = ['ComponentReset', 'ConsistentMass', 'Coulomb', 'Elastic', 'ExponentialDecay', 'FullSine', 'HalfSine', 'Harmonic', 'ImpulseUpdate', 'Inelastic', 'KelvinVoigt', 'LinearElastic', 'MassProportional', 'Newton', 'NoDamping', 'Orthotropic', 'PlaneStrain', 'PlaneStress', 'Rayleigh', 'Rectangular', 'Redistributed', 'Ricker', 'SlipRateCoulomb', 'Solid', 'StaticKinetic', 'Tabulated', 'Tresca', 'with_weight']
+__all__: list[str] = ['ComponentReset', 'ConsistentMass', 'Coulomb', 'DampingRatio', 'Elastic', 'ExponentialDecay', 'FullSine', 'HalfSine', 'Harmonic', 'ImpulseUpdate', 'Inelastic', 'KelvinVoigt', 'LinearElastic', 'MassProportional', 'Newton', 'NoDamping', 'Orthotropic', 'PlaneStrain', 'PlaneStress', 'Rayleigh', 'Rectangular', 'Redistributed', 'Ricker', 'SlipRateCoulomb', 'Solid', 'StaticKinetic', 'Tabulated', 'Tresca', 'with_weight']

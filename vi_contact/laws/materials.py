@@ -24,6 +24,7 @@ class LinearElastic:
     E: float
     nu: float
     rho: float
+    xi: ClassVar[float] = 0.0  # what DampingRatio asks for
 
     def __post_init__(self) -> None:
         if any(callable(one) or hasattr(one, "ufl_shape") for one in (self.E, self.nu, self.rho)):
@@ -77,11 +78,13 @@ class LinearElastic:
 
 @dataclass(frozen=True)
 class ElasticValues:
-    """Hold E [Pa], nu and rho [kg/m³] at points, (k,) each or one for all; sections and damping take them alike."""
+    """Hold E [Pa], nu, rho [kg/m³] and the damping ratio xi at points, (k,) each or one for all; sections and damping
+    take them alike."""
 
     E: Any
     nu: Any
     rho: Any
+    xi: Any = 0.0
     lame_lambda = LinearElastic.lame_lambda
     shear_modulus = LinearElastic.shear_modulus
 
@@ -217,3 +220,28 @@ class Rayleigh:
         number("Rayleigh.ratio", "the frequency f [Hz]", f, positive=True)
         w = 2.0 * math.pi * f
         return 0.5 * (self.alpha / w + self.beta * w)
+
+
+@dataclass(frozen=True)
+class DampingRatio:
+    """Damp by the ratio xi of each material (``fem.Heterogeneous(…, xi=…)``, zero of others), which may change from
+    cell to cell, at one frequency f1 [Hz] or at two: C = alpha M + beta K with w = 2 pi f and
+
+        alpha = 2 xi w1 w2 / (w1 + w2),    beta = 2 xi / (w1 + w2)
+
+    ``second`` is f2, or zero for damping of the stiffness alone: xi f/f1 at f. With two frequencies the ratio is less
+    than xi between them and more outside, and alpha M also resists rigid rocking (see ``Rayleigh``).
+    """
+
+    frequency: float
+    second: float = 0.0
+
+    def __post_init__(self) -> None:
+        number("DampingRatio", "frequency [Hz]", self.frequency, positive=True)
+        number("DampingRatio", "second [Hz]", self.second, not_negative=True)
+
+    def coefficients(self, material: LinearElastic) -> tuple[Any, Any]:
+        """Return (alpha [1/s], beta [s]), of values at points where xi is."""
+        w1, w2 = 2.0 * math.pi * self.frequency, 2.0 * math.pi * self.second
+        beta = 2.0 / (w1 + w2) * material.xi
+        return w1 * w2 * beta, beta

@@ -16,6 +16,7 @@ _CONTENTS = {
     "free_field": ("FreeField",),
     "moving_base": ("BaseMotion", "base_motion"),
     "soil_column": ("SoilColumn",),
+    "strain_compatible": ("StrainCompatible", "strain_compatible"),
     "upgoing_wave": ("UpgoingVelocity", "upgoing"),
 }
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -8,7 +8,9 @@ from .free_field import FreeField as FreeField
 from .moving_base import BaseMotion as BaseMotion
 from .moving_base import base_motion as base_motion
 from .soil_column import SoilColumn as SoilColumn
+from .strain_compatible import StrainCompatible as StrainCompatible
+from .strain_compatible import strain_compatible as strain_compatible
 from .upgoing_wave import UpgoingVelocity as UpgoingVelocity
 from .upgoing_wave import upgoing as upgoing
 
-__all__: list[str] = ['BaseMotion', 'CompanionRun', 'FreeField', 'SiteResponse', 'SoilColumn', 'SoilCurves', 'UpgoingVelocity', 'base_motion', 'equivalent_linear', 'upgoing']
+__all__: list[str] = ['BaseMotion', 'CompanionRun', 'FreeField', 'SiteResponse', 'SoilColumn', 'SoilCurves', 'StrainCompatible', 'UpgoingVelocity', 'base_motion', 'equivalent_linear', 'strain_compatible', 'upgoing']

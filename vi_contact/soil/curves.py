@@ -24,7 +24,7 @@ class SoilCurves:
 
     strain: rising, as numbers, not per cent (1e-3 is 0.1 %); reduction: G/Gmax, from at least 0.95 falling, above zero;
     damping: ratios below 1/2. Smaller strains than the first have its values; larger ones than the last are outside:
-    ``equivalent_linear`` refuses to end there. InputError for other tables.
+    ``equivalent_linear`` and ``strain_compatible`` refuse to end there. InputError for other tables.
     """
 
     strain: Sequence[float]

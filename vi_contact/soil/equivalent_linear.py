@@ -72,8 +72,8 @@ def equivalent_linear(
     rock: the half-space below, whose *outcrop* the record is of; None: the record is of the base itself (*within*).
     ratio: of the effective to the largest strain, 0.65 or (M - 1)/10 for magnitude M. tolerance: relative, of G and xi.
     frequency: None for xi at all frequencies; f [Hz] for G* = G (1 + 2 i xi w/(2 pi f)), the damping of
-    ``column``. The record is followed by as long a quiet time. InputError where the effective strain ends beyond its
-    curves; ViContactError without convergence in so many iterations.
+    ``column`` and DampingRatio. The record is followed by as long a quiet time. InputError where the effective strain
+    ends beyond its curves; ViContactError without convergence in so many iterations.
     """
     owner = "equivalent_linear"
     remedy = "give (thickness, LinearElastic, SoilCurves) of each layer, from the top"

@@ -1,0 +1,91 @@
+"""Make the soil of a model strain-compatible: run it again with the stiffness and damping that its strains ask for."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from ..core.algebra import Array
+from ..core.checks import at, function, instance, number, refuse, several
+from ..core.errors import InputError
+from ..fem import compat
+from ..fem.communicators import MpiComm
+from ..fem.forms import Materials, cell_constants
+from ..fem.groups import cells_of
+from ..fem.heterogeneous import Heterogeneous
+from ..fem.mesh import Cells
+from ..fem.output.largest_strain import LargestStrain
+from .curves import SoilCurves
+from .equivalent_linear import iterated
+
+T = TypeVar("T")
+OWNER = "strain_compatible"
+
+
+@dataclass(frozen=True)
+class StrainCompatible(Generic[T]):
+    """Hold what ``strain_compatible`` found: what the last ``run`` returned; the ``material`` it had, E and xi among it
+    as Functions of DG0; its effective ``strain``, likewise; ``changes``: the largest one after every run."""
+
+    solution: T
+    material: Heterogeneous
+    strain: Any
+    changes: tuple[float, ...]
+
+
+def strain_compatible(
+    mesh: Any, material: Materials, curves: Sequence[tuple[Cells, SoilCurves]],
+    run: Callable[[Heterogeneous, LargestStrain], T], *, ratio: float = 0.65, tolerance: float = 0.01, most: int = 20,
+) -> StrainCompatible[T]:
+    """Run a model until G and xi of every cell are those of its effective strain. Collective.
+
+    Args:
+        material: as for ``assemble``, of small strains; of Heterogeneous ones cells take the middle.
+        curves: (cells, curves) pairs; other cells keep their stiffness, and are not damped.
+        run: run(material, strain): assemble the body of this material with ``damping=DampingRatio(…)``, march with
+            ``strain`` among the recorders, and return anything. All else is yours: contact, gravity first, free fields.
+        ratio: of the effective to the largest strain. tolerance: of the largest relative change of G or xi in a cell.
+    Poisson's ratio is kept.
+    Raises:
+        InputError: cells named twice, Orthotropic ones, an effective strain that ends beyond its curves, with place.
+        ViContactError: no end after so many runs.
+    """
+    function(OWNER, "run", run, "give a function of a material and a recorder")
+    number(OWNER, "ratio", ratio, positive=True)
+    comm, remedy = MpiComm(mesh.comm), "give (cells, SoilCurves) pairs"
+    pairs = [(cells_of(OWNER, "the cells of curves", cells, mesh).indices, instance(OWNER, "curves", one, SoilCurves,
+              remedy)) for cells, one in several(OWNER, "curves", curves, remedy)]
+    named = np.concatenate([np.zeros(0, dtype=int), *(cells for cells, _ in pairs)])
+    refuse([f"{OWNER}: some cells have two curves: name each once" if len(np.unique(named)) < len(named) else ""], comm)
+    space = compat.cell_space(mesh)
+    place, (E, nu, rho) = compat.cell_blocks(space)[:, 0], cell_constants(space, material)
+
+    refuse([f"{OWNER}: Orthotropic has no G to reduce: model these cells alike" if np.isnan(E).any() else ""], comm)
+
+    def field(values: Array) -> Any:
+        found = compat.function(space)
+        found.x.array[place[: len(values)]] = values  # of cells that this rank owns, or of all
+        found.x.scatter_forward()
+        return found
+
+    def softened(strain: Array) -> Array:
+        values = np.tile([[1.0], [0.0]], len(strain))
+        for cells, one in pairs:
+            values[:, cells] = one.at(strain[cells])
+        return values
+
+    def once(values: Array) -> tuple[tuple[T, Heterogeneous, Any], Array]:
+        body, strain = Heterogeneous(field(E * values[0]), field(nu), field(rho), field(values[1])), LargestStrain()
+        solution = run(body, strain)
+        if not hasattr(strain, "values"):
+            raise InputError(f"{OWNER}: run has not recorded its strain: give simulate record=(strain, …)")
+        effective = field(ratio * strain.values)
+        return (solution, body, effective), softened(effective.x.array[place])
+
+    found, _, changes = iterated(OWNER, once, softened(np.zeros(len(place))), tolerance, most, comm)
+    strain = found[-1].x.array[place]
+    middles = mesh.geometry.x[compat.geometry_dofmap(mesh)].mean(axis=1)[:, : mesh.geometry.dim]
+    worst = [(one, cells[strain[cells].argmax()]) for cells, one in pairs if len(cells)]
+    refuse([one.beyond(strain[cell], f"at {at(middles[cell])}") for one, cell in worst], comm)
+    return StrainCompatible(*found, changes)
