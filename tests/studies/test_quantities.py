@@ -16,7 +16,7 @@ from mpi4py import MPI
 from vi_contact import core, fem, meshes
 from vi_contact.core.errors import InputError
 from vi_contact.studies import read_case
-from vi_contact.studies.cases.quantities import _KEYS, text_node
+from vi_contact.studies.cases.quantities import KEYS, text_node
 from vi_contact.studies.cases.table_calls import Call, Spot
 
 COMM = MPI.COMM_WORLD
@@ -187,6 +187,6 @@ def test_expressions_where_none_belongs_are_refused(tmp_path: Path) -> None:
 @pytest.mark.serial
 def test_the_guide_has_the_table_of_units() -> None:
     text = (ROOT / "docs" / "guide" / "studies.md").read_text(encoding="utf-8")
-    for unit, keys in _KEYS.items():
-        row = f"| {'none, or %' if unit == '1' else unit} | {', '.join(f'`{key}`' for key in keys.split())} |"
+    for unit, keys in KEYS.items():
+        row = f"| {'none, or %' if unit == '1' else unit} | {', '.join(f'`{key}`' for key in keys)} |"
         assert row in text or not unit

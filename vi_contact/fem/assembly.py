@@ -183,7 +183,7 @@ def _integrated(space: FemSpace, section: Section, load: AnyLoad) -> Callable[[f
     matrix = PetscMatrix(compat.assemble_matrix(space.compiled(form)))
 
     def at(t: float) -> Array:
-        values = evaluate(type(load).__name__, load.field, space.points, t, space.comm)
+        values = evaluate(type(load).__name__, load.value, space.points, t, space.comm)
         return space.pull(section.thickness * (matrix @ values.ravel()))
 
     return at

@@ -19,7 +19,7 @@ from .form_checks import refuse_complex
 from .forms import KINDS
 from .groups import cells_of, facets_of, field_given
 from .linear_forms import LinearForm
-from .loads import BodyForce, FacetLoad, Prescribed
+from .loads import BodyForce, Prescribed, Traction
 from .numbering import is_curved
 from .own_forms import Forms
 from .ties import Tied
@@ -136,7 +136,7 @@ def check_boundaries(mesh: Mesh, clamped: Any, prescribed: Any, tied: Any, dashp
         facets_of(OWNER, "clamped", group, mesh)
     for name, items, kinds in (
         ("prescribed", prescribed, (Prescribed,)), ("tied", tied, (Tied,)), ("dashpots", dashpots, (Dashpots,)),
-        ("loads", loads, (FacetLoad, BodyForce, LinearForm)),
+        ("loads", loads, (Traction, BodyForce, LinearForm)),
     ):
         remedy = f"give {' or '.join(f'fem.{kind.__name__}(…)' for kind in kinds)}, or a list of them"
         for item in items:

@@ -13,7 +13,7 @@ from ..core.checks import function, on_all, optional, refuse
 from ..core.errors import InputError
 from . import compat
 from .form_checks import form_of
-from .loads import BodyForce, Pressure, Traction
+from .loads import BodyForce, Traction
 from .space import FemSpace
 
 NAME = "LinearForm"
@@ -78,5 +78,5 @@ class LinearForm:
         return at
 
 
-AnyLoad = Traction | Pressure | BodyForce | LinearForm
+AnyLoad = Traction | BodyForce | LinearForm
 Loads = AnyLoad | Sequence[AnyLoad]

@@ -14,7 +14,6 @@ from dolfinx.mesh import Mesh
 
 from ..core.algebra import Array, Comm
 from ..core.checks import ended, function, number, optional, refuse, shown
-from ..core.errors import InputError
 from . import compat
 from .groups import components_given, components_of, facets_of, field_given
 from .mesh import Facets
@@ -133,27 +132,18 @@ def _at_rest(value: Value) -> bool:
 class ActingLoad:
     """Say where and how a load acts in forms; by default in the whole body, and all of it."""
 
-    value: Any
+    value: Value
     history: Callable[[float], float] | None
 
     def __post_init__(self) -> None:
         owner = type(self).__name__
-        self._check_value(owner)
-        optional(function, owner, "history", self.history, "give a function of the time [s], or None")
-
-    def _check_value(self, owner: str) -> None:
         field_given(owner, "value", self.value)
+        optional(function, owner, "history", self.history, "give a function of the time [s], or None")
 
     @property
     def is_constant(self) -> bool:
         """Return whether one assembly serves all times."""
         return self.history is not None or not callable(self.value)
-
-    @property
-    def field(self) -> Value:
-        """Return the vectors at points that the forms of ``acting`` take."""
-        value: Value = self.value
-        return value
 
     def measure(self, mesh: Mesh) -> Any:
         """Return the measure of integration over the part on which the load acts."""
@@ -164,21 +154,8 @@ class ActingLoad:
         return g
 
 
-class FacetLoad(ActingLoad):
-    """Say what loads on facets share."""
-
-    facets: Facets
-
-    def __post_init__(self) -> None:
-        facets_of(type(self).__name__, "facets", self.facets)
-        super().__post_init__()
-
-    def measure(self, mesh: Mesh) -> Any:
-        return compat.measure(mesh, mesh.topology.dim - 1, self.facets.indices)
-
-
 @dataclass(frozen=True)
-class Traction(FacetLoad):
+class Traction(ActingLoad):
     """Apply S_i = F_i(x, t) [Pa] on facets (eq. 4). ``history``: a factor f(t) of a value that is constant in time.
 
     With a history, or with a tuple, the load is assembled once; a callable without history is evaluated every step.
@@ -187,6 +164,13 @@ class Traction(FacetLoad):
     facets: Facets
     value: Value
     history: Callable[[float], float] | None = None
+
+    def __post_init__(self) -> None:
+        facets_of(type(self).__name__, "facets", self.facets)
+        super().__post_init__()
+
+    def measure(self, mesh: Mesh) -> Any:
+        return compat.measure(mesh, mesh.topology.dim - 1, self.facets.indices)
 
 
 @dataclass(frozen=True)
@@ -199,34 +183,29 @@ class TangentialTraction(Traction):
 
 
 @dataclass(frozen=True)
-class Pressure(FacetLoad):
+class Pressure(Traction):
     """Apply S = -p(x, t) n [Pa], a pressure p > 0 against the outward normal n of the facets: water, uplift in a joint.
 
-    ``value``: a number, or a function of points (k, d) [m] and the time [s] -> (k,), asked at all nodes of the body;
-    ``history``: a factor as of ``Traction``. p is interpolated at nodes: resultants of one that is linear between them
-    are exact, so let a node lie at the water level.
+    ``value``: a number, or a function of points (k, d) [m] and the time [s] -> (k,), asked at all nodes of the body; it
+    is kept as the first component of a vector field. p is interpolated at nodes: resultants of one that is linear
+    between them are exact, so let a node lie at the water level. ``history``: as of ``Traction``.
     """
 
-    facets: Facets
-    value: float | Callable[[Array, float], Array]
-    history: Callable[[float], float] | None = None
+    value: float | Callable[[Array, float], Array]  # type: ignore[assignment]  # what is given
 
-    def _check_value(self, owner: str) -> None:
-        if callable(self.value):
-            function(owner, "value", self.value, "give a number or a function of points and time")
+    def __post_init__(self) -> None:
+        given: Any = self.value
+        if callable(given):
+            function("Pressure", "value", given, "give a number or a function of points and time")
+
+            def field(points: Array, t: float) -> Array:
+                return np.multiply.outer(np.broadcast_to(given(points, t), len(points)), np.eye(points.shape[1])[0])
+
+            object.__setattr__(self, "value", field)
         else:
-            number(owner, "value", self.value, unit="Pa")
-
-    @property
-    def field(self) -> Value:
-        def first(points: Array, t: float) -> Array:
-            """The pressure as first component, the others zero."""
-            p = np.asarray(self.value(points, t) if callable(self.value) else self.value)
-            if p.shape not in ((), (len(points),)):
-                raise InputError(f"it returned shape {p.shape} for {len(points)} points: return one pressure per point")
-            return np.multiply.outer(np.broadcast_to(p, len(points)), np.eye(points.shape[1])[0])
-
-        return first
+            axes = facets_of("Pressure", "facets", self.facets).mesh.geometry.dim
+            object.__setattr__(self, "value", (number("Pressure", "value", given, unit="Pa"), *[0.0] * (axes - 1)))
+        super().__post_init__()
 
     def acting(self, g: Any, mesh: Mesh) -> Any:
         return -g[0] * ufl.FacetNormal(mesh)

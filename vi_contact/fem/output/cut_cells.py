@@ -13,14 +13,14 @@ import numpy as np
 
 from ...core.algebra import Array, Indices, Mask, from_each
 from .. import compat
-from ..loads import BodyForce, FacetLoad, Pressure, TangentialTraction
+from ..loads import BodyForce, Pressure, TangentialTraction, Traction
 from ..mesh import node_numbers
 from ..space import FemSpace
 
 
 def work_beyond(
     space: FemSpace, crossed: Mask, level: Callable[[Array], Array], motion: Callable[[Array], Array],
-    density: Array | float, load: FacetLoad | BodyForce | None,
+    density: Array | float, load: Traction | BodyForce | None,
 ) -> Array:
     """Return (motions, owned components) ∫ density motion·phi_i over parts of cells, or of the facets of a traction.
 
@@ -29,9 +29,9 @@ def work_beyond(
     Collective.
     """
     d = space.dimension
-    cells, nodes = _entities(space.mesh, crossed, load.facets.indices if isinstance(load, FacetLoad) else None)
+    cells, nodes = _entities(space.mesh, crossed, load.facets.indices if isinstance(load, Traction) else None)
     whole = space.mesh.geometry.x[nodes][:, :, :d]
-    corners, owner = parts(simplices(nodes.shape[1], d - isinstance(load, FacetLoad)), level(whole))
+    corners, owner = parts(simplices(nodes.shape[1], d - isinstance(load, Traction)), level(whole))
     at = np.matmul(corners, whole[owner])
     edges, r = at[:, 1:] - at[:, :1], motion(at.reshape(-1, d))
     r = r.reshape(len(r), *at.shape)

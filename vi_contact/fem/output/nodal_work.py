@@ -23,7 +23,7 @@ from .. import compat
 from ..contact.surface import moved_by_held
 from ..groups import facets_of
 from ..linear_forms import AnyLoad, LinearForm, Loads
-from ..loads import BodyForce, FacetLoad, as_tuple, evaluate
+from ..loads import BodyForce, Traction, as_tuple, evaluate
 from ..space import known_matrices, space_of
 
 log = logging.getLogger(__name__)
@@ -37,7 +37,7 @@ Rigid = tuple[Mask, Array, Mask | None, Beyond | None]
 def check_actions(owner: str, loads: Any, gravity: Any) -> None:
     """Raise InputError unless these are loads, as for ``fem.assemble``, and an acceleration."""
     for load in as_tuple(loads):
-        instance(owner, "loads", load, (FacetLoad, BodyForce, LinearForm), "give the loads of fem.assemble")
+        instance(owner, "loads", load, (Traction, BodyForce, LinearForm), "give the loads of fem.assemble")
     optional(array, owner, "gravity", gravity, (None,), unit="m/s²")
 
 
@@ -168,7 +168,7 @@ class NodalWork:
             if isinstance(load, LinearForm):
                 values = self._nodal[k](t)
             else:
-                values = evaluate(type(load).__name__, load.field, self.space.points, t, self.space.comm)
+                values = evaluate(type(load).__name__, load.value, self.space.points, t, self.space.comm)
             return np.asarray(self._matrices[len(self._forms) + k] @ values.ravel())
 
         if load.history is None and not load.is_constant:

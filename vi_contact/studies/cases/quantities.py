@@ -6,13 +6,14 @@ one table here tells.
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+import tomllib
+from collections.abc import Callable, Sequence
+from importlib.resources import files
 from typing import Any, get_origin
 
 from ...core.algebra import Array
 from ...core.checks import shown
 from ...core.errors import InputError
-from ...core.units import STANDARD_GRAVITY
 from .expressions import LENGTH, Expression, Places
 from .table_calls import Spot
 
@@ -22,32 +23,12 @@ Dimension = tuple[int, ...]  # exponents of metre, kilogram, second, radian
 _NUMBER, _NAME = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", "[A-Za-zµμ°%]+"
 _VALUE = re.compile(rf"\s*((?>{_NUMBER}))\s*((?:1\s*/\s*)?{_NAME}[^()+]*)")
 _FACTOR = re.compile(rf"([*·/ ]?)\s*(1(?=\s*/|$)|{_NAME})(?:\^?(-?\d)|([²³]))?\s*")
-_PREFIXES = {"": 1.0, "G": 1e9, "M": 1e6, "k": 1e3, "d": 1e-1, "c": 1e-2, "m": 1e-3, "µ": 1e-6, "μ": 1e-6, "n": 1e-9}
-_WITH_PREFIX: Mapping[str, Dimension] = {
-    "m": (1, 0, 0, 0), "s": (0, 0, 1, 0), "N": (1, 1, -2, 0), "Pa": (-1, 1, -2, 0), "Hz": (0, 0, -1, 0),
-}
-_ALONE: dict[str, tuple[float, Dimension]] = {
-    "1": (1.0, (0, 0, 0, 0)), "%": (1e-2, (0, 0, 0, 0)), "kg": (1.0, (0, 1, 0, 0)), "t": (1e3, (0, 1, 0, 0)),
-    "g": (STANDARD_GRAVITY, (1, 0, -2, 0)), "rad": (1.0, (0, 0, 0, 1)), "deg": (math.pi / 180.0, (0, 0, 0, 1)),
-    "°": (math.pi / 180.0, (0, 0, 0, 1)),
-}
-_UNITS = {start + name: (factor, dimension) for start, factor in _PREFIXES.items()
-          for name, dimension in _WITH_PREFIX.items()} | _ALONE
-_KEYS: Mapping[str, str] = {  # unit -> keys in it wherever they stand, and of what a table calls, as CALLEE.KEY
-    "m": "height width thickness depth outer_width wall slab left size far lengths corner offset gap point points cuts "
-         "frames centre initial_displacement Prescribed.displacement AnalyticGap.function BlockMesh.deform",
-    "Pa": "E E1 E2 E3 G12 G13 G23 Tresca.threshold Traction.value TangentialTraction.value Pressure.value surcharge",
-    "Pa/m": "springs", "Pa*s": "KelvinVoigt.shear KelvinVoigt.bulk", "N/m3": "BodyForce.value",
-    "kg/m3": "rho",
-    "m/s": "c_p c_s v_c initial_velocity Prescribed.velocity Processing.arias",
-    "m/s2": "amplitude pga gravity largest with_weight.acceleration Prescribed.acceleration Tabulated.values",
-    "s": "dt t_end resample_dt duration delay times trim pad resample rise end Rayleigh.beta",
-    "1/s": "Rayleigh.alpha MassProportional.c decay", "Hz": "frequency f1 f2 low high", "m2/s3": "s0",
-    "rad/s": "omega_g omega_f", "rad": "phase angle feature_angle phi delta slope batter",
-    "1": "nu nu12 nu13 nu23 mu mu_s mu_k e xi1 xi2 zeta_g zeta_f scale ratio taper direction",
-    "": "Uzawa.rho ZienkiewiczWoodTaylor.phi",  # numbers of methods
-}
-_UNIT_OF = {key: unit for unit, keys in _KEYS.items() for key in keys.split()}
+_TABLES = tomllib.loads(files(__package__).joinpath("units.toml").read_text(encoding="utf-8"))
+_UNITS = _TABLES["alone"] | {start + name: [factor * unit[0], *unit[1:]]
+                             for start, factor in _TABLES["prefixes"].items()
+                             for name, unit in _TABLES["with_prefix"].items()}
+KEYS = {unit: keys.split() for unit, keys in _TABLES["keys"].items()}
+_UNIT_OF = {key: unit for unit, keys in KEYS.items() for key in keys}
 
 
 def unit_of(name: str, key: str) -> str | None:
@@ -115,9 +96,9 @@ def _unit(text: str) -> tuple[float, Dimension]:
         below = sign == "/" or (below and sign in ("", " "))
         power = (int(digits) if digits else {"²": 2, "³": 3}.get(raised, 1)) * (-1 if below else 1)
         if name not in _UNITS:
-            known = ", ".join((*_WITH_PREFIX, *_ALONE))
+            known = ", ".join((*_TABLES["with_prefix"], *_TABLES["alone"]))
             raise InputError(f"{shown(name)} is no unit here: there are {known}, kPa, mm")
-        factor, dimension = _UNITS[name]
+        factor, *dimension = _UNITS[name]
         size *= factor**power
         total = tuple(a + power * b for a, b in zip(total, dimension, strict=True))
         place = found.end()
