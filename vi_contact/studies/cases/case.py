@@ -43,6 +43,7 @@ from ...solvers.automatic import Automatic
 from .library import base_folder, check_format, keep_copy, refuse_retired, refuse_retired_model
 from .own_classes import packages
 from .parsing import Words, arguments, nearest, read
+from .strain_compatible import CALL, iterate
 from .table_calls import Call, Callee, Group, Node, Spot, build, callee, needs_body, nodes_in
 from .toml_file import read_toml, with_settings
 from .vocabulary import MeshFile, Parts, weight, words
@@ -53,6 +54,7 @@ _TABLES: dict[str, Any] = {  # in the order in which they are read: type of what
     "mesh": MeshScript | MeshFile,
     "material": Mapping[str, LinearElastic | Orthotropic | Heterogeneous],
     "system": callee(assemble),
+    "strain_compatible": CALL,
     "contact": ContactSurface | Sequence[ContactSurface],
     "gravity": callee(weight, name="with_weight"),
     "friction": FrictionLaw,
@@ -69,7 +71,7 @@ _TABLES: dict[str, Any] = {  # in the order in which they are read: type of what
     "fields": FieldWriter,
     "check": Check | Sequence[Check],
 }
-_OF_A_BODY = ("material", "system", "contact", "gravity")  # which a model has itself
+_OF_A_BODY = ("material", "system", "strain_compatible", "contact", "gravity")  # which a model has itself
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ class Case:
     """Hold a case file that has been read and checked; nothing is computed yet.
 
     path: of the file; tables: its content, with the settings; settings: the KEY=VALUE made after reading; nodes: the
-    calls that its tables are; allowed: the packages whose classes it may name.
+    calls that its tables are; allowed: the packages whose classes it may name; ready: mesh and groups, when they are.
     """
 
     path: Path
@@ -85,6 +87,7 @@ class Case:
     settings: tuple[str, ...]
     nodes: Mapping[str, Node] = field(repr=False)
     allowed: tuple[str, ...] = ()
+    ready: tuple[Any, Tags] | None = field(default=None, repr=False)
 
     @property
     def out(self) -> Path | None:
@@ -117,7 +120,7 @@ class Case:
             except InputError as error:
                 raise InputError(f"{self.path}: [run] {error}") from None
         if comm is not None and "mesh" in self.nodes:
-            self._mesh(comm)
+            self.meshed(comm)
 
     def problem(self, comm: Any) -> ContactProblem:
         """Return the contact problem; collective."""
@@ -150,7 +153,10 @@ class Case:
         equilibrium. The folder gets a copy of the case, ``case.toml``. Raises as ``simulate``.
         """
         self.check()
-        with self.call(self.parts(comm), self.out if out is None else Path(out), changed=changed) as call:
+        folder = self.out if out is None else Path(out)
+        if "strain_compatible" in self.nodes:
+            return iterate(self, comm, folder, restart=restart, progress=progress, wall_time=wall_time)
+        with self.call(self.parts(comm), folder, changed=changed) as call:
             return simulate(**call, restart=restart, progress=progress, wall_time=wall_time)
 
     @contextmanager
@@ -161,6 +167,8 @@ class Case:
 
         parts: as of ``parts``, of this case or of one with the same body; state: at rest, when it is known.
         """
+        if "strain_compatible" in self.nodes:
+            raise InputError(f"{self.path}: [strain_compatible] is for single runs: take it out for a study of many")
         problem = self._problem(parts)
         own = {name: value for name, value in self._made("run", system=parts.system).items() if name != "out"}
         own |= {"changed": True} if changed else {}
@@ -192,7 +200,7 @@ class Case:
         if "model" in self.nodes:
             parts: Parts = self._made("model", comm=comm)
             return parts
-        mesh, tags = self._mesh(comm)
+        mesh, tags = self.meshed(comm)
         system = self._made("system", mesh=mesh, tags=tags, **self._shaking())
         system = self._made("gravity", system=system, tags=tags) if "gravity" in self.nodes else system
         none = empty_surface(system.algebra.comm, system.space.dimension)
@@ -205,8 +213,10 @@ class Case:
         early = "excitation" not in self.nodes or not needs_body(self.nodes["excitation"])
         return {"excitations": self.excitations()} if early else {}
 
-    def _mesh(self, comm: Any) -> tuple[Any, Tags]:
+    def meshed(self, comm: Any) -> tuple[Any, Tags]:
         """Return the mesh and its groups, all those that the tables name among them."""
+        if self.ready is not None:
+            return self.ready
         script = self._made("mesh")
         mesh, tags = read_mesh(script.path, comm) if isinstance(script, MeshFile) else build_mesh(script, comm)
         for node in self.nodes.values():

@@ -30,7 +30,7 @@ from ...meshes.gmsh_session import MeshScript
 from ...models import wall
 from ...run import HalvedAtImpact, Schedule
 from ...run.files.writer import FieldWriter
-from ...soil import UpgoingVelocity
+from ...soil import SoilCurves, UpgoingVelocity
 from ...solvers import friction, normal, volume
 from ...solvers.condensed import SmallMethod
 from ...solvers.friction.extrapolation import Extrapolation
@@ -50,7 +50,7 @@ _KINDS: Mapping[ModuleType, tuple[Any, ...]] = {  # room -> the kinds of things 
     solvers: (Solver,), normal: (SmallMethod,), friction: (FrictionMethod, Extrapolation), volume: (Method,),
     schemes: (Scheme,),
     run: (Solver, Schedule, HalvedAtImpact, Recorder),
-    engineering: (Recorder,), checks: (Check,),
+    engineering: (Recorder,), checks: (Check,), soil: (SoilCurves,),
 }
 
 

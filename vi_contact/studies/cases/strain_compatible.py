@@ -1,0 +1,61 @@
+"""Run a case until its soil is strain-compatible: [strain_compatible] has the arguments of ``soil.strain_compatible``.
+
+    [strain_compatible]
+    curves = [["sand", {type = "SoilCurves.vucetic_dobry", plasticity = 15}]]
+
+Every run is a whole one, in DIR; those before the last one are kept in DIR/iterations/1, 2, …
+"""
+
+import shutil
+from dataclasses import replace
+from functools import partial
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from ...core.errors import InputError
+from ...core.files import on_root
+from ...fem.communicators import MpiComm
+from ...run.files.folder import LOCK, locked, run_folder
+from ...run.recorders import Contact, Energy
+from ...run.simulate import Solution
+from ...soil.strain_compatible import strain_compatible
+from .table_calls import Call, build, callee
+
+CALL = replace(callee(strain_compatible, only=("curves", "ratio", "tolerance", "most"), given=()), function=dict)
+
+
+def iterate(case: Any, comm: Any, folder: Path | None, *, restart: bool | str | Path, **options: Any) -> Solution:
+    """Run a case with [strain_compatible] until it is; the solution of the last run. Collective."""
+    spot, ranks, numbers, given = f"{case.path}: [strain_compatible]", MpiComm(comm), count(), case.nodes["system"]
+    if restart:
+        raise InputError(f"{spot} begins with the soil at small strains and cannot be continued: run it from the start")
+    damping = given.arguments.get("damping")
+    if not isinstance(damping, Call) or damping.callee.name != "DampingRatio":
+        raise InputError(f"{spot} gives every cell its damping ratio: give [system.damping] type = \"DampingRatio\"")
+    mesh, tags = case.meshed(comm)
+
+    def run(material: Any, strain: Any) -> Any:
+        if folder is not None:
+            on_root(ranks, partial(_set_aside, folder / "iterations", next(numbers)))
+        own = case.nodes.get("record", (Energy(), Contact()))
+        nodes = {name: node for name, node in case.nodes.items() if name != "strain_compatible"}
+        nodes["system"] = replace(given, arguments=given.arguments | {"material": material})
+        nodes["record"] = (*(own if isinstance(own, tuple) else (own,)), strain)
+        return replace(case, nodes=nodes, ready=(mesh, tags)).run(comm, out=folder, **options)
+
+    each = given.arguments.get("material", ()), case.nodes["strain_compatible"]
+    material, asked = (build(one, {"tags": tags}) for one in each)
+    with locked(ranks, None if folder is None else run_folder(ranks, folder)):
+        return strain_compatible(mesh, material, run=run, **asked).solution
+
+
+def _set_aside(place: Path, number: int) -> None:
+    """Move the run beside this folder into it; before the first run, remove what is there of an earlier time."""
+    if number == 0:
+        shutil.rmtree(place, ignore_errors=True)
+        return
+    (place / str(number)).mkdir(parents=True)
+    for path in place.parent.iterdir():
+        if path.name not in (place.name, LOCK):
+            path.replace(place / str(number) / path.name)
