@@ -15,7 +15,12 @@ e are the sizes of vectors in the plane across n̄, whose components along the a
 
 The rotation theta and the settlement u·n̄ of the centre are those of the smallest rigid motion u + theta x (X - c) whose
 normal displacements fit those of the part best, by weight; nan for what they say nothing about: a level base does not
-tell how it turns about the vertical.
+tell how it turns about the vertical. ``Resultants`` adds what a report asks of a part:
+
+    level = h / H,    sliding = (sum w slip / sum w)·t̄,    margin = 1 - |T| / sum limit(r_n)    (mu N - |T| over mu N)
+
+h is the height of the thrust above the lowest point of the part, H the height of the part; pressure_low and
+pressure_high are r_n / weight at its two ends, of the heel and the toe of a wall's base.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -25,7 +30,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 
-from ..core.algebra import Array, Indices, Mask
+from ..core.algebra import Array, Indices, Mask, from_each
 from ..core.checks import array, column_name, function, instance, mask, optional, provides
 from ..core.corners import tangent_vectors
 from ..core.errors import InputError
@@ -40,7 +45,7 @@ DETERMINED = 1e-9  # of the largest singular value of the rigid modes of a part:
 
 def check_part(name: str, centre: Any, where: Any, normal: Any) -> None:
     """Raise InputError unless centre and direction are numbers and the mask is a function."""
-    array(f"part '{name}'", "the centre", centre, (None,), unit="metres")
+    optional(array, f"part '{name}'", "the centre", centre, (None,), unit="metres")
     optional(function, f"part '{name}'", "where", where, "give a function of points and normals, or None")
     optional(array, f"part '{name}'", "normal", normal, (None,))
 
@@ -50,11 +55,12 @@ class Part:
 
     ``where``: points (m, d), normals (m, d) -> mask (m,); all points when None. InputError for a part without points,
     a centre of other dimension, or directions that cancel (a closed ring), unless ``normal`` says which N is meant.
+    ``centre`` None: the middle of the part by weight, at the level of its lowest point.
     ``slots``: the numbers of the conditions whose share in it is held; those of one rank, all when None.
     """
 
     def __init__(
-        self, name: str, geometry: Geometry, centre: Sequence[float], where: Where | None,
+        self, name: str, geometry: Geometry, centre: Sequence[float] | None, where: Where | None,
         normal: Sequence[float] | None, slots: Indices | None = None,
     ) -> None:
         check_part(name, centre, where, normal)
@@ -63,16 +69,20 @@ class Part:
         chosen = mask(f"part '{name}'", "what where(points, normals) returns", given, (len(points),))
         if not chosen.any():
             raise InputError(f"part '{name}' has no contact points: change its mask")
-        self.centre = array(f"part '{name}'", "the centre", centre, points.shape[1:], unit="metres")
+        weights, box = geometry.weights[chosen], points[chosen]
+        middle = np.append((weights @ box / weights.sum())[:-1], box[:, -1].min()) if centre is None else centre
+        self.centre = array(f"part '{name}'", "the centre", middle, points.shape[1:], unit="metres")
         self.name, self.dimension = name, points.shape[1]
         self.weights, self.normals, self.arms = geometry.weights[chosen], normals[chosen], points[chosen] - self.centre
         self.normal, self.whole = self._direction(name, normal), self.weights.sum()
         places = np.unique(points, axis=0, return_inverse=True)[1].ravel()  # run folders do not tell of nodes
         self.tangents = tangent_vectors(normals, getattr(geometry, "nodes", places))[chosen]
-        self.fit = self._fit().T
+        self.fit, self.ends = self._fit().T, self._ends(box).T
+        lowest, self.tall = float(box[:, -1].min() - self.centre[-1]), float(np.ptp(box[:, -1]))
+        self.lowest = lowest if self.tall > DETERMINED * np.ptp(box, axis=0).max() else np.nan
         slots = np.arange(len(points)) if slots is None else slots
         self.mask = chosen[slots]
-        for kept in ("weights", "normals", "arms", "tangents", "fit"):
+        for kept in ("weights", "normals", "arms", "tangents", "fit", "ends"):
             setattr(self, kept, getattr(self, kept)[(np.cumsum(chosen) - 1)[slots[self.mask]]])
 
     def _direction(self, name: str, given: Sequence[float] | None) -> Array:
@@ -82,6 +92,13 @@ class Part:
         if size <= 1e-6 * (self.weights.sum() if given is None else 1.0):
             raise InputError(f"part '{name}': its contact directions cancel, give normal= the direction of N")
         return np.asarray(direction / size)
+
+    def _ends(self, points: Array) -> Array:
+        """Return rows (2, k) that make the pressures at the low and the high end of r_n, along the longest axis."""
+        along = points[:, np.argmax(np.ptp(points, axis=0))]
+        slack = DETERMINED * np.ptp(along)
+        ends = np.stack([along <= along.min() + slack, along >= along.max() - slack])
+        return np.asarray(ends / (ends @ self.weights)[:, None])
 
     def _fit(self) -> Array:
         """Return rows (q + 1, k) that make theta and settlement of normal displacements; nan what is not determined."""
@@ -154,6 +171,11 @@ _MEANING = {
     "height": ("m", "height of the thrust above the centre; nan while open"),
     "theta": ("rad", "rocking angle, anticlockwise positive; nan where the part does not tell"),
     "settlement": ("m", "mean displacement towards the support"),
+    "level": ("-", "height of the thrust above the lowest point over the height of the part; nan while open"),
+    "sliding": ("m", "mean tangential displacement on the support; in space its size"),
+    "margin": ("-", "share of the friction that is left, 1 - |T|/limit; nan while open"),
+    "pressure_low": ("Pa", "contact pressure at the end where the longest coordinate is least"),
+    "pressure_high": ("Pa", "contact pressure at the end where the longest coordinate is largest"),
 }
 
 
@@ -162,56 +184,94 @@ class Resultants:
     """Record columns <quantity>_<name> of a named part of the contact surface; the module's head lists the quantities.
 
     uplift, opening, slip, force_x, force_y, N, T, M, e, height, theta, settlement (relative to the support); in space
-    also force_z, T_x, …, e_x, …, and M_x, …, theta_x, … in place of M and theta.
+    also force_z, T_x, …, e_x, …, and M_x, …, theta_x, … in place of M and theta. level, sliding, pressure_low,
+    pressure_high and, with friction, margin. What has slid in the end is the last ``sliding`` less the first.
 
     Args:
-        name: names the columns. centre: (d,) the point of reference, of a footing the middle of its base, of a wall a
-            point at the level from which ``height`` counts [m].
-        where: points (m, d), normals (m, d) -> boolean mask (m,); the whole surface when None.
+        name: names the columns; that of the group ``part`` when left out. centre: (d,) the point of reference, of a
+            footing the middle of its base, of a wall a point at the level from which ``height`` counts [m]; the middle
+            of the part at the level of its lowest point when None.
+        part: a boundary group, fem.Facets, or two opposite corners of a box, which has its faces too;
+            where: points (m, d), normals (m, d) -> boolean mask (m,). The whole surface when both are None.
         normal: direction of N towards the support; the part's mean contact direction when None.
     Reactions are those of the step (mean or end value, as the scheme says), on a unilateral and on a held support.
+    InputError for both part and where, and for a part of no contact points.
     """
 
-    name: str
-    centre: Sequence[float]
+    name: str = ""
+    centre: Sequence[float] | None = None
     where: Where | None = None
     normal: Sequence[float] | None = None
+    part: Any = None
 
     def __post_init__(self) -> None:
+        self.name = self.name or getattr(self.part, "name", "")
         column_name("part name", self.name)
         check_part(self.name, self.centre, self.where, self.normal)
+        if self.part is not None and self.where is not None:
+            raise InputError(f"part '{self.name}' has both part and where: leave one of them out")
+        if not hasattr(self.part, "indices"):
+            optional(array, f"part '{self.name}'", "part, a box,", self.part, (2, None), unit="metres")
 
     def columns(self) -> Columns:
         """Call ``start`` first."""
         found = {}
         for quantity in self._quantities:
-            kind, _, axis = quantity.partition("_")
-            unit, text = _MEANING[kind]
+            kind, _, axis = ("", "", "") if quantity in _MEANING else quantity.partition("_")
+            unit, text = _MEANING[kind or quantity]
             found[f"{quantity}_{self.name}"] = (unit, f"{text}{f' along {axis}' if axis else ''}, part {self.name}")
         return found
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """Find the part once, and return the row of the state, a static one or the start of a run. Collective."""
-        self._surface = problem.surface
+        self._surface, self._problem = problem.surface, problem
         whole = problem.surface.whole()
-        self._part = Part(self.name, whole, self.centre, self.where, self.normal, problem.surface.slots)
+        where = self.where if self.part is None else self._chosen(whole)
+        self._part = Part(self.name, whole, self.centre, where, self.normal, problem.surface.slots)
         return self._row(state)
+
+    def _chosen(self, whole: ContactSurface) -> Where:
+        """What picks the part out of all conditions. Collective."""
+        if hasattr(self.part, "indices"):
+            space: Any = self._problem.system.space
+            provides(f"part '{self.name}'", "the system's space", space, ("facet_blocks",), "use one of fem.assemble")
+            own = space.nodes[space.facet_blocks(self.part.indices)]
+            found = np.isin(whole.nodes, np.concatenate(from_each(self._surface.comm, own)))  # type: ignore[arg-type]
+            alone = found.copy()
+            for rows in whole.corners:
+                alone[rows] = False
+            mean = whole.weights[alone] @ whole.normals[alone]
+            for rows in whole.corners:  # of a corner the face that is in the group
+                found[rows] &= np.arange(len(rows)) == np.argmax(whole.normals[rows] @ mean)
+        else:
+            low, high = np.sort(np.asarray(self.part, dtype=float), axis=0)
+            slack = DETERMINED * np.ptp(whole.points, axis=0).max()
+            found = np.all((whole.points >= low - slack) & (whole.points <= high + slack), axis=1)
+        return lambda points, normals: found
 
     def row(self, report: Report) -> Row:
         return self._row(report.new)
 
     def _row(self, state: State) -> Row:
         """Sums and maxima of this rank's conditions, then of all ranks."""
-        surface, part, r_n = self._surface, self._part, state.r_n
+        surface, part, r_n, d = self._surface, self._part, state.r_n, self._part.dimension
         u_n, slip = surface.normal_values(state.u), surface.slip(state.u, state.t)
         gap = surface.gap(state.t) - u_n + surface.compliance * r_n
         sums = part.sums(r_n[None], None if state.r_t is None else state.r_t[None], state.active[None])
-        sums = surface.comm.sum(np.concatenate([sums[0], u_n[part.mask] @ part.fit]))
+        limit = self._problem.friction.limit(r_n, surface.weights, 1.0)[part.mask].sum()
+        slid = np.einsum("k,kdc,kc->d", part.weights, part.tangents, slip[part.mask]) / part.whole
+        more = [u_n[part.mask] @ part.fit, r_n[part.mask] @ part.ends, slid, [limit]]
+        whole = surface.comm.sum(np.concatenate([sums[0], *more]))
+        sums, motion, (low, high), slid, (limit,) = np.split(whole, np.cumsum([len(sums[0]), *map(len, more[:-1])]))
         tops = surface.comm.max(part.tops(gap[None], slip[None])[0])
-        series, motion = part.quantities(sums[None, : -part.fit.shape[1]], tops[None]), sums[-part.fit.shape[1] :]
-        names = ([], ["theta", "settlement"], [*(f"theta_{axis}" for axis in AXES), "settlement"])[part.dimension - 1]
-        found = {quantity: float(values[0]) for quantity, values in series.items()}
+        names = ([], ["theta", "settlement"], [*(f"theta_{axis}" for axis in AXES), "settlement"])[d - 1]
+        found = {quantity: float(values[0]) for quantity, values in part.quantities(sums[None], tops[None]).items()}
         found |= dict(zip(names, motion.tolist(), strict=False))
+        along = slid @ [-part.normal[1], part.normal[0]] if d == 2 else np.linalg.norm(slid)
+        found |= {"level": (found["height"] - part.lowest) / part.tall if part.tall else np.nan,
+                  "sliding": float(along), "pressure_low": float(low), "pressure_high": float(high)}
+        if self._problem.frictional:
+            found["margin"] = float(1.0 - abs(found["T"]) / limit) if limit > 0.0 else np.nan
         self._quantities = list(found)
         return {f"{quantity}_{self.name}": value for quantity, value in found.items()}
 

@@ -287,6 +287,9 @@ def _node(name: str, tables: Mapping[str, Any], spot: Spot, known: Words) -> Nod
             value = {"material": materials[0] if len(materials) == 1 else [[one, one] for one in materials]} | value
         return arguments(value, asked, spot, known)
     node = read(value, asked, spot, known)
+    if name == "contact":
+        given = (one.arguments for one in nodes_in(node) if isinstance(one, Call) and "name" in one.arguments)
+        known.named[name] = {one["name"]: one.get("facets", one.get("facets1")) for one in given}
     if name == "material" and isinstance(node, dict):
         known.named[LinearElastic] = node  # before the system names them
     return node

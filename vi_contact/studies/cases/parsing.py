@@ -4,7 +4,7 @@ import os
 import types
 from collections import ChainMap
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, is_dataclass
+from dataclasses import dataclass, field, is_dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Union, get_args, get_origin
@@ -22,7 +22,7 @@ class Words:
 
     choices: of every type that tables can make, by the word after ``type``; default: where it may be left out;
     groups: types that are named groups of the mesh; short: the one key that a plain text stands for; allowed: the
-    packages whose classes may be named; named: nodes by type and name.
+    packages whose classes may be named; named: nodes by type and name; by "contact" the groups of contact tables.
     """
 
     folder: Path
@@ -44,6 +44,8 @@ def read(value: Any, hint: Any, spot: Spot, words: Words) -> Node:
     if isinstance(value, list):
         field = list_node(value, members, spot)
         return _list(value, members, spot, words) if field is None else field
+    if {str, *words.groups} & {*members} > {str} and value in words.named.get("contact", ()):  # a group, or such a name
+        return replace(words.named["contact"][value], alias=value, spot=spot)
     for member in members:
         node = _scalar(value, member, spot, words)
         if node is not None:

@@ -11,7 +11,7 @@ evaluated as code.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, is_dataclass
+from dataclasses import dataclass, field, is_dataclass, replace
 from inspect import Parameter, signature
 from typing import Any, get_type_hints
 
@@ -56,11 +56,12 @@ class Spot:
 
 @dataclass(frozen=True)
 class Group:
-    """Name a group of the mesh."""
+    """Name a group of the mesh; ``alias``: another name that it goes by."""
 
     name: str
     kind: type
     spot: Spot
+    alias: str = ""
 
     def build(self, context: Context) -> Any:
         try:
@@ -69,7 +70,7 @@ class Group:
             raise self.spot.wrong(f"is '{self.name}', but the {error}") from None
         if not isinstance(found, self.kind):
             raise self.spot.wrong(f"is '{self.name}', {GROUP[type(found).__name__]}: {self._remedy(found)}")
-        return found
+        return replace(context["tags"][self.name], name=self.alias) if self.alias else found
 
     def _remedy(self, found: Any) -> str:
         """Give the other kind; or, where a boundary was saved without the body it bounds, save the body too."""

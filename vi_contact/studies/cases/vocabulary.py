@@ -73,9 +73,10 @@ def record(
 def surface(
     system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obstacle | None = None,
     points: Sequence[tuple[float, ...]] | None = None, feature_angle: float = FEATURE_ANGLE, held: bool = False,
-    springs: float | None = None, frictionless_corners: bool = False,
+    springs: float | None = None, frictionless_corners: bool = False, name: str = "",
 ) -> ContactSurface:
-    """Make a ``contact_surface``; held: bilateral everywhere; springs: on these; the last: no friction in corners."""
+    """Make a ``contact_surface``; held: bilateral everywhere; springs: on these; no friction in corners; name: of it
+    as ``part`` of recorders."""
     found = fem.contact_surface(system, facets, obstacle=obstacle, points=points, feature_angle=feature_angle)
     found = found if springs is None else found.on_springs(springs)
     found = found.with_frictionless_corners() if frictionless_corners else found
@@ -85,9 +86,9 @@ def surface(
 def pair(
     system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *, matching: Matching | None = None,
     points: Sequence[tuple[float, ...]] | None = None, feature_angle: float = FEATURE_ANGLE, held: bool = False,
-    frictionless_corners: bool = False,
+    frictionless_corners: bool = False, name: str = "",
 ) -> ContactSurface:
-    """Make a ``contact_pair``; held: ``.bilateral_everywhere()``; the last: ``.with_frictionless_corners()``."""
+    """Make a ``contact_pair``; held: ``.bilateral_everywhere()``; the others: as of ``surface``."""
     found = fem.contact_pair(system, facets1, facets2, matching=matching, points=points, feature_angle=feature_angle)
     found = found.with_frictionless_corners() if frictionless_corners else found
     return found.bilateral_everywhere() if held else found
@@ -123,6 +124,14 @@ def heterogeneous(E: float | Expression, nu: float | Expression, rho: float | Ex
 
 def analytic_gap(function: Expression) -> core.AnalyticGap:
     return core.AnalyticGap(Places(function))
+
+
+def resultants(
+    name: str = "", centre: tuple[float, ...] | None = None, normal: tuple[float, ...] | None = None,
+    part: Facets | str | tuple[tuple[float, ...], ...] | None = None,
+) -> engineering.Resultants:
+    """Record ``Resultants``; part: the name of a [[contact]] or of a boundary group, or a box."""
+    return engineering.Resultants(name, centre, normal=normal, part=part)
 
 
 def compliant_base(
@@ -192,6 +201,7 @@ _FUNCTIONS: Mapping[Any, Mapping[str, Callable[[], Any]]] = {  # kind -> word ->
     Schedule: {"FirstModePeriod": lambda: first_mode_period},
     Heterogeneous: {"Heterogeneous": lambda: heterogeneous},
     Obstacle: {"AnalyticGap": lambda: analytic_gap},
+    Recorder: {"Resultants": lambda: resultants},
 }
 
 
