@@ -20,8 +20,8 @@ from mpi4py import MPI
 from step_cost import SCHEME, Factors, Linear, StepsWithContact, wall_cells  # first: it sets the number of threads
 
 import vi_contact as vc
+from demos.problems.wall import Wall, build
 from vi_contact import solvers
-from vi_contact.models.wall import Wall, build
 from vi_contact.solvers.friction.extrapolation import Anderson
 
 ROUTES: dict[str, Any] = {

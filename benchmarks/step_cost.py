@@ -39,6 +39,7 @@ from petsc4py import PETSc  # noqa: E402
 
 import vi_contact as vc  # noqa: E402
 from demos.problems import channel  # noqa: E402
+from demos.problems.wall import Wall, build  # noqa: E402
 from vi_contact import fem  # noqa: E402
 from vi_contact.core import contact_last  # noqa: E402
 from vi_contact.core.algebra import EffectiveMatrix, SerialComm  # noqa: E402
@@ -47,7 +48,6 @@ from vi_contact.core.state_checks import initial_state  # noqa: E402
 from vi_contact.fem.petsc_algebra import PREFIX, PetscFactor  # noqa: E402
 from vi_contact.meshes.block import BlockMesh  # noqa: E402
 from vi_contact.meshes.channel import ChannelMesh  # noqa: E402
-from vi_contact.models.wall import Wall, build  # noqa: E402
 
 SCHEME = vc.ZienkiewiczWoodTaylor(phi=0.5)
 SIZES = {"wall": (216, 2e3, 2e4, 2e5), "channel": (216, 2e3, 2e4, 2e5), "block": (2e4, 6e4), "square": (2e4, 2e5)}

@@ -26,10 +26,10 @@ import vi_contact as vc
 from demos.exact.bar import ThrownBar
 from demos.exact.bouncing_bar import BouncingBar
 from demos.pictures.layer import plot_layered_bar, plot_thin_limit
+from demos.problems import wall
 from demos.problems.bar import Bar, build
 from vi_contact import boundary_layer
 from vi_contact.cli import status_of
-from vi_contact.models import wall
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 BARS = (Bar(ThrownBar(), elements=100), Bar(BouncingBar(), elements=100))

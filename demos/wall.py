@@ -24,10 +24,10 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from demos.pictures.runs import plot_runs
+from demos.problems import wall as wall_model
 from vi_contact import fem
 from vi_contact.cli import main as command
 from vi_contact.cli import status_of
-from vi_contact.models import wall as wall_model
 from vi_contact.plots.run_pictures import draw_histories
 from vi_contact.solvers.volume.route import Volume
 from vi_contact.solvers.volume.snes import ReducedNewton
@@ -40,6 +40,10 @@ STEPS = 400
 REFINED = 16  # the comparison of schemes divides the seed's dt by this
 FRAMES_EVERY = 10  # steps between ParaView frames
 OUT = Path("results/wall")
+BUILT_IN = {  # case -> settings of the case that ships with the package, which is case b
+    "a": ["contact.points=[[6.0, 3.0], [6.0, 5.25], [6.0, 7.5]]"], "b": [], "face": ["contact.points="],
+    "bilateral": ["contact.held=true"], "free": ["contact="],
+}
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
@@ -109,12 +113,13 @@ def compare_schemes(model: wall_model.WallModel, case: str, steps: int, refined:
 def command_line(words: Sequence[str]) -> int:
     """Run the built-in case and draw its report, both routes to every step; without --case, cases a and b."""
     options = ArgumentParser(add_help=False, allow_abbrev=False)
-    options.add_argument("--case")
+    options.add_argument("--case", choices=BUILT_IN)
     options.add_argument("--out", default=str(OUT))
     own, others = options.parse_known_args(words)
     runs = {own.case: own.out} if own.case else {case: f"{own.out}/{case}" for case in CASES}
     for case, folder in runs.items():
-        status = command(["run", "wall", "--cross-check", "--set", f"model.case={case}", "--out", folder, *others])
+        settings = [word for setting in BUILT_IN[case] for word in ("--set", setting)]
+        status = command(["run", "wall", "--cross-check", *settings, "--out", folder, *others])
         if status == 0 and MPI.COMM_WORLD.rank == 0:
             status = command(["report", folder])
         if status:

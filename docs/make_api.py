@@ -35,7 +35,7 @@ from api_source import (
 PAGE = ROOT / "docs" / "reference" / "api.md"
 ROOMS = (
     "core", "laws", "fem", "solvers", "vi", "schemes", "run", "soil", "engineering", "engineering.checks",
-    "ground_motion", "bem", "beam", "boundary_layer", "meshes", "models", "studies", "plots",
+    "ground_motion", "bem", "beam", "boundary_layer", "meshes", "studies", "plots",
 )
 CONTRACT = (
     ("core.step", ("Scheme", "Solver", "PreparedSolver", "Recorder")),
@@ -125,18 +125,12 @@ def short_names() -> Iterator[str]:
 
 
 def room(name: str) -> Iterator[str]:
-    """Yield the names of one room; of a room that hands on whole modules, those of each."""
+    """Yield the names of one room."""
     where = module(name)
     told = re.sub(r"(?ms)\n^>>> .*", lambda example: f"\n\n```pycon{example[0]}\n```", documentation(where.tree))
     yield f"## `vi_contact.{name}`\n\n{told}\n"
-    if public(where):
-        yield from (entry(where, one) for one in public(where))
-        yield ""
-        return
-    for part in contents(where):
-        yield f"`vi_contact.{name}.{part}`:\n"
-        yield from (entry(module(f"{name}.{part}"), one) for one in public(module(f"{name}.{part}")))
-        yield ""
+    yield from (entry(where, one) for one in public(where))
+    yield ""
 
 
 def page() -> str:
@@ -149,8 +143,8 @@ def stub(where: Module) -> str:
     """Return the public names of a package as imports that a checker of types follows."""
     lines = ["# ruff: noqa", "# Made from __init__.py by docs/make_api.py, for checkers of types and editors."]
     for part, names in contents(where).items():
-        lines += [f"from .{part} import {name} as {name}" for name in names] or [f"from . import {part} as {part}"]
-    return "\n".join([*lines, "", f"__all__: list[str] = {sorted(public(where)) or sorted(contents(where))}", ""])
+        lines += [f"from .{part} import {name} as {name}" for name in names]
+    return "\n".join([*lines, "", f"__all__: list[str] = {sorted(public(where))}", ""])
 
 
 def files() -> Iterator[tuple[Path, str]]:

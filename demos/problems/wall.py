@@ -7,25 +7,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from ..core.checks import check_word
-from ..core.errors import InputError
-from ..core.obstacles import HalfSpace
-from ..core.problem import ContactProblem
-from ..core.protocols import Excitation, ImpactLaw, MassLaw
-from ..core.surfaces import ContactSurface, empty_surface
-from ..core.system import SemiDiscreteSystem
-from ..core.units import STANDARD_GRAVITY
-from ..engineering.modal import lowest_frequency
-from ..fem.assembly import assemble
-from ..fem.communicators import MpiComm
-from ..fem.contact.surface import contact_surface
-from ..fem.loads import BodyForce
-from ..fem.mesh import build_mesh
-from ..laws.excitation import Harmonic
-from ..laws.impact import Inelastic
-from ..laws.mass import ConsistentMass
-from ..laws.materials import Damping, LinearElastic, NoDamping, PlaneStress
-from ..meshes.wall import WallMesh
+from vi_contact.core.checks import check_word
+from vi_contact.core.errors import InputError
+from vi_contact.core.obstacles import HalfSpace
+from vi_contact.core.problem import ContactProblem
+from vi_contact.core.protocols import Excitation, ImpactLaw, MassLaw
+from vi_contact.core.surfaces import ContactSurface, empty_surface
+from vi_contact.core.system import SemiDiscreteSystem
+from vi_contact.core.units import STANDARD_GRAVITY
+from vi_contact.engineering.modal import lowest_frequency
+from vi_contact.fem.assembly import assemble
+from vi_contact.fem.communicators import MpiComm
+from vi_contact.fem.contact.surface import contact_surface
+from vi_contact.fem.loads import BodyForce
+from vi_contact.fem.mesh import build_mesh
+from vi_contact.laws.excitation import Harmonic
+from vi_contact.laws.impact import Inelastic
+from vi_contact.laws.mass import ConsistentMass
+from vi_contact.laws.materials import Damping, LinearElastic, NoDamping, PlaneStress
+from vi_contact.meshes.wall import WallMesh
 
 CASES = {
     "a": (4, 7, 10),  # the three labelled points of Fig. 2
@@ -139,4 +139,4 @@ def build(wall: Wall, comm: Any, *, weight: bool = False, base_inertia: str = "w
     loads = (BodyForce((0.0, -wall.material.rho * STANDARD_GRAVITY)),) if weight else ()
     system = assemble(mesh, wall.material, section=PlaneStress(wall.thickness), clamped=tags["base"], loads=loads,
                       damping=wall.damping, base_inertia=base_inertia == "whole")
-    return WallModel(wall, mesh, tags, replace(system, notes=(*system.notes, BASE_INERTIA[base_inertia])))
+    return WallModel(wall, mesh, tags, replace(system, notes=(BASE_INERTIA[base_inertia],)))

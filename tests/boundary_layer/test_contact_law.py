@@ -259,7 +259,7 @@ def test_a_stiff_block_of_finite_elements(comm):
 @serial
 def test_wall_tends_to_the_exact_inequality(comm):
     """The wall of seed 000, case b, in the layer: contact points within O(b) of the midpoint rule with gap >= 0."""
-    from vi_contact.models.wall import Wall, build
+    from demos.problems.wall import Wall, build
 
     model = build(Wall(), comm)
     exact = model.problem("b", impact=None, mass=ConsistentMass())

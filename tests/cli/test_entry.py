@@ -86,7 +86,7 @@ def test_motion_info(record):
     [
         (["motion", "info", "nowhere.AT2"], "nowhere.AT2: there is no such file"),
         (["motion", "info", "."], "Is a directory"),
-        (["run", "wall", "--set", "model.case=z"], "unknown case 'z': choose one of"),
+        (["run", "wall", "--set", "contact.points=[[5.0, 3.0]]"], "contact point (5, 3) is 1 m away from"),
     ],
 )
 def test_errors_are_one_sentence(arguments, word):

@@ -76,8 +76,9 @@ WRONG: dict[str, dict[str, list[str]]] = {  # command -> option -> values; an op
         "--part": ["0/1", "5/2", "x", "1"], "--launch": ["'"], "--motions": ["FILE FILE", "FILE,FILE", ",", ""],
         "--levels": ["1"], "--set": ["x"],
     },
-    "run wall": STEP | {"--set model.case=": ["foo", "3"], "--set model.size=": [*SET, "1e-9"],
-                        "--set model.divisions=": ["[0,1]", "[1.5,1]", "[1000000,1000000]"]},
+    "run wall": STEP | {"--set model.case=": ["foo", "3"], "--set mesh.divisions= --set mesh.size=": [*SET, "1e-9"],
+                        "--set mesh.divisions=": ["[0,1]", "[1.5,1]", "[1000000,1000000]"],
+                        "--set contact.points=": ["foo", "3", "[[1]]", "[[7,1]]"], "--set contact.held=": ["3"]},
     "run channel": STEP | {
         "--set system.prescribed=": ["foo", '{type="foo"}'], "--set gravity.cells=": ["foo", "3"],
         "--set mesh.size=": SET, "--set model.size=": SET, "--set model.sides=": ["foo", '{type="foo"}'],

@@ -27,5 +27,5 @@ def test_the_wall_starts_without_what_it_has_no_use_for(tmp_path: Path) -> None:
     pytest.importorskip("dolfinx")
     ended = subprocess.run([sys.executable, "-c", CODE, str(tmp_path)], capture_output=True, text=True, check=True)
     loaded = ended.stdout.split()
-    assert {"dolfinx", "scipy.sparse", "vi_contact.models.wall"} <= set(loaded)
+    assert {"dolfinx", "scipy.sparse", "vi_contact.meshes.wall"} <= set(loaded)
     assert [one for one in loaded if one in WITHOUT or one.startswith(tuple(f"{name}." for name in WITHOUT))] == []

@@ -9,6 +9,7 @@ import pytest
 from fem_problems import field, max_over_ranks
 from mpi4py import MPI
 
+from demos.problems.wall import CASES, Wall, build
 from vi_contact.core.errors import InputError
 from vi_contact.core.units import STANDARD_GRAVITY
 from vi_contact.engineering.modal import lowest_frequency
@@ -17,7 +18,6 @@ from vi_contact.ground_motion.excitation import GroundMotion
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.laws.impact import Elastic, Inelastic
 from vi_contact.laws.materials import LinearElastic, Rayleigh
-from vi_contact.models.wall import CASES, Wall, build
 from vi_contact.run.march import march
 from vi_contact.run.simulate import simulate
 from vi_contact.run.static import static_equilibrium
@@ -142,18 +142,35 @@ def built_in(*given: str, **short: Any) -> Case:
 def test_which_mass_a_run_shakes():
     """All of it under a record; under the harmonic of the figures what their reference numbers have; or as asked."""
     conventions = {
-        "whole": (built_in(motion="f"), built_in(motion="f,g"), built_in("model.base_inertia=whole")),
-        "catalogue": (built_in(), built_in("model.case=face"), built_in("model.base_inertia=catalogue", motion="f")),
+        True: (built_in(motion="f"), built_in(motion="f,g"), built_in("system.base_inertia=true")),
+        False: (built_in(), built_in("contact.points="), built_in("system.base_inertia=false", motion="f")),
     }
     for word, cases in conventions.items():
-        assert [case.tables["model"]["base_inertia"] for case in cases] == [word] * 3
-    with pytest.raises(InputError, match="unknown base_inertia 'half': choose one of whole, catalogue"):
-        built_in("model.base_inertia=half").problem(COMM)
+        assert [case.tables["system"]["base_inertia"] for case in cases] == [word] * 3
+    with pytest.raises(InputError, match=r"\[system\] base_inertia is 'half': give true or false"):
+        built_in("system.base_inertia=half")
+
+
+def test_every_case_is_a_setting_of_the_one_that_ships():
+    """Points, sides of the law and their number; what the model of before was set by names what is in its place."""
+    points = [list(Wall().point(number)) for number in CASES["a"]]
+    settings = {"a": f"contact.points={points}", "face": "contact.points=", "bilateral": "contact.held=true",
+                "free": "contact=", "b": "impact.type=Inelastic"}
+    model = build(Wall(), COMM)
+    for case, setting in settings.items():
+        found, expected = (one.whole() for one in (built_in(setting).problem(COMM).surface, model.surface(case)))
+        assert np.array_equal(found.points, expected.points) and np.array_equal(found.normals, expected.normals)
+        assert np.array_equal(found.bilateral, expected.bilateral)
+    instead = {"case=a": "contact.points, contact.held or contact", "size=1": "mesh.size", "weight=true": "gravity={}",
+               "base_inertia=whole": "system.base_inertia", "thickness=1": "system.section.thickness"}
+    for old, new in instead.items():
+        with pytest.raises(InputError, match=rf"\[model\] {old.split('=')[0]} was of the model Wall, .*: give {new}"):
+            built_in(f"model.{old}")
 
 
 @pytest.mark.parametrize("recorded", [True, False])
 def test_records_shake_the_whole_mass(shared_tmp, recorded):
-    """The run and the same problem assembled here; log and summary tell which mass the ground motion accelerates."""
+    """The run and the same problem assembled here; log and summary tell when it shakes less."""
     path, given, shaking, short = shared_tmp / "pulse.txt", [], None, {}
     if recorded:
         if COMM.rank == 0:
@@ -161,11 +178,10 @@ def test_records_shake_the_whole_mass(shared_tmp, recorded):
         COMM.Barrier()
         short, given = {"motion": str(path)}, ["excitation.1.record.units=m/s2"]
         shaking = GroundMotion(read_record(path, "m/s2"))
-    case = built_in("model.case=face", "fields=", *given, dt=1e-3, steps=3, **short)
+    case = built_in("contact.points=", "fields=", *given, dt=1e-3, steps=3, **short)
     found = case.run(COMM, out=shared_tmp / "run", progress=False)
-    told = "the whole mass" if recorded else "the convention of the catalogue"
-    assert told in found.facts["boundaries"][0]
-    assert told in (shared_tmp / "run" / "run.log").read_text(encoding="utf-8")
+    told, log = "the convention of the catalogue", (shared_tmp / "run" / "run.log").read_text(encoding="utf-8")
+    assert [told in one for one in found.facts["boundaries"]] == [True][recorded:] and (told in log) is not recorded
     problem = build(Wall(), COMM, base_inertia="whole" if recorded else "catalogue").problem("face", excitation=shaking)
     expected = simulate(problem, scheme=ZienkiewiczWoodTaylor(), dt=1e-3, steps=3, progress=False)
     off, size = (max_over_ranks(COMM, u) for u in (found.state.u - expected.state.u, expected.state.u))

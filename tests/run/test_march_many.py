@@ -12,10 +12,10 @@ import pytest
 from mpi4py import MPI
 
 import vi_contact as vc
+from demos.problems.wall import Wall, build
 from vi_contact import fem
 from vi_contact.core import contact_last
 from vi_contact.meshes.block import BlockMesh
-from vi_contact.models.wall import Wall, build
 from vi_contact.run.together import Group
 
 MODEL = build(Wall(divisions=(4, 6)), MPI.COMM_WORLD)

@@ -15,6 +15,7 @@ pytest.importorskip("dolfinx")
 from mpi4py import MPI
 
 import vi_contact as vc
+from demos.problems.wall import Wall, build
 from vi_contact import engineering, fem, ground_motion, laws, meshes, schemes, solvers
 from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
@@ -22,7 +23,6 @@ from vi_contact.core.step import Scheme, Solver
 from vi_contact.core.surfaces import empty_surface
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
-from vi_contact.models.wall import Wall, build
 from vi_contact.soil import FreeField, upgoing
 from vi_contact.solvers.friction.problem import FrictionMethod
 from vi_contact.studies import Case, read_case
@@ -174,36 +174,12 @@ def test_a_pair_with_weight_and_record_to_the_last_bit(shared_tmp: Path) -> None
     assert_same(found.history, expected.history)
 
 
-MODEL = """
-[model]
-type = "Wall"
-case = "a"
-thickness = 0.3
-
-[impact]
-type = "Inelastic"
-
-[mass]
-type = "ConsistentMass"
-
-[excitation]
-type = "Harmonic"
-amplitude = 1
-frequency = 14
-
-[scheme]
-type = "ZienkiewiczWoodTaylor"
-
-[run]
-dt = 0.0018
-steps = 30
-"""
-
-
-def test_a_model_by_its_name(shared_tmp: Path) -> None:
-    """[model] is the wall of ``models.wall`` with its own probes and the convention that is named."""
-    text = MODEL.replace("thickness", 'base_inertia = "catalogue"\nthickness')
-    found = read_case(write(shared_tmp, text)).run(COMM, progress=False)
+def test_the_wall_with_other_values(shared_tmp: Path) -> None:
+    """The case that ships is the wall beside its demo, its probes too, with the convention of its reference numbers."""
+    given = ("contact.points=[[6.0, 3.0], [6.0, 5.25], [6.0, 7.5]]", "system.section.thickness=0.3",
+             'mass={type="ConsistentMass"}', 'excitation={type="Harmonic", amplitude=1, frequency=14}', "run.dt=0.0018",
+             "run.steps=30", "scheme.phi=", "fields=")
+    found = read_case(located("wall"), given).run(COMM, progress=False)
     model = build(Wall(thickness=0.3), COMM, base_inertia="catalogue")
     expected = vc.simulate(
         model.problem("a", excitation=vc.Harmonic(1.0, 14.0)), scheme=vc.ZienkiewiczWoodTaylor(), dt=0.0018, steps=30,
@@ -220,8 +196,7 @@ def test_the_channel_with_a_recorder_of_its_demo(shared_tmp: Path) -> None:
     given = ("mesh.size=1.0", "mesh.wall=1.0", "mesh.slab=1.0", "run.steps=2", "fields=")
     history = read_case(path, given, allow=("demos",)).run(COMM, progress=False).history
     assert history["contact_resultant"][0] > 0.0 and "u_x_1_soil" in history
-    old = MODEL.replace('type = "Wall"\ncase = "a"\nthickness = 0.3', 'type = "Channel"')
-    retired = write(shared_tmp, old, "old.toml")
+    retired = write(shared_tmp, '[model]\ntype = "Channel"\n[run]\ndt = 0.01\nsteps = 1\n', "old.toml")
     with pytest.raises(InputError, match=r"\[model\] type was of the model Channel, which is retired: give the tables"):
         read_case(retired)
 
@@ -330,8 +305,12 @@ MISTAKES = {  # what is replaced in demos/cases/wall.toml, by what, what the sen
     "inner table": ('section = {type = "PlaneStress", thickness = 0.20}', "section = {type = 'PlaneStress', depth = 1}",
                     ": [system.section] has the unknown key 'depth' for PlaneStress"),
     "no dt": ("dt = 0.0017857142857142857", "", ": [run] lacks 'dt', which simulate needs"),
-    "both": ("[mesh]", '[model]\ntype = "Wall"\n[mesh]', ": give either [mesh], the problem table by table, or"),
-    "part of the model": ("[mesh]", "[model]", ": [material] is part of the model"),
+    "model": ("[mesh]", '[model]\ntype = "Wall"\n[mesh]', ": [model] type was of the model Wall, which is retired: "
+              "give the tables of the case 'wall'"),
+    "part of the model": ("[mesh]", "[model]", ": [model] height was of the model Wall, which is retired: give "
+                          "mesh.height of the case 'wall'"),
+    "no mesh": ('[mesh]\ntype = "WallMesh"\nheight = 9.0              # m\nwidth = 6.0\ndivisions = [8, 12]\n', "",
+                ": there is no table [mesh]: give the mesh of the body"),
 }
 
 

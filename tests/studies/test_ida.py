@@ -32,6 +32,7 @@ from vi_contact.run.files.folder import locked
 from vi_contact.run.solution import Solution
 from vi_contact.run.wall_time import WallTime
 from vi_contact.studies import IDA, read_case, run_ida
+from vi_contact.studies.cases.library import located
 from vi_contact.studies.cases.toml_file import toml_value
 from vi_contact.studies.ida.measures import demand, fractiles, intensity
 from vi_contact.studies.ida.processes import command, executed
@@ -188,12 +189,12 @@ def test_stopping_stops_the_runs(study: Path, monkeypatch: pytest.MonkeyPatch) -
     assert time.monotonic() - start < 600.0 and not (long.folder / "row.json").exists()
 
 
-def test_runs_of_a_model_keep_their_own_books(study: Path, tmp_path: Path) -> None:
-    """Runs that share a process share the model's body, and none of its recorders: the ledger of each is its own."""
-    (tmp_path / "model.toml").write_text(
-        '[model]\ntype = "Wall"\n[excitation]\ntype = "GroundMotion"\nrecord = "x.at2"\n'
-        'direction = [1, 0]\n[run]\ndt = 0.005\nsteps = 20\n')
-    case, shaking = read_case(tmp_path / "model.toml"), Shaking("motion_1", (Path("motion_1.at2").resolve(),))
+def test_runs_of_a_body_keep_their_own_books(study: Path, tmp_path: Path) -> None:
+    """Runs that share a process share the body, and none of their recorders: the ledger of each is its own."""
+    shaking = Shaking("motion_1", (Path("motion_1.at2").resolve(),))
+    case = read_case(located("wall"), [
+        'excitation={type="GroundMotion", record="x.at2", direction=[1, 0]}', "run.dt=0.005", "run.steps=20", "impact=",
+        "scheme=", "solver=", "escalation=", "fields=", "system.base_inertia=true"])
     runs = [OneRun(case, shaking, scale, tmp_path / f"x{scale}") for scale in (1.0, 2.0)]
     shares: list[float] = []
     ends = dict(results(json.loads(command(runs, (), WallTime())[-1]), MPI.COMM_SELF, shares.append))
@@ -303,7 +304,7 @@ def test_two_motions_and_their_settings(tmp_path: Path) -> None:
     made = read_case(case.path, (*case.settings, *one.settings(case, 2.0)))
     assert [table["scale"] for table in made.tables["excitation"]] == [2.0, 1.0]
     single = tmp_path / "single.toml"
-    single.write_text('[model]\ntype = "Wall"\n[excitation]\ntype = "GroundMotion"\nrecord = {path = "r"}\n'
+    single.write_text('[mesh]\ntype = "WallMesh"\n[excitation]\ntype = "GroundMotion"\nrecord = {path = "r"}\n'
                       "[run]\ndt = 1\n")
     (one,) = IDA(read_case(single), ["h.at2"], ["t"], scales=(2.0,)).shakings
     assert one.settings(read_case(single)) == (f'excitation.record.path="{h}"', "excitation.scale=1.0")

@@ -9,9 +9,9 @@ import pytest
 from mpi4py import MPI
 
 import vi_contact as vc
+from demos.problems.wall import Wall, WallModel, build
 from vi_contact.laws.impact import Inelastic
 from vi_contact.laws.mass import ConsistentMass
-from vi_contact.models.wall import Wall, WallModel, build
 from vi_contact.run.recorders import Contact, Energy, Probe
 from vi_contact.run.simulate import Solution, simulate
 from vi_contact.schemes.trapezoidal import Trapezoidal

@@ -69,7 +69,7 @@ def _report(options: argparse.Namespace) -> str:
     shown = None if options.show is None else [one.split(",") for one in options.show]
     page = plot_report(run, out, title=title, columns=shown)
     table = write_peaks(out.with_name("peaks.csv"), peaks(run.history, run.columns))
-    drawn = draw_run(run, out.parent, title=title, unilateral=_contact_labels(tables.get("model")))
+    drawn = draw_run(run, out.parent, title=title)
     pictures = ", ".join(path.name for path in drawn)
     return f"report: {page}\ntable: {table}\npictures in {drawn[0].parent}: {pictures}"
 
@@ -78,17 +78,6 @@ def _run(options: argparse.Namespace) -> "RunFolder":
     from ..run.files.reading import read_run  # late: h5py, which records do not need
 
     return read_run(options.folder)
-
-
-def _contact_labels(model: Any) -> list[str] | None:
-    """Return the labels of the wall's probes that are contact points; None for another model."""
-    if not isinstance(model, dict) or model.get("type") != "Wall":
-        return None
-    try:
-        from ..models.wall import CASES
-    except ImportError:  # without DOLFINx
-        return None
-    return [str(number) for number in CASES.get(str(model.get("case", "b")), range(1, 13))]
 
 
 def _peaks(options: argparse.Namespace) -> str:

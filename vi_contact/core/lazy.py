@@ -10,15 +10,14 @@ from typing import Any
 def lazy(
     package: str, contents: Mapping[str, Sequence[str]]
 ) -> tuple[list[str], Callable[[str], Any], Callable[[], list[str]]]:
-    """Return ``__all__``, ``__getattr__``, ``__dir__`` of a package (PEP 562): module -> names, () for itself whole."""
-    home = {name: module for module, names in contents.items() for name in names or (module,)}
+    """Return ``__all__``, ``__getattr__``, ``__dir__`` of a package (PEP 562): module -> names."""
+    home = {name: module for module, names in contents.items() for name in names}
     public = sorted(home)
 
     def get(name: str) -> Any:
         if name not in home:
             raise AttributeError(f"module '{package}' has no attribute '{name}'")
-        module = import_module(f"{package}.{home[name]}")
-        return getattr(module, name) if contents[home[name]] else module
+        return getattr(import_module(f"{package}.{home[name]}"), name)
 
     class Room(ModuleType):
         """Keep names when Python binds a module of the same name: ``run.simulate`` stays the function."""

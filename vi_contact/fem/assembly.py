@@ -38,6 +38,11 @@ from .ties import Tied
 Field = tuple[float, ...] | Callable[[Array], Array]
 Initial = Field | Sequence[tuple[Cells, Field]] | None
 
+LIGHTER = (
+    "inertia load of the ground motion: the convention of the catalogue's reference numbers, which leave out the mass "
+    "that elements share with the base"
+)
+
 
 @stage("assembling")
 def assemble(
@@ -102,8 +107,8 @@ def assemble(
         base_mass=np.column_stack([one - M @ r for one, r in zip(momenta, rigid.T, strict=True)]) if momenta else None,
         u0=_initial(space, "initial displacement", initial_displacement),
         v0=_initial(space, "initial velocity", initial_velocity),
-        space=space, tied=space.tied_unknowns, notes=describe_boundaries(boundaries, mesh.comm.rank, body.notes),
-        absolute=any(one.lets_waves_in for one in boundaries),
+        space=space, tied=space.tied_unknowns, absolute=any(one.lets_waves_in for one in boundaries),
+        notes=describe_boundaries(boundaries, mesh.comm.rank, body.notes if base_inertia else (*body.notes, LIGHTER)),
         companions=tuple(one for part in (*moved, *acting) for one in part.companions),
     ))
     body.own(system)

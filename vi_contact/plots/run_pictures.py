@@ -17,13 +17,10 @@ from .maps import arc_position, plot_contact
 SOIL = "_soil"  # after the label of a point: that of the soil which touches it
 
 
-def draw_run(run: RunFolder, out: Path, *, title: str, unilateral: Sequence[str] | None = None) -> list[Path]:
+def draw_run(run: RunFolder, out: Path, *, title: str) -> list[Path]:
     """Draw all pictures of a run folder into ``out``: of its histories, in space of the contact
-    faces, with fields of the deformed bodies and a film of them.
-
-    ``unilateral``: labels of probes that are contact points, drawn with their bound (see ``plot_points``).
-    """
-    drawn = draw_histories(run.history, run.contact, out, title=title, unilateral=unilateral)
+    faces, with fields of the deformed bodies and a film of them."""
+    drawn = draw_histories(run.history, run.contact, out, title=title)
     if run.contact is not None and run.contact.points.shape[1] == 3 and "active" in run.history:
         drawn.append(plot_faces(run, out / "faces.png", title=title))
     if frames_of(run.folder) and read_frames(run).cells.shape[1] > 2:  # no bars
@@ -35,7 +32,10 @@ def draw_histories(
     history: History, contact: ContactSurface | ContactGeometry | None, out: Path, *, title: str,
     unilateral: Sequence[str] | None = None, reference: History | None = None,
 ) -> list[Path]:
-    """Draw the pictures of recorded histories, each where there is something to draw; ``reference``: in grey."""
+    """Draw the pictures of recorded histories, each where there is something to draw; ``reference``: in grey.
+
+    ``unilateral``: labels of probes that are contact points, drawn with their bound (see ``plot_points``).
+    """
     drawn = []
     if shaken(history):
         drawn.append(plot_excitation(history, out / "excitation.png"))

@@ -4,14 +4,12 @@
     [material.NAME]   LinearElastic, Orthotropic           [[record]] [fields]
     [system]          fem.assemble                         [run]      the other arguments of simulate
     [[contact]]       fem.contact_surface, .contact_pair   [gravity]  with_weight, then static_equilibrium
-    [friction] [impact] [mass] [[excitation]]              [model]    instead of mesh, material, system, contact
-    [[check]]  engineering.checks, formulas to compare the run with
+    [friction] [impact] [mass] [[excitation]]              [[check]]  formulas to compare with (engineering.checks)
 """
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from copy import copy
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -50,7 +48,6 @@ from .vocabulary import MeshFile, Parts, weight, words
 
 _TABLES: dict[str, Any] = {  # in the order in which they are read: type of what a table makes, or the one call it is
     "title": str,
-    "model": Parts,
     "mesh": MeshScript | MeshFile,
     "material": Mapping[str, LinearElastic | Orthotropic | Heterogeneous],
     "system": callee(assemble),
@@ -71,7 +68,6 @@ _TABLES: dict[str, Any] = {  # in the order in which they are read: type of what
     "fields": FieldWriter,
     "check": Check | Sequence[Check],
 }
-_OF_A_BODY = ("material", "system", "strain_compatible", "contact", "gravity")  # which a model has itself
 
 
 @dataclass(frozen=True)
@@ -107,10 +103,10 @@ class Case:
     def check(self, comm: Any = None) -> None:
         """Make everything that needs no mesh, so that a wrong value or record file is told at once; InputError.
 
-        With a communicator also the mesh, if the case has one, and look up every group of it that is named; collective.
+        With a communicator also the mesh, and look up every group of it that is named; collective.
         """
         for table, node in self.nodes.items():
-            if table not in ("title", "model", "mesh", "system", "contact", "gravity") and not needs_body(node):
+            if table not in ("title", "mesh", "system", "contact", "gravity") and not needs_body(node):
                 self._made(table)
         if not needs_body(self.nodes["run"]):
             own = self._made("run")
@@ -119,7 +115,7 @@ class Case:
                 step_plan(own["dt"], steps, own.get("t_end"))
             except InputError as error:
                 raise InputError(f"{self.path}: [run] {error}") from None
-        if comm is not None and "mesh" in self.nodes:
+        if comm is not None:
             self.meshed(comm)
 
     def problem(self, comm: Any) -> ContactProblem:
@@ -139,9 +135,8 @@ class Case:
         )
 
     def _recorders(self, parts: Parts) -> tuple[Recorder, ...] | None:
-        """Return the recorders of [[record]], else such as the model's own; None for those of ``simulate``."""
-        own = parts.recorders and tuple(map(copy, parts.recorders))  # each run has its own, on whatever parts
-        return self._several("record", tags=parts.tags) if "record" in self.nodes else own
+        """Return the recorders of [[record]]; None for those of ``simulate``."""
+        return self._several("record", tags=parts.tags) if "record" in self.nodes else None
 
     def run(
         self, comm: Any, *, out: str | Path | None = None, restart: bool | str | Path = False, progress: bool = True,
@@ -197,9 +192,6 @@ class Case:
 
     def parts(self, comm: Any) -> Parts:
         """Return what the problem is made of; collective."""
-        if "model" in self.nodes:
-            parts: Parts = self._made("model", comm=comm)
-            return parts
         mesh, tags = self.meshed(comm)
         system = self._made("system", mesh=mesh, tags=tags, **self._shaking())
         system = self._made("gravity", system=system, tags=tags) if "gravity" in self.nodes else system
@@ -267,12 +259,9 @@ def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence
     for name in tables:
         if name not in ("format", *_TABLES):
             raise InputError(f"{path}: unknown table [{name}]: {nearest(name, ('format', *_TABLES))}")
-    if ("model" in tables) == ("mesh" in tables):
-        raise InputError(f"{path}: give either [mesh], the problem table by table, or [model], a model by its name")
-    for name in _OF_A_BODY:
-        if "model" in tables and name in tables:
-            raise InputError(f"{path}: [{name}] is part of the model: leave it out, or replace [model] by [mesh]")
-    given = {"run": {}} | ({} if "model" in tables else {"system": {}}) | tables
+    if "mesh" not in tables:
+        raise InputError(f"{path}: there is no table [mesh]: give the mesh of the body")
+    given = {"run": {}, "system": {}} | tables
     nodes = {name: _node(name, given, Spot(str(path), "", name), known) for name in _TABLES if name in given}
     return Case(path, tables, tuple(settings), nodes, allowed)
 

@@ -18,10 +18,17 @@ FORMAT = 1  # of case files
 _SET = "# set "  # before a setting, in the copy
 _RETIRED = {"beam": "timoshenko_beam", "layer": "particle_layer"}  # cases of before -> demos that draw the same
 _SUPPORTS = "clamped, prescribed, tied and dashpots in [system]"
-_OF_CHANNEL = {  # keys of its model of before -> where they are in the case file that ships
-    "type": "the tables", "shape": "[mesh]", "soil": "material.soil", "concrete": "material.channel",
-    "damping": "system.damping", "held": "held in each [[contact]]", "weighing": "gravity.cells",
-    "sides": _SUPPORTS, "base": _SUPPORTS, "rock": _SUPPORTS,
+_OF_MODELS: Mapping[str, Mapping[str, str]] = {  # case -> keys of its [model] of before -> where they are in its file
+    "channel": {
+        "type": "the tables", "shape": "[mesh]", "soil": "material.soil", "concrete": "material.channel",
+        "damping": "system.damping", "held": "held in each [[contact]]", "weighing": "gravity.cells",
+        "sides": _SUPPORTS, "base": _SUPPORTS, "rock": _SUPPORTS,
+    },
+    "wall": {
+        "type": "the tables", "material": "[material]", "damping": "system.damping", "weight": "gravity={}",
+        "thickness": "system.section.thickness", "base_inertia": "system.base_inertia",
+        "case": "contact.points, contact.held or contact, as the first lines tell,",
+    },
 }
 
 
@@ -50,13 +57,12 @@ def refuse_retired(names: Iterable[str]) -> None:
 
 
 def refuse_retired_model(path: Path, model: Any) -> None:
-    """Raise InputError, which names what is in its place, for the model of the channel and settings of it."""
-    given = model if isinstance(model, dict) else {}
-    if given.get("type") != "Channel" and path != FOLDER / "channel.toml":
-        return
-    for key in sorted(given, key=lambda one: one == "type"):  # which says least
-        raise InputError(f"{path}: [model] {key} was of the model Channel, which is retired: give "
-                         f"{_OF_CHANNEL.get(key, f'mesh.{key}')} of the case 'channel', {FOLDER / 'channel.toml'}")
+    """Raise InputError, which names what is in its place, for a table [model] and its settings; None: no such table."""
+    given = model if isinstance(model, dict) else {"type": model}
+    name = "channel" if given.get("type") == "Channel" or path == FOLDER / "channel.toml" else "wall"
+    for key in () if model is None else sorted(given, key=lambda one: one == "type") or ["type"]:  # which says least
+        raise InputError(f"{path}: [model] {key} was of the model {name.capitalize()}, which is retired: give "
+                         f"{_OF_MODELS[name].get(key, f'mesh.{key}')} of the case '{name}', {FOLDER / name}.toml")
 
 
 def check_format(path: Path, tables: Mapping[str, Any]) -> None:

@@ -57,9 +57,10 @@ class ShortOptions:
             motions.append({"type": "GroundMotion", "direction": [float(k == axis) for k in range(axes)]} | old | {
                 "record": (record if isinstance(record, dict) else {}) | {"path": str(Path(file).absolute())}})
         found = [f"excitation={toml_value(motions)}"]
-        if any(one.get("type") == "Wall" for one in _tables(tables.get("model"))):
-            found.append('model.base_inertia="whole"')
-        if len(files) == 2 and any(one.get("prescribed") == ROLLERS for one in _tables(tables.get("system"))):
+        system = next(iter(_tables(tables.get("system"))), {})
+        if system.get("base_inertia") is False:
+            found.append("system.base_inertia=true")
+        if len(files) == 2 and system.get("prescribed") == ROLLERS:
             found += TIED
         return [*found, "run.steps=", "run.t_end="]
 

@@ -19,7 +19,7 @@ from ...core.errors import InputError
 
 Context = Mapping[str, Any]
 Node = Any  # what has been read: a Group or Call, a tuple or dict of nodes; all else stands for itself
-GIVEN = ("comm", "mesh", "system", "excitations")  # parameters that the context supplies
+GIVEN = ("mesh", "system", "excitations")  # parameters that the context supplies
 
 
 @dataclass(frozen=True)

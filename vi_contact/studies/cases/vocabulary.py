@@ -1,4 +1,4 @@
-"""Say the words of case files: which classes, functions and models a table may call where.
+"""Say the words of case files: which classes and functions a table may call where.
 
 Rooms list their public classes once, in their ``__init__``; a class is a word wherever it is of the kind that is asked
 for, and so are its named constructors ("GeneralisedAlpha.spectral_radius"). What takes functions has no word, or one
@@ -27,7 +27,6 @@ from ...laws.impact import VelocityUpdate
 from ...laws.materials import Damping, LinearElastic, Section
 from ...laws.orthotropic import Orthotropic
 from ...meshes.gmsh_session import MeshScript
-from ...models import wall
 from ...run import HalvedAtImpact, Schedule
 from ...run.files.writer import FieldWriter
 from ...soil import SoilCurves, UpgoingVelocity
@@ -154,39 +153,18 @@ def free_field(
 class Parts:
     """Hold what a problem is made of.
 
-    tags: groups of the mesh; weighted: it carries its weight, and starts from its equilibrium; recorders: of a case
-    that names none.
+    tags: groups of the mesh; weighted: it carries its weight, and starts from its equilibrium.
     """
 
     system: SemiDiscreteSystem
     surface: ContactSurface
     tags: Any
     weighted: bool = False
-    recorders: tuple[Recorder, ...] | None = None
 
     @property
     def steady(self) -> bool:
         """Say whether they serve other excitations too: nothing in them moves with these."""
         return not (self.system.companions or self.surface.companions)
-
-
-def _wall(shape: wall.Wall, comm: Any, *, case: str = "b", weight: bool = False, base_inertia: str = "whole") -> Parts:
-    model = wall.build(shape, comm, weight=weight, base_inertia=base_inertia)
-    recorders = run.Energy(), run.Contact(), run.Probe(model.probes())
-    return Parts(model.system, model.surface(case), model.tags, weight, recorders)
-
-
-def _model(shape: type, build: Callable[..., Parts]) -> Callee:
-    """Return the call of a model: its keys are the fields of its shape, and what ``build`` takes by keyword."""
-    of_shape, target = callee(shape).hints, callee(build)
-    extra = {key: hint for key, hint in target.hints.items() if key != "shape"}
-
-    def made(**values: Any) -> Parts:
-        own, more = ({key: values[key] for key in names if key in values}
-                     for names in (of_shape, (*extra, *target.given)))
-        return build(shape(**own), **more)
-
-    return Callee(shape.__name__, made, {**of_shape, **extra}, given=target.given)
 
 
 _FUNCTIONS: Mapping[Any, Mapping[str, Callable[[], Any]]] = {  # kind -> word -> what it calls, when asked
@@ -214,7 +192,7 @@ def names_of(kind: Any) -> tuple[str, ...]:
 def _choices() -> Mapping[Any, Mapping[str, Callee]]:
     """Return kind -> word -> what it calls."""
     of_rooms = (kind for kinds in _KINDS.values() for kind in kinds)
-    return MappingProxyType({kind: _Listed(kind) for kind in (Parts, *of_rooms, *_FUNCTIONS)})
+    return MappingProxyType({kind: _Listed(kind) for kind in (*of_rooms, *_FUNCTIONS)})
 
 
 class _Listed(Mapping[str, Callee]):
@@ -226,8 +204,6 @@ class _Listed(Mapping[str, Callee]):
     def _found(self, names: Sequence[str] | None = None) -> dict[str, Callee]:
         """What words with these names before the dot call; None: all."""
         found: dict[str, Callee] = {}
-        if self._kind is Parts and (names is None or "Wall" in names):
-            found["Wall"] = _model(wall.Wall, _wall)
         for room in self._rooms:
             own = room.__all__ if names is None else [name for name in names if name in room.__all__]
             found |= {one.name: one for one in _callees(room, self._kind, own)}
