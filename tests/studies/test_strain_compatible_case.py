@@ -20,6 +20,7 @@ from vi_contact.core.errors import InputError, ViContactError
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
 from vi_contact.studies import read_case
+from vi_contact.studies.cases.table_calls import build
 
 pytestmark = pytest.mark.serial
 COMM = MPI.COMM_WORLD
@@ -104,6 +105,15 @@ def test_a_case_is_the_calls_of_python(tmp_path):
     first, last = (np.loadtxt(path / "history.csv", delimiter=",", skiprows=1, usecols=1)
                    for path in (out / "iterations" / "1", out))
     assert len(first) == len(last) == 61
+
+
+def test_units_of_curves(tmp_path):
+    curves = 'type = "SoilCurves.darendeli", mean_stress = "100 kPa", plasticity = 15'
+    text = CASE.replace('type = "SoilCurves.vucetic_dobry", plasticity = 15', curves).replace("20.0}", '"20 Hz"}')
+    case = read_case(written(tmp_path, text))
+    _, tags = case.meshed(COMM)
+    asked = build(case.nodes["strain_compatible"], {"tags": tags})
+    assert asked["curves"][0] == (tags["lower"], soil.SoilCurves.darendeli(mean_stress=1e5, plasticity=15))
 
 
 @pytest.mark.parametrize(("old", "new", "words"), [

@@ -60,7 +60,6 @@ def strain_compatible(
     refuse([f"{OWNER}: some cells have two curves: name each once" if len(np.unique(named)) < len(named) else ""], comm)
     space = compat.cell_space(mesh)
     place, (E, nu, rho) = compat.cell_blocks(space)[:, 0], cell_constants(space, material)
-
     refuse([f"{OWNER}: Orthotropic has no G to reduce: model these cells alike" if np.isnan(E).any() else ""], comm)
 
     def field(values: Array) -> Any:
