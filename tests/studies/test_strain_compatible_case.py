@@ -133,15 +133,12 @@ def test_what_is_refused(tmp_path, old, new, words):
         read_case(written(tmp_path, CASE.replace(old, new, 1))).run(COMM, progress=False)
 
 
-def test_no_restart_no_model_and_no_study(tmp_path):
+def test_no_restart_and_no_study(tmp_path):
     case = read_case(written(tmp_path))
     with pytest.raises(InputError, match="cannot be continued: run it from the start"):
         case.run(COMM, out=tmp_path / "out", restart=True)
     with pytest.raises(InputError, match="take it out for a study of many"), case.call(case.parts(COMM), None):
         pass
-    model = '[model]\ntype = "Wall"\n[strain_compatible]\ncurves = []\n'
-    with pytest.raises(InputError, match=r"\[strain_compatible\] is part of the model"):
-        read_case(written(tmp_path, model))
 
 
 def test_the_command_runs_it(tmp_path, capsys):
