@@ -26,8 +26,6 @@ from .curves import SoilCurves
 from .soil_column import SoilColumn
 
 T = TypeVar("T")
-
-
 Layer = tuple[float, LinearElastic, SoilCurves]  # its thickness [m], its material at small strains, its curves
 
 
@@ -87,6 +85,7 @@ def equivalent_linear(
     instance(owner, "record", record, Record, "give a Record, such as read_record returns")
     optional(instance, owner, "rock", rock, LinearElastic, "give a LinearElastic, or None")
     optional(number, owner, "frequency", frequency, positive=True)
+    number(owner, "rock_damping", rock_damping, not_negative=True)
     number(owner, "ratio", ratio, positive=True)
     n = next_fast_len(2 * record.acceleration.size)
     w = 2.0 * np.pi * np.fft.rfftfreq(n, record.dt)
