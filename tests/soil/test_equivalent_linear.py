@@ -86,7 +86,8 @@ def test_materials_of_the_layers():
     ({"layers": [(1.0, SOIL)]}, "from the top"), ({"layers": [(0.0, SOIL, SOIL)]}, "thickness .m. is 0.0"),
     ({"layers": [(1.0, SOIL, 0.05)]}, "the curves is 0.05"),
     ({"record": [1.0]}, "give a Record"),
-    ({"rock": 3.0}, "give a LinearElastic"), ({"rock_damping": -0.1}, "rock_damping is -0.1"), ({"ratio": 0.0}, "ratio is 0.0"), ({"tolerance": -1}, "tolerance is -1"),
+    ({"rock": 3.0}, "give a LinearElastic"), ({"rock_damping": -0.1}, "rock_damping is -0.1"),
+    ({"ratio": 0.0}, "ratio is 0.0"), ({"tolerance": -1}, "tolerance is -1"),
     ({"frequency": 0.0}, "frequency is 0.0"), ({"most": 0}, "most is 0"),
 ])
 def test_wrong_input(wrong, words):
