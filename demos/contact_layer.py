@@ -28,6 +28,8 @@ from demos.exact.bouncing_bar import BouncingBar
 from demos.pictures.layer import plot_layered_bar, plot_thin_limit
 from demos.problems import wall
 from demos.problems.bar import Bar, build
+from demos.problems.layer_law import contact_layer
+from demos.problems.layer_scheme import BoundaryLayer
 from vi_contact import boundary_layer
 from vi_contact.cli import status_of
 
@@ -73,9 +75,9 @@ def rebounds(wanted: tuple[float, ...], metrics: tuple[boundary_layer.Metric, ..
     weight = case.rho * case.length  # mass over contact area
     for metric in metrics:
         for e in wanted:
-            law = boundary_layer.contact_layer(e, mass=weight, speed=case.speed, width=width, metric=metric)
+            law = contact_layer(e, mass=weight, speed=case.speed, width=width, metric=metric)
             dt = width / case.speed / PASSAGE
-            for state, _ in vc.march(problem, scheme=boundary_layer.BoundaryLayer(law=law), dt=dt, t_end=0.012):
+            for state, _ in vc.march(problem, scheme=BoundaryLayer(law=law), dt=dt, t_end=0.012):
                 v = problem.cartesian(state.v)
             momentum = system.algebra.dot(system.influence[:, -1], system.M @ v)
             found = momentum / (weight * model.bar.section * case.speed)
@@ -97,9 +99,9 @@ def thin_limit(
     for metric in metrics:
         for width in widths:
             mass = np.sqrt(case.E * case.rho) * width / speed
-            law = boundary_layer.contact_layer(0.5, mass=mass, speed=speed, width=width, metric=metric)
+            law = contact_layer(0.5, mass=mass, speed=speed, width=width, metric=metric)
             dt = min(width / speed / PASSAGE, bar.time_step(0.5))
-            schemes[f"{metric.name} b {width:g}"] = (boundary_layer.BoundaryLayer(law=law), dt)
+            schemes[f"{metric.name} b {width:g}"] = (BoundaryLayer(law=law), dt)
     fine = np.linspace(0.0, t_end, 2001)
     curve = (fine, case.height + case.displacement(0.0, fine), case.force(fine))
     impulse, runs = float(np.mean(curve[2])) * t_end, {}
@@ -138,10 +140,10 @@ def shaken_wall(widths: tuple[float, ...], steps: int, periods: float, out: Path
     numbers["wall: largest displacement"] = float(np.max(np.abs(reference)))
     for width in widths:
         mass = np.sqrt(concrete.E * concrete.rho) * width / WALL_SPEED
-        law = boundary_layer.contact_layer(
+        law = contact_layer(
             0.5, mass=mass, speed=WALL_SPEED, width=width, metric=boundary_layer.Metric.FLAT
         )
-        scheme = boundary_layer.BoundaryLayer(law=law)
+        scheme = BoundaryLayer(law=law)
         found = displacements(replace(exact, surface=law.set_back(exact.surface)), scheme)
         errors.append(float(np.sqrt(np.mean((found - reference) ** 2))))
         numbers |= {f"wall b {width:g}: error": errors[-1], f"wall b {width:g}: deepest": float(found.max())}

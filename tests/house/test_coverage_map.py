@@ -24,7 +24,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "bem/test_thin_bodies.py": "bem.element_pairs bem.quadrature",
     "boundary_layer/test_constrained_motion.py":
         "boundary_layer.metric boundary_layer.motion boundary_layer.trajectory",
-    "boundary_layer/test_contact_law.py": "boundary_layer.layer boundary_layer.scheme",
+    "boundary_layer/test_particle.py": "boundary_layer.layer",
     "cli/test_fuzz_cli.py": "cli.errors",
     "cli/test_entry.py": "cli.options studies.cases.library",
     "cli/test_motion.py": "plots.records",
