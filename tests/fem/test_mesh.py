@@ -116,7 +116,7 @@ def test_a_missing_group_is_named_with_those_there_are(comm):
     sentence = refusal(comm, lambda: tags["fase"])
     assert sentence == (
         "mesh has no group 'fase'; its boundary groups are back, face, base, top, its cell groups wall:"
-        " name it in Gmsh as a physical group"
+        " did you mean face or base? Else name it in Gmsh as a physical group"
     )
     assert "fase" not in tags and tags.get("fase") is None
 

@@ -61,13 +61,13 @@ def test_the_cases_that_ship_are_installed() -> None:
     patterns = project["tool"]["setuptools"]["package-data"]["vi_contact.studies.cases"]
     files = sorted(path.relative_to(FOLDER.parent).as_posix() for path in FOLDER.rglob("*") if path.is_file())
     assert len(files) == 2 and all(any(fnmatch(file, one) for one in patterns) for file in files)
-    others = [path for path in (ROOT / "vi_contact").rglob("*") if path.is_file() and "__pycache__" not in path.parts
-              and path.suffix not in (".py", ".pyi", ".toml", ".typed")]
+    others = {path for path in (ROOT / "vi_contact").rglob("*") if path.is_file() and "__pycache__" not in path.parts
+              and path.suffix not in (".py", ".pyi")}
     data = project["tool"]["setuptools"]["package-data"]
     assert data["vi_contact"] == ["py.typed"] and data["*"] == ["*.pyi"]  # checkers of types look for them
     assert (ROOT / "vi_contact" / "py.typed").read_bytes() == b""
-    named = data["vi_contact.core"]
-    assert [path.relative_to(ROOT / "vi_contact" / "core").as_posix() for path in others] == named
+    homes = {ROOT / package.replace(".", "/"): named for package, named in data.items() if package != "*"}
+    assert others == {path for home, named in homes.items() for one in named for path in home.glob(one)}
 
 
 @pytest.mark.serial

@@ -5,7 +5,7 @@ import gc
 from contextlib import ExitStack
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import schemes
 from ..core import stages
@@ -13,8 +13,11 @@ from ..core.errors import InputError
 from ..studies.cases.library import FOLDER, builtin_cases, located
 from ..studies.cases.short_settings import ShortOptions
 from ..studies.cases.toml_file import read_toml
-from .errors import world
+from .errors import printable, world
 from .options import WALL_TIME, add_settings
+
+if TYPE_CHECKING:
+    from ..studies.cases.case import Case
 
 
 def add_case_commands(commands: Any) -> None:
@@ -39,7 +42,8 @@ def add_case_commands(commands: Any) -> None:
                      help="the same, also when the problem is another one than that of the checkpoint")
     run.add_argument("--wall-time", metavar="TIME", help=WALL_TIME)
     add_settings(run)
-    run.add_argument("--check", action="store_true", help="read the case and stop: nothing is computed")
+    run.add_argument("--check", action="store_true", help="tell what the model is, draw it as DIR/model.png, "
+                     "and stop: mesh and records are read, and no step is computed")
     run.add_argument("--quiet", action="store_true", help="no progress line")
     run.set_defaults(run=_run, spelling={"units": "units (--set excitation.1.record.units=UNIT)"})
     cases = commands.add_parser("cases", help="list the cases that ship with the package",
@@ -73,10 +77,27 @@ def _run(options: argparse.Namespace) -> str:
     restart = options.restart or options.changed
     out = options.out or case.out or Path("results") / path.stem
     if options.check:
-        case.check(comm)
-        said = f"{options.case}: {name}: the file is in order"
-    else:
-        found = case.run(comm, out=out, restart=restart, progress=not options.quiet, changed=options.changed,
-                         wall_time=options.wall_time)
-        said = f"{name}\n{found.summary()}\noutput: {out}"
-    return said if comm.rank == 0 else ""
+        return _checked(case, comm, Path(out))
+    found = case.run(comm, out=out, restart=restart, progress=not options.quiet, changed=options.changed,
+                     wall_time=options.wall_time)
+    return f"{name}\n{found.summary()}\noutput: {out}" if comm.rank == 0 else ""
+
+
+def _checked(case: "Case", comm: Any, folder: Path) -> str:
+    """Describe and draw the model of a case; InputError for what is wrong with it, once all the rest is told."""
+    from ..core.files import on_root
+    from ..plots.sketch import sketch  # late: matplotlib
+    from ..run.files.folder import run_folder
+    from ..studies.cases.description import describe, in_words, write_model
+
+    case.check()
+    parts = case.parts(comm)
+    model, ranks = describe(case, comm, parts), parts.system.algebra.comm
+    case.columns(comm, parts)  # points and groups of the recorders
+    write_model(ranks, model, run_folder(ranks, folder))
+    on_root(ranks, lambda: sketch(model).savefig(folder / "model.png", dpi=130, bbox_inches="tight"))
+    if comm.rank == 0:
+        print(printable(f"{in_words(model)}\npicture: {folder / 'model.png'}"))
+    if model["defects"]:
+        raise InputError(f"{case.path}: {'; '.join(model['defects'])}")
+    return f"{case.path}: {model['title']}: the file is in order" if comm.rank == 0 else ""

@@ -1,10 +1,13 @@
-"""Find the lowest natural frequency of a system, for choosing excitations and time steps."""
+"""Find the lowest natural frequencies of a system, for choosing excitations and time steps."""
 
 import numpy as np
 
+from ..core.algebra import Algebra, Array, Matrix, SerialFactor, SerialMatrix
 from ..core.checks import instance, whole
 from ..core.errors import InputError
 from ..core.system import SemiDiscreteSystem
+
+SHIFT, RIGID = 1e-6, 1e-13  # of the largest K_ii / M_ii: added to K; below the other a motion is rigid
 
 
 def lowest_frequency(system: SemiDiscreteSystem, *, max_iterations: int = 2000) -> float:
@@ -33,3 +36,25 @@ def lowest_frequency(system: SemiDiscreteSystem, *, max_iterations: int = 2000) 
     if not abs(square - last) <= 1e-10 * square:
         raise InputError("the lowest frequency did not settle: give the excitation frequency explicitly")
     return float(np.sqrt(square)) / (2.0 * np.pi)
+
+
+def natural_frequencies(algebra: Algebra, K: Matrix, M: Matrix, *, count: int = 3, rigid: int = 0) -> tuple[Array, int]:
+    """Return (lowest frequencies above zero [Hz], ascending; number of rigid motions) of K phi = (2 pi f)² M phi.
+
+    rigid: there are no more rigid motions than these. Solved on rank 0, by Lanczos' method and one factor of K + s M,
+    which there is where bodies float, too. Collective.
+    """
+    from scipy.sparse import vstack  # late: no step needs it
+    from scipy.sparse.linalg import LinearOperator, eigsh
+
+    parts, found = algebra.comm.gather([algebra.entries(A, np.arange(A.rows)) for A in (K, M)]), None
+    if parts is not None:
+        k, m = (vstack(rows).tocsc() for rows in zip(*parts, strict=True))
+        mass, n = m.diagonal(), k.shape[0]
+        scale = float(np.max(k.diagonal()[mass > 0.0] / mass[mass > 0.0]))
+        solve = LinearOperator(k.shape, SerialFactor(SerialMatrix(k + SHIFT * scale * m)).solve)
+        wanted = {"k": min(count + rigid, n - 1), "v0": np.cos(np.arange(n) ** 2.0)}
+        squares = np.sort(eigsh(k, M=m, sigma=-SHIFT * scale, OPinv=solve, return_eigenvectors=False, **wanted))
+        found = squares[squares > RIGID * scale], int(np.count_nonzero(squares <= RIGID * scale))
+    squares, free = algebra.comm.bcast(found)
+    return np.sqrt(squares[:count]) / (2.0 * np.pi), free

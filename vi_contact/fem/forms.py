@@ -36,6 +36,7 @@ class ElasticForms:
         fields: lame, shear, rho, alpha_rho, lame_out times the section's thickness, and beta: functions of DG0, of DG1
             where a material changes inside of cells. Lamé constants are NaN in orthotropic cells.
         damped: whether there is a C; densities: whether ``fields`` tell the mass and its damping, cell by cell.
+        materials: (local cells, material) as they were given.
         dilatation: with ``selective``, the mean of tr eps over each cell, which takes its place in K, in C = beta K
             and in stresses (``fem.dilatation``); None otherwise.
         tells_stress: whether ``stress`` is known; symmetric: whether all matrices are; notes: what comes from where.
@@ -53,6 +54,7 @@ class ElasticForms:
         self.dilatation = MeanDilatation(space.V) if selective else None
         self.u, self.v = ufl.TrialFunction(space.V), ufl.TestFunction(space.V)
         self._matrices: dict[str, WeakSet[Any]] = {name: WeakSet() for name in ("M", "C", "K")}
+        self.materials = tuple(materials)
         found = [material for _, material in materials]
         degree = int(any(isinstance(one, Heterogeneous) and one.varies for one in found))
         cells = compat.lagrange(space.mesh, degree, continuous=False)

@@ -6,6 +6,7 @@ recognised on each rank by the vertices of their members, numbered as in the inp
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -141,8 +142,10 @@ class Tags(dict[str, Any]):
     def __missing__(self, name: str) -> Any:
         facets = [key for key, group in self.items() if isinstance(group, Facets)]
         cells = [key for key, group in self.items() if isinstance(group, Cells)]
+        near = " or ".join(get_close_matches(str(name), self, cutoff=0.5))
         raise InputError(f"mesh has no group '{name}'; its boundary groups are {', '.join(facets) or 'none'}, its cell "
-                         f"groups {', '.join(cells)}: name it in Gmsh as a physical group")
+                         f"groups {', '.join(cells)}: {near and f'did you mean {near}? Else '}name it in Gmsh as a "
+                         "physical group")
 
 
 def alone() -> MPI.Comm:

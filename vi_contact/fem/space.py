@@ -107,7 +107,7 @@ class FemSpace(NodalSpace):
         self.nodes: Indices = numbers[:owned]
         self.points: Array = points[:owned]
         self.size = bounding_box(self.comm, self.points)  # tolerances are relative to it
-        self.prescribed = prescribed
+        self.prescribed, self.ties = prescribed, tuple(tied)
         self.held = np.zeros((owned, self.dimension), dtype=bool)
         self._where_held = [one.places(self) for one in prescribed]
         for places in self._where_held:

@@ -32,8 +32,10 @@ HISTORY_H5 = "history.h5"
 JOURNAL = "history.journal"
 LOCK = ".lock"
 LOG = "run.log"
+MODEL = "model.json"
 SUMMARY = "summary.json"
-FILES = (ABOUT, CHECKPOINT, COLUMNS, FIELDS_INDEX, HISTORY_CSV, HISTORY_H5, JOURNAL, LOG, SUMMARY)  # of a run
+FILES = (ABOUT, CHECKPOINT, COLUMNS, FIELDS_INDEX, HISTORY_CSV, HISTORY_H5, JOURNAL, LOG, MODEL,
+         SUMMARY)  # of a run
 _held: dict[Path, int] = {}  # locks that this process has -> the thread that took them
 
 

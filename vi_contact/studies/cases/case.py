@@ -36,7 +36,7 @@ from ...run.files.writer import FieldWriter
 from ...run.method import with_defaults
 from ...run.recorders import Contact, Energy, Steps
 from ...run.simulate import Solution, simulate
-from ...run.time_steps import step_plan
+from ...run.time_steps import StepPlan, step_plan
 from ...solvers.automatic import Automatic
 from .library import base_folder, check_format, keep_copy, refuse_retired, refuse_retired_model
 from .own_classes import packages
@@ -100,11 +100,8 @@ class Case:
         """Return what shakes the body; record files are read here."""
         return self._several("excitation", **context)
 
-    def check(self, comm: Any = None) -> None:
-        """Make everything that needs no mesh, so that a wrong value or record file is told at once; InputError.
-
-        With a communicator also the mesh, and look up every group of it that is named; collective.
-        """
+    def check(self) -> None:
+        """Make everything that needs no mesh, so that a wrong value or record file is told at once; InputError."""
         for table, node in self.nodes.items():
             if table not in ("title", "mesh", "system", "contact", "gravity") and not needs_body(node):
                 self._made(table)
@@ -115,16 +112,20 @@ class Case:
                 step_plan(own["dt"], steps, own.get("t_end"))
             except InputError as error:
                 raise InputError(f"{self.path}: [run] {error}") from None
-        if comm is not None:
-            self.meshed(comm)
 
-    def problem(self, comm: Any) -> ContactProblem:
-        """Return the contact problem; collective."""
-        return self._problem(self.parts(comm))
+    def problem(self, comm: Any, parts: Parts | None = None) -> ContactProblem:
+        """Return the contact problem; ``parts``: those of ``parts``, when they are known. Collective."""
+        return self._problem(parts or self.parts(comm))
 
-    def columns(self, comm: Any) -> frozenset[str]:
-        """Return the columns that a run writes into history.csv; assembles, and computes no step. Collective."""
-        parts = self.parts(comm)
+    def plan(self, parts: Parts) -> StepPlan:
+        """Return the base steps of the run; without ``steps`` and ``t_end`` it lasts as long as the excitation."""
+        own = self._made("run", system=parts.system)
+        endless = "steps" not in own and "t_end" not in own
+        return step_plan(own["dt"], own.get("steps"), self._duration(parts) if endless else own.get("t_end"))
+
+    def columns(self, comm: Any, parts: Parts | None = None) -> frozenset[str]:
+        """Return the columns that a run writes into history.csv; computes no step. ``parts`` as above. Collective."""
+        parts = parts or self.parts(comm)
         problem = self._problem(parts)
         own = self._recorders(parts)
         recorders = [Steps(), *((Energy(), Contact()) if own is None else own)]
@@ -151,7 +152,12 @@ class Case:
         folder = self.out if out is None else Path(out)
         if "strain_compatible" in self.nodes:
             return iterate(self, comm, folder, restart=restart, progress=progress, wall_time=wall_time)
-        with self.call(self.parts(comm), folder, changed=changed) as call:
+        parts = self.parts(comm)
+        with self.call(parts, folder, changed=changed) as call:
+            if folder is not None:
+                from .description import FEW, describe, write_model  # late: it reads cases
+
+                write_model(parts.system.algebra.comm, describe(self, comm, parts, most=FEW), folder)
             return simulate(**call, restart=restart, progress=progress, wall_time=wall_time)
 
     @contextmanager

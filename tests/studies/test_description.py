@@ -1,0 +1,198 @@
+"""What ``run --check`` tells of a model: exact masses and periods, on any number of ranks; and what it refuses."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("dolfinx")
+
+from mpi4py import MPI
+
+from vi_contact.cli.entry import main
+from vi_contact.plots.sketch import sketch
+from vi_contact.studies import read_case
+from vi_contact.studies.cases.description import describe, in_words
+
+COMM = MPI.COMM_WORLD
+HEIGHT, CELLS, E, RHO = 4.0, 16, 1.8e9, 2000.0
+BLOCKS = """
+title = "Two blocks that carry axial waves"
+[mesh]
+type = "TwoBlocks"
+lower = {lengths = [0.25, 2.0], divisions = [1, 8]}
+upper = {lengths = [0.25, 2.0], divisions = [1, 8]}
+[material]
+lower = {E = 1.8e9, nu = 0.0, rho = 2000.0}
+upper = {E = 1.8e9, nu = 0.0, rho = 2000.0}
+[system]
+clamped = "lower_bottom"
+prescribed = [{facets = "lower_left", components = [0]}, {facets = "lower_right", components = [0]}]
+dashpots = [{facets = "upper_top", normal = 0.1}]
+[gravity]
+[[contact]]
+type = "contact_pair"
+facets1 = "upper_bottom"
+facets2 = "lower_top"
+[friction]
+type = "Coulomb"
+mu = 0.5
+[[excitation]]
+type = "GroundMotion"
+direction = [0.0, 1.0]
+scale = 2.0
+record = {type = "synthetic", spectrum = {s0 = 0.01}, duration = 1.0, dt = 0.01, seed = 3}
+[run]
+dt = 0.002
+steps = 3
+"""
+
+
+def written(folder: Path, text: str = BLOCKS) -> Path:
+    path = folder / "blocks.toml"
+    if COMM.rank == 0:
+        path.write_text(text, encoding="utf-8")
+    COMM.Barrier()
+    return path
+
+
+def described(path: Path, comm: Any = COMM, *settings: str) -> dict[str, Any]:
+    return describe(read_case(path, settings), comm)
+
+
+def axial(n: int, height: float, cells: int) -> float:
+    """The n-th period of a column of linear elements with consistent mass, clamped at its foot: closed form."""
+    h, c = height / cells, np.sqrt(E / RHO)
+    kh = (2 * n - 1) * np.pi / (2.0 * height) * h
+    return float(2.0 * np.pi / np.sqrt(6.0 * c**2 / h**2 * (1.0 - np.cos(kh)) / (2.0 + np.cos(kh))))
+
+
+def test_numbers_of_two_blocks(shared_tmp: Path) -> None:
+    """V11.1: masses, sizes, wave lengths; periods of axial waves in both blocks as one where they touch, in the lower
+    one with a gap. Held sideways they have no other modes as low; what rubs sticks, what slides is free to."""
+    sides = ("lower_left", "lower_right", "upper_left", "upper_right")
+    held = ",".join(f"{{facets='{one}', components=[0]}}" for one in sides)
+    free, path = described(written(shared_tmp)), shared_tmp / "blocks.toml"
+    assert free["mass"] == pytest.approx(HEIGHT * 0.25 * RHO, rel=1e-9)
+    assert [(one["name"], one["cells"]) for one in free["bodies"]] == [("lower", 8), ("upper", 8)]
+    assert free["bodies"][0]["material"] == {"type": "LinearElastic", "E": E, "nu": 0.0, "rho": RHO}
+    assert {"name": "upper_left", "kind": "facets"} in free["groups"] and len(free["groups"]) == 10
+    assert [(one["kind"], one["groups"], one["components"]) for one in free["supports"]] == [
+        ("clamped", ["lower_bottom"], ["x", "y"]), ("held", ["lower_left"], ["x"]), ("held", ["lower_right"], ["x"]),
+        ("Dashpots", ["upper_top"], ["x", "y"])]
+    (contact,) = free["contact"]
+    assert contact["name"] == "upper_bottom on lower_top" and contact["points"] == 2
+    assert contact["size"] == pytest.approx(0.25) and contact["friction"] == "Coulomb(mu=0.5)"
+    c_s = np.sqrt(0.5 * E / RHO)
+    for wave in free["waves"]:
+        assert [wave[key] for key in ("c_s", "h", "f_max", "dt_ratio")] == pytest.approx(
+            [c_s, 0.25, c_s / 2.0, 0.002 * c_s / 0.25], rel=1e-9)
+    assert free["run"] == {"dt": 0.002, "t_end": pytest.approx(0.006), "steps": 3}
+    (record,) = free["records"]
+    assert record["file"] == "synthetic, seed 3" and record["scale"] == 2.0 and 1.0 < record["f_95"] < 50.0
+    assert free["rigid_motions"] == 0 and described(path, COMM, "friction=")["rigid_motions"] == 1  # it may slide
+    closed = described(path, COMM, f"system.prescribed=[{held}]")
+    assert closed["periods"] == pytest.approx([axial(n, HEIGHT, CELLS) for n in (1, 2, 3)], rel=1e-8)
+    gap = described(path, COMM, f"system.prescribed=[{held}]", "mesh.gap=0.1")
+    assert gap["rigid_motions"] == 1
+    assert gap["periods"][0] == pytest.approx(axial(1, HEIGHT / 2, CELLS // 2), rel=1e-8)
+    assert "periods" not in describe(read_case(path), COMM, most=51)
+
+
+def test_any_number_of_ranks_describes_alike(shared_tmp: Path) -> None:
+    path = written(shared_tmp)
+    whole, alone = described(path), described(path, MPI.COMM_SELF)
+    assert [len(one["lines"]) for one in alone["outline"] if one["group"] in ("", "upper_left")] == [36, 8]
+    read_case(path).run(COMM, out=shared_tmp / "run", progress=False)
+    kept = json.loads((shared_tmp / "run" / "model.json").read_text("utf-8"))
+    for model in (whole, kept) if COMM.rank == 0 else (whole,):
+        assert model.pop("periods") == pytest.approx(alone["periods"], rel=1e-8)
+        assert {key: one for key, one in model.items() if key != "outline"} == {
+            key: one for key, one in alone.items() if key not in ("outline", "periods")}
+        assert COMM.rank > 0 or model["outline"] == alone["outline"]
+
+
+@pytest.mark.serial
+def test_the_command_tells_and_draws(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    assert main(["run", str(written(tmp_path)), "--out", str(out), "--quiet", "--check"]) == 0
+    printed = capsys.readouterr().out
+    assert {path.name for path in out.iterdir()} == {"model.json", "model.png"}
+    model = json.loads((out / "model.json").read_text("utf-8"))
+    assert printed.startswith(in_words(model)) and printed.endswith("the file is in order\n")
+    assert "  upper_bottom on lower_top: 2 points on 0.25 m²; Coulomb(mu=0.5)\n" in printed
+    assert (out / "model.png").read_bytes()[:4] == b"\x89PNG"
+
+
+@pytest.mark.serial
+def test_the_page_shows_what_the_command_tells(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                               capsys: pytest.CaptureFixture[str]) -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs" / "guide" / "check.md").read_text(encoding="utf-8")
+    (shown,) = re.findall(r"^```\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "channel", "--check", "--quiet"]) == 0
+    *told, last = capsys.readouterr().out.splitlines()
+    assert told == shown.splitlines() and last.endswith("A channel buried in soil, shaken: the file is in order")
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_a_sketch_shows_what_holds_and_touches(tmp_path: Path, d: int) -> None:
+    """Lines of groups that hold a body are thick and in the legend; boxes in space; dots where they may touch."""
+    text = BLOCKS
+    if d == 3:
+        text = text.replace("[0.25, 2.0]", "[0.25, 2.0, 1.0]").replace("[1, 8]", "[1, 8, 2]")
+        text = text.replace("direction = [0.0, 1.0]", "direction = [0.0, 1.0, 0.0]")
+    if d == 1:
+        text = re.sub(r"prescribed = .*\n", "", text.replace("[0.25, 2.0]", "[2.0]").replace("[1, 8]", "[8]"))
+        text = text.replace("direction = [0.0, 1.0]", "direction = [1.0]").replace("_bottom", "_left")
+        text = text.replace("lower_top", "lower_right").replace("upper_top", "upper_right").replace("[friction]", "")
+        text = text.replace('type = "Coulomb"\nmu = 0.5\n', "")
+    model = described(written(tmp_path, text))
+    (axis,) = sketch(model).axes
+    names = [one.get_text() for one in axis.get_legend().get_texts()]
+    letters = ", ".join("xyz"[:d])
+    assert names[0] == f"clamped {letters}: lower_{'left' if d == 1 else 'bottom'}" and names[-1].startswith("contact")
+    assert len(model["outline"]) == {1: 2, 2: 9, 3: 2}[d]
+    dots = axis.lines[-1]
+    shown = np.array(dots.get_data_3d() if d == 3 else dots.get_xydata().T)
+    assert shown[min(d - 1, 1)] == pytest.approx(2.0)
+
+
+RECORD = '{type = "synthetic", spectrum = {s0 = 0.01}, duration = 1.0, dt = 0.01, seed = 3}'
+SECOND = '\n[[excitation]]\ntype = "GroundMotion"\ndirection = [1.0, 0.0]\nrecord = ' + RECORD + "\n"
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize(("old", "new", "said"), [
+    ('"upper_bottom"', '"uper_bottom"', "did you mean upper_bottom"),
+    ('"lower_bottom"', '"zz"', "upper: name it in Gmsh"),
+    ("[run]", SECOND.replace("dt = 0.01", "dt = 0.02") + "[run]",
+     "have samples every 0.01 and 0.02 s: bring them to one step"),
+    ("[run]", SECOND.replace("duration = 1.0", "duration = 2.0") + "[run]", "last 1 and 2 s: trim one"),
+    ("dt = 0.002", "dt = 0.02", "time step of 0.02 s leaves out samples of 'synthetic, seed 3'"),
+    (RECORD, '"none.at2"', "none.at2: there is no such file"),
+    ("steps = 3", 'steps = 3\n[[record]]\ntype = "Probe"\npoints = {far = [9.0, 9.0]}', "m away from the nearest node"),
+], ids=range(7))
+def test_check_ends_with_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str,
+                                       said: str) -> None:
+    assert BLOCKS.count(old) == 1
+    path = written(tmp_path, BLOCKS.replace(old, new))
+    assert main(["run", str(path), "--check", "--quiet", "--out", str(tmp_path / "out")]) == 1
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and said in error
+
+
+@pytest.mark.serial
+def test_warnings_name_what_is_coarse(tmp_path: Path) -> None:
+    """Edges too long for the record's energy, and steps longer than a twentieth of the first period."""
+    soft = described(written(tmp_path, BLOCKS.replace("E = 1.8e9", "E = 1.8e4")))
+    assert [one.split()[0] for one in soft["warnings"]] == ["'lower'", "'upper'"]
+    assert np.sqrt(0.5 * 1.8e4 / RHO) / 2.0 == pytest.approx(1.06, rel=1e-2) and "up to 1.06 Hz" in soft["warnings"][0]
+    (slow,) = described(written(tmp_path), COMM, "run.dt=0.005")["warnings"]
+    assert "0.005 s is longer than a twentieth of the first natural period" in slow

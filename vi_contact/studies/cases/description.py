@@ -1,0 +1,174 @@
+"""Describe the model that a case file makes, before any step: what ``run --check`` tells and model.json holds."""
+
+import json
+import tomllib
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...core.algebra import Comm, largest, total
+from ...core.files import on_root, to_json, write_atomically
+from ...core.problem import ContactProblem
+from ...core.step import AXES
+from ...engineering.modal import natural_frequencies
+from ...fem.mesh import Cells
+from ...fem.output.outline import cell_volumes, longest_edge, outline
+from ...fem.space import space_of
+from ...ground_motion.excitation import GroundMotion
+from ...laws.free_motions import free_motions
+from ...run.files.folder import MODEL
+from .table_calls import Group, nodes_in
+from .vocabulary import Parts
+
+ELEMENTS = 8.0  # of first order in a wave length: Kuhlemeyer and Lysmer (1973); the cautious take 10
+STEPS = 20.0  # in a period
+ENERGY = 0.95  # of a record, the integral of |A(f)|², below the frequency that is told
+ROUNDED = 1e-9  # of a time step
+TOUCHING = 1e-9  # of the size of the bodies: a gap that is none
+FEW = 10_000  # unknowns: up to so many a run tells its periods, which take two seconds; more when it is checked
+DIGITS = 10  # of a number: those beyond depend on the number of ranks
+WORDS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+
+
+def describe(case: Any, comm: Any, parts: Parts | None = None, *, most: int = 50_000) -> dict[str, Any]:
+    """Return what the model of a ``Case`` is, plain values in SI units; computes no step.
+
+    Keys: title, dimension, unknowns, degree, mass; groups (name, kind); bodies (name, cells, mass, material);
+    supports (kind, groups, components); contact (name, points, size [m²], friction, places); periods and
+    rigid_motions with the contact closed where it touches at the start, and sticking where there is friction; waves
+    (body, c_s, h: the longest edge over the degree, f_max = c_s / (8 h), dt_ratio = dt c_s / h); records (file, scale,
+    dt, duration, pga, f_95: 95 % of its energy are below); run (dt, t_end, steps); outline (group, lines), on rank 0;
+    defects and warnings: sentences.
+
+    parts: those of the case, when they are known; most: unknowns beyond which periods are left out. The same on any
+    number of ranks. InputError as of a run. Collective.
+    """
+    parts = parts or case.parts(comm)
+    problem, plan, tags = case.problem(comm, parts), case.plan(parts), parts.tags or {}
+    space = space_of("describe", problem.system)
+    bodies = [_body(space, tags, *one) for one in space.forms.materials]
+    run = {"dt": plan.dt(0), "t_end": plan.length, "steps": plan.steps}
+    model = {
+        "title": case.tables.get("title") or case.path.stem, "dimension": space.dimension, "unknowns": space.unknowns,
+        "degree": space.degree, "mass": sum(one["mass"] for one in bodies),
+        "groups": [{"name": name, "kind": type(one).__name__.lower()} for name, one in tags.items()],
+        "bodies": [{key: one[key] for key in ("name", "cells", "mass", "material")} for one in bodies],
+        "supports": list(_supports(space)), "contact": list(_contact(case, problem)),
+        "waves": [{"body": one["name"], "c_s": one["c_s"], "h": one["h"], "f_max": one["c_s"] / (ELEMENTS * one["h"]),
+                   "dt_ratio": run["dt"] * one["c_s"] / one["h"]} for one in bodies],
+        "records": [_record(one) for one in case.excitations(system=parts.system) if isinstance(one, GroundMotion)],
+        "run": run, "outline": outline(space, tags, [cells for cells, _ in space.forms.materials]),
+    } | (_periods(problem, space.size) if space.unknowns <= most else {})
+    model |= {"defects": list(_defects(model)), "warnings": list(_warnings(model))}
+    found: dict[str, Any] = json.loads(to_json(model), parse_float=lambda text: float(f"{float(text):.{DIGITS}g}"))
+    return found
+
+
+def in_words(model: Mapping[str, Any]) -> str:
+    """Return what ``describe`` found, as lines of text."""
+    lines = []
+    for part in WORDS["part"]:
+        rows = model[part["key"]] if "key" in part else [model] if part.get("needs", "title") in model else []
+        lines += [part["heading"]] if rows and "heading" in part else []
+        lines += [part["text"].format(**{key: _word(one) for key, one in row.items()}) for row in rows]
+    return "\n".join([*lines, *(f"look at this: {one}" for one in model["warnings"])])
+
+
+def _word(value: Any) -> Any:
+    """Lists and materials as texts, all else as it is."""
+    if isinstance(value, Mapping) and "type" in value:
+        value = [f"{key} {one:.4g}" for key, one in value.items() if key != "type"]
+    return ", ".join(f"{one:.4g}" if isinstance(one, float) else str(one) for one in value) if isinstance(
+        value, list) else value
+
+
+def _body(space: Any, tags: Mapping[str, Any], cells: Any, material: Any) -> dict[str, Any]:
+    """What is made of one material, by the name of its cell group, with its slowest waves and longest edge."""
+    names = [name for name, one in tags.items() if isinstance(one, Cells)
+             and not largest(space.comm, not np.array_equal(one.indices, cells))]
+    volumes = cell_volumes(space.mesh)
+    own = cells[cells < len(volumes)]
+    density, shear = (space.forms.cellwise(field)[own] for field in ("rho", "shear"))
+    if hasattr(material, "G12"):
+        shear = density / material.rho * min(material.G12, material.G13, material.G23)
+    numbers = {key: one for key, one in vars(material).items() if isinstance(one, int | float)}
+    return {"name": (names or ["body"])[0], "cells": round(total(space.comm, len(own))),
+            "mass": total(space.comm, volumes[own] @ density), "material": {"type": type(material).__name__} | numbers,
+            "c_s": -largest(space.comm, np.max(-np.sqrt(shear / density), initial=-np.inf)),
+            "h": largest(space.comm, longest_edge(space.mesh, own)) / space.degree}
+
+
+def _supports(space: Any) -> Iterator[dict[str, Any]]:
+    """Yield what holds the bodies, moves them, absorbs or lets in waves, or ties sides to each other."""
+    held = [("moved" if one.moves else "clamped" if one.components is None else "held", [one.name], one.components)
+            for one in space.prescribed]
+    absorbing = [(type(one).__name__, [one.facets.name], None) for one in space.forms.boundaries]
+    tied = [("tied", [one.first.name, one.second.name], one.components) for one in space.ties]
+    for kind, groups, components in (*held, *absorbing, *tied):
+        chosen = range(space.dimension) if components is None else components
+        yield {"kind": kind, "groups": groups, "components": [AXES[one] for one in chosen]}
+
+
+def _contact(case: Any, problem: ContactProblem) -> Iterator[dict[str, Any]]:
+    """Yield the parts of the contact, one for each table: by its name, or by those of its groups."""
+    surface, tables = problem.surface, case.nodes.get("contact", ())
+    names = [node.arguments.get("name") or " on ".join(one.name for one in nodes_in(node) if isinstance(one, Group))
+             for node in (tables if isinstance(tables, tuple) else (tables,))]
+    whole, parts = surface.whole(), getattr(surface, "parts", ())
+    ends = np.cumsum([0, *(round(total(surface.comm, len(part.slots))) for part in parts)])
+    for name, (a, b) in zip(names, pairwise(ends), strict=True):
+        yield {"name": name, "points": int(b - a), "size": float(whole.weights[a:b].sum()),
+               "friction": repr(problem.friction), "places": whole.points[a:b]}
+
+
+def _record(motion: GroundMotion) -> dict[str, Any]:
+    """A record and the frequency [Hz] below which ENERGY of its energy is; a synthetic one is named by its seed."""
+    record = motion.record
+    power = np.cumsum(np.abs(np.fft.rfft(record.acceleration)) ** 2)
+    highest = np.fft.rfftfreq(record.acceleration.size, record.dt)[np.searchsorted(power, ENERGY * power[-1])]
+    return {"file": Path(record.source).name or f"synthetic, {record.title.rpartition(', ')[2]}", "scale": motion.scale,
+            "dt": record.dt, "duration": record.duration, "f_95": float(highest),
+            "pga": float(np.abs(motion.scale * record.acceleration).max())}
+
+
+def _periods(problem: ContactProblem, size: float) -> dict[str, Any]:
+    """Undamped natural periods [s] with the contact closed where there is no gap, and sticking where it rubs."""
+    system, surface = problem.static_load, problem.surface
+    closed, held, springs = surface.gap0 <= TOUCHING * size, *np.zeros((2, system.rows))
+    rigid = closed & surface.rigid
+    held[surface.owned[rigid]] = 1.0
+    held[surface.tangents[(surface.tangents >= 0) & closed[:, None] & problem.frictional]] = 1.0
+    springs[surface.owned[closed & ~rigid]] = 1.0 / surface.compliance[closed & ~rigid]
+    algebra, every = system.algebra, np.arange(system.rows)
+    K = algebra.combine([(1.0, system.K), (1.0, algebra.local(every, every, springs, system.rows))])
+    most = sum(body.motions.shape[1] for body in free_motions(problem.system))
+    f, free = natural_frequencies(algebra, *(algebra.block(one, held == 0.0) for one in (K, system.M)), rigid=most)
+    return {"periods": list(1.0 / f), "rigid_motions": free}
+
+
+def _defects(model: Mapping[str, Any]) -> Iterator[str]:
+    """Yield why records do not fit to each other or to the time step, a sentence each."""
+    for one, other in pairwise(model["records"]):
+        for key, words in (("dt", "uneven"), ("duration", "unequal")):
+            if abs(one[key] - other[key]) > ROUNDED * one[key]:
+                yield WORDS[words].format(one=one, other=other)
+    for one in model["records"]:
+        if model["run"]["dt"] > one["dt"] * (1.0 + ROUNDED):
+            yield WORDS["long"].format(one=one, run=model["run"])
+
+
+def _warnings(model: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what an engineer should look at, a sentence each."""
+    for one in sorted(model["records"], key=lambda one: float(one["f_95"]))[-1:]:
+        coarse = (wave for wave in model["waves"] if one["f_95"] > wave["f_max"])
+        yield from (WORDS["coarse"].format(wave=wave, one=one) for wave in coarse)
+    if model["run"]["dt"] > next(iter(model.get("periods", ())), np.inf) / STEPS:
+        yield WORDS["slow"].format(**model)
+
+
+def write_model(comm: Comm, model: Mapping[str, Any], folder: Path) -> None:
+    """Write model.json into a folder that exists. Collective."""
+    on_root(comm, lambda: write_atomically(folder / MODEL, to_json(model).encode()))
