@@ -17,7 +17,7 @@ from ...core.algebra import Array
 from ...core.errors import InputError
 
 LENGTH, DEPTH, POWER = 500, 20, 100
-_WORD = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[A-Za-z]\w*|[-+*/^(),]", re.ASCII)
+_WORD = re.compile(r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?|[A-Za-z]\w*|[-+*/^(),]", re.ASCII)
 _OF_ONE: Mapping[str, Callable[..., Any]] = {
     "sqrt": np.sqrt, "sin": np.sin, "cos": np.cos, "tan": np.tan, "exp": np.exp, "log": np.log, "abs": np.abs,
     "step": lambda a: np.heaviside(a, 1.0),
