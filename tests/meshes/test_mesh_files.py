@@ -1,6 +1,5 @@
 """Mesh files are data: no script runs, whatever the file is called, and wrong ones are refused in one sentence."""
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -51,7 +50,7 @@ def test_scripts_are_not_run(name: str, meshes: dict[str, bytes], tmp_path: Path
     mark = tmp_path / "PWNED"
     script = SCRIPT.format(mark=mark).encode()
     (tmp_path / name).write_bytes(script)
-    with pytest.raises(InputError, match="is a Gmsh script" if name[4:] in (".geo", ".pos", ".opt") else "MeshFormat"):
+    with pytest.raises(InputError, match="MeshFormat, .* may be a script"):
         arrays_from_file(tmp_path / name)
     for data in (meshes["4.1 text"] + script, meshes["2.2 text"] + b'$View\n' + script, meshes["4.1 text"]):
         (tmp_path / name).write_bytes(data)
@@ -65,7 +64,7 @@ def test_scripts_are_not_run(name: str, meshes: dict[str, bytes], tmp_path: Path
 
 def test_a_geo_file_is_refused_with_the_remedy(tmp_path: Path) -> None:
     (tmp_path / "dam.geo").write_text("Point(1) = {0, 0, 0, 1};\n")
-    with pytest.raises(InputError, match=re.escape("as by gmsh -2 dam.geo -o dam.msh (-3")):
+    with pytest.raises(InputError, match="give a .geo of geometry alone as meshes.GeoFile"):
         arrays_from_file(tmp_path / "dam.geo")
 
 

@@ -49,6 +49,9 @@ def add_case_commands(commands: Any) -> None:
     cases = commands.add_parser("cases", help="list the cases that ship with the package",
                                 description="List the cases that ship with the package, and their folder.")
     cases.set_defaults(run=_cases)
+    schema = commands.add_parser("schema", help="print the JSON schema of case files, for editors",
+                                 description="Print the JSON schema of case files: vi-contact schema > case.json.")
+    schema.set_defaults(run=lambda options: FOLDER.with_name("case.schema.json").read_text("utf-8").rstrip())
 
 
 def _cases(options: argparse.Namespace) -> str:

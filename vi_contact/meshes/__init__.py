@@ -12,6 +12,7 @@ _CONTENTS = {
     "block": ("BlockMesh",),
     "channel": ("ChannelMesh",),
     "cut": ("CutOpen", "Welded"),
+    "geo_file": ("GeoFile",),
     "two_blocks": ("Blocks", "TwoBlocks"),
     "wall": ("WallMesh",),
 }

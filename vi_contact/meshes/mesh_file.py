@@ -15,7 +15,6 @@ from vi_contact.core.checks import shown
 from vi_contact.core.errors import InputError
 
 MAGIC = b"$MeshFormat"
-_SCRIPTS = (".geo", ".geo_unrolled", ".opt", ".pos", ".script")
 _SECTION = re.compile(rb"\n\$(End)?(PhysicalNames|Entities|Nodes|Elements)\b")
 SHORT = 80  # bytes in which what comes first is found
 
@@ -45,15 +44,10 @@ def safe_copy(file: Path, folder: Path) -> Path:
 
 
 def _check_magic(data: mmap.mmap, file: Path) -> None:
-    if data[: len(MAGIC)] == MAGIC:
-        return
-    if file.suffix.lower() in _SCRIPTS:
-        raise InputError(f"mesh file {file} is a Gmsh script, which may run commands, and is not read: mesh it "
-                         f"yourself and give the result, as by gmsh -2 {file.name} -o {file.stem}.msh (-3 for a body "
-                         "in space)")
-    raise InputError(f"mesh file {file} does not begin with $MeshFormat, so it is no mesh of Gmsh's own format: write "
-                     f"it from Gmsh as .msh, or convert it as by gmsh -save {file.name} -o {file.stem}.msh if you "
-                     "trust it")
+    if data[: len(MAGIC)] != MAGIC:
+        raise InputError(f"mesh file {file} does not begin with $MeshFormat, so it is no mesh of Gmsh's own format and "
+                         "may be a script, which runs commands: write it from Gmsh as .msh, or give a .geo of geometry "
+                         "alone as meshes.GeoFile")
 
 
 def _check_sections(data: mmap.mmap, file: Path) -> None:

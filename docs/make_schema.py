@@ -1,0 +1,109 @@
+"""Write the JSON schema of case files, which tells editors tables, keys and types, from the type hints that read them.
+
+    python3 docs/make_schema.py            # write the file: after every change of what case files may say
+
+``tests/studies/test_schema.py`` tells when the file is not what this writes.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from inspect import getdoc
+from pathlib import Path
+from typing import Any, get_args, get_origin
+
+from vi_contact.laws.materials import LinearElastic
+from vi_contact.studies.cases.case import _TABLES
+from vi_contact.studies.cases.own_classes import is_protocol
+from vi_contact.studies.cases.parsing import Words, choices_of, is_list, is_path, members_of
+from vi_contact.studies.cases.quantities import AT_START, FIELD, HISTORY, Expression, unit_of
+from vi_contact.studies.cases.table_calls import Callee
+from vi_contact.studies.cases.vocabulary import words
+
+FILE = Path(__file__).resolve().parents[1] / "vi_contact" / "studies" / "cases" / "case.schema.json"
+DRAFT = "http://json-schema.org/draft-07/schema#"
+_PLAIN: Mapping[Any, Any] = {
+    float: {"type": ["number", "string"]}, int: {"type": ["integer", "string"]}, bool: {"type": "boolean"},
+    str: {"type": "string"}, HISTORY: {"type": "string"}, Expression: {"type": "string"},
+    FIELD: {"type": ["string", "array"]}, AT_START: {"type": "array"},
+}
+_OWN_CLASS = {"type": "object", "properties": {"type": {"type": "string", "pattern": ":"}}, "required": ["type"]}
+_MATERIALS = {"type": "string", "description": "the NAME of [material.NAME]"}
+
+
+def text() -> str:
+    """Return the schema (draft 7) of case files."""
+    found = _Schema(words(Path()))
+    properties = {name: found.call(one) if isinstance(one, Callee) else found.of(one) for name, one in _TABLES.items()}
+    head = {
+        "$schema": DRAFT, "title": "A case file of vi_contact", "type": "object", "additionalProperties": False,
+        "required": ["mesh"],
+    }
+    definitions = dict(sorted(found.definitions.items()))
+    inside = {"properties": {"format": {"const": 1}, **properties}, "definitions": definitions}
+    parts = [json.dumps(head)[1:-1], *(f"{json.dumps(key)}: {{\n{_lines(one)}\n}}" for key, one in inside.items())]
+    return "{" + ",\n".join(parts) + "}\n"
+
+
+def _lines(table: dict[str, Any]) -> str:
+    """Return the members of a table, each on a line of its own."""
+    return ",\n".join(f"{json.dumps(key)}: {json.dumps(one, ensure_ascii=False)}" for key, one in table.items())
+
+
+class _Schema:
+    def __init__(self, words: Words) -> None:
+        self._words = words
+        self.definitions: dict[str, Any] = {}
+
+    def of(self, hint: Any) -> dict[str, Any]:
+        """Return the schema of values for a parameter with this hint."""
+        members = members_of(hint)
+        found = [one for member in members for one in self._one(member)] + self._tables(members)
+        return {} if {} in found or not found else found[0] if len(found) == 1 else {"anyOf": found}
+
+    def call(self, target: Callee, word: str = "") -> dict[str, Any]:
+        """Return the schema of the table of a call; ``word``: what its ``type`` may be."""
+        keys = {key: self._key(target, key) for key in target.hints}
+        kind = {"type": {"const": word}} if word else {}
+        return {
+            "type": "object", "additionalProperties": False, "required": sorted(target.required),
+            "properties": kind | keys, "description": (getdoc(target.function) or target.name).split("\n")[0],
+        }
+
+    def _key(self, target: Callee, key: str) -> dict[str, Any]:
+        found, unit = self.of(target.hints[key]), unit_of(target.name, key)
+        return found if unit in (None, "1") or not found else found | {"description": f"in {unit}, or with its unit"}
+
+    def _one(self, member: Any) -> list[dict[str, Any]]:
+        if member in (Any, object):
+            return [{}]
+        if member in _PLAIN:
+            return [_PLAIN[member]]
+        if is_path(member) or member in self._words.groups or member in self._words.short:
+            return [_PLAIN[str]]
+        if is_list(member):
+            inside = [self.of(one) for one in dict.fromkeys(get_args(member)) if one is not Ellipsis]
+            return [{"type": "array", "items": inside[0] if len(inside) == 1 else {"anyOf": inside}}]
+        if get_origin(member) in (Mapping, dict):
+            return [{"type": "object", "additionalProperties": self.of(get_args(member)[1])}]
+        return [_MATERIALS] if member is LinearElastic else []
+
+    def _tables(self, members: Sequence[Any]) -> list[dict[str, Any]]:
+        """Return the tables with a ``type`` that these types may be; the type of one may be left out."""
+        every = {(member, word): target for member in members
+                 for word, target in choices_of(member, self._words).items()}
+        default = next((self._words.default[one] for one in members if one in self._words.default), None)
+        found: list[dict[str, Any]] = []
+        for (member, word), target in every.items():
+            name = f"{member.__name__}.{word}"
+            if name not in self.definitions:
+                self.definitions[name] = {}  # what is inside may name it
+                self.definitions[name] = self.call(target, word)
+            one = {"$ref": f"#/definitions/{name}"}
+            found.append(one if len(every) == 1 or word == default else {"allOf": [one, {"required": ["type"]}]})
+        return found + [_OWN_CLASS] * any(is_protocol(member) for member in members)
+
+
+if __name__ == "__main__":
+    FILE.write_text(text(), encoding="utf-8")

@@ -1,0 +1,197 @@
+"""Gmsh scripts meshed on request: what is allowed gives the mesh of Gmsh, all else is refused before Gmsh sees it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("gmsh")
+
+from vi_contact.core.errors import InputError
+from vi_contact.meshes import GeoFile
+from vi_contact.meshes.extract import arrays_of
+from vi_contact.meshes.geo_file import allowed
+
+pytestmark = pytest.mark.serial
+WALL = """// an L-shaped wall /* no comment begins here
+H = 6.0; B = 4; t = 0.5; h = 0.4;  /* sizes of
+cells; */ DefineConstant[ n = 3 ];
+Point(1) = {0, 0, 0, h}; Point(2) = {B, 0, 0, h}; Point(3) = {B, t, 0, h};
+Point(4) = {t, t, 0, h}; Point(5) = {t, H, 0, h}; Point(6) = {0, H, 0, h};
+corner[] = {};
+For i In {1:5}
+  Line(i) = {i, i + 1}; corner[] += {i};
+EndFor
+Line(6) = {6, 1};
+Curve Loop(1) = {corner[], 6}; Plane Surface(1) = {1};
+Field[1] = Distance; Field[1].CurvesList = {1}; Field[2] = MathEval; Field[2].F = "0.3 + 0.02*y";
+Background Field = 2;
+Mesh.Algorithm = 6;
+If (n > 2)
+  Physical Curve("base") = {1};
+Else
+  Physical Curve("socle à gauche") = {1};
+EndIf
+Physical Surface("wall") = {1};
+"""
+BOX = """SetFactory("OpenCASCADE");
+Box(1) = {0, 0, 0, 2, 1, 1}; Box(2) = {0, 0, 1, 2, 1, 1};
+BooleanFragments{ Volume{1}; Delete; }{ Volume{2}; Delete; }
+Physical Volume("low") = {1}; Physical Volume("high") = {2};
+Physical Surface("foot") = Surface In BoundingBox {-1, -1, -0.1, 3, 2, 0.1};
+"""
+
+
+def written(folder: Path, text: str, name: str = "wall.geo") -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def area(arrays: Any) -> float:
+    x = arrays.points[arrays.cells]
+    a, b = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]
+    return float(0.5 * np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
+
+
+def test_a_wall_is_meshed(tmp_path: Path) -> None:
+    """Area 4·0.5 + 0.5·5.5 m², and its groups."""
+    path = written(tmp_path, WALL)
+    arrays = arrays_of(GeoFile(path=path))
+    assert area(arrays) == pytest.approx(4.75, rel=1e-12)
+    assert list(arrays.cell_groups) == ["wall"] and list(arrays.facet_groups) == ["base"]
+    other = arrays_of(GeoFile(path=written(tmp_path, WALL.replace("n = 3", "n = 1"))))
+    assert list(other.facet_groups) == ["socle à gauche"]
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["wall.geo"]
+
+
+def test_bodies_in_space_are_meshed(tmp_path: Path) -> None:
+    text = BOX.replace("Surface In BoundingBox {-1, -1, -0.1, 3, 2, 0.1}", "{5}")
+    path = written(tmp_path, f"{text}MeshSize{{:}} = 1;")
+    arrays = arrays_of(GeoFile(path=path))
+    assert list(arrays.cell_groups) == ["low", "high"] and list(arrays.facet_groups) == ["foot"]
+    edges = np.diff(arrays.points[arrays.cells], axis=1)
+    volume = np.abs(np.linalg.det(edges)) / 6.0
+    assert volume[arrays.cell_groups["low"]].sum() == pytest.approx(2.0, rel=1e-10)
+
+
+SQUARE = """L = 2;
+Point(1) = {0, 0, 0, 1}; Point(2) = {L, 0, 0, 1}; Point(3) = {L, 1, 0, 1}; Point(4) = {0, 1, 0, 1};
+Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 4}; Line(4) = {4, 1};
+Curve Loop(1) = {1:4}; Plane Surface(1) = {1};
+Transfinite Surface {1}; EXTRA
+Physical Curve("base") = {1}; Physical Surface("body") = {1};
+"""
+SOLID = """out[] = Extrude {0, 0, 1} { Surface{1}; Layers{2}; EXTRA };
+Physical Volume("body") = {out[1]}; Physical Surface("base") = {1};
+"""
+
+
+@pytest.mark.parametrize("cell", ["triangle", "quadrilateral", "tetrahedron", "hexahedron"])
+def test_all_cells_are_divided(tmp_path: Path, cell: str) -> None:
+    """C1.2: 2^d times as many cells, 2^(d-1) facets, twice over; the measure of body and base to 1e-12."""
+    boxes = cell in ("quadrilateral", "hexahedron")
+    text = SQUARE.replace("EXTRA", "Recombine Surface {1};" if boxes else "")
+    if d := 3 if cell in ("tetrahedron", "hexahedron") else 0:
+        text = text[: text.index("Physical")] + SOLID.replace("EXTRA", "Recombine;" if boxes else "")
+    path = written(tmp_path, text)
+    coarse, fine = (arrays_of(GeoFile(path=path, refine=n)) for n in (0, 2))
+    d = d or 2
+    assert coarse.cell == fine.cell == cell
+    assert len(fine.cells) == 4**d * len(coarse.cells) > 0
+    assert len(fine.facet_groups["base"]) == 4 ** (d - 1) * len(coarse.facet_groups["base"])
+    foot = fine.points[np.unique(fine.facet_groups["base"])]
+    assert np.array_equal(foot[:, d - 1], np.zeros(len(foot))) and np.ptp(foot[:, 0]) == 2.0
+    corners = {"triangle": (0, 1, 2), "quadrilateral": (0, 1, 3), "tetrahedron": (0, 1, 2, 3),
+               "hexahedron": (0, 1, 3, 4)}[cell]
+    x = fine.points[fine.cells[:, list(corners)]]
+    part = {"triangle": 2.0, "tetrahedron": 6.0}.get(cell, 1.0)
+    measure = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])).sum() / part
+    assert measure == pytest.approx(2.0, rel=1e-12)
+
+
+FORBIDDEN = {
+    "a command": ('SystemCall "touch broken";', "SystemCall"),
+    "a command beside": ('NonBlockingSystemCall "touch broken";', "NonBlockingSystemCall"),
+    "a command that was declared": ('SystemCall = 1; SystemCall "touch broken";', '"touch broken"'),
+    "a file that is read": ('Merge "other.msh";', "Merge"),
+    "a file that is included": ('Include "other.geo";', "Include"),
+    "a file that is written": ('Save "broken";', "Save"),
+    "a line in a file": ('Printf("x") > "broken";', "Printf"),
+    "the end": ("Exit;", "Exit"),
+    "a plugin": ("Plugin(MathEval).Run;", "Plugin"),
+    "a macro": ("Macro m SystemCall x; Return", "Macro"),
+    "a call": ("Call m;", "Call"),
+    "a view": ("View.Light = 0;", "View"),
+    "options of the program": ("General.Terminal = 1;", "General"),
+    "a file of a field": ('Field[1] = Structured; Field[1].FileName = "x";', "Structured"),
+    "the name of a file of a field": ('Field[1] = Distance; Field[1].FileName = "x";', "FileName"),
+    "a process of a field": ('Field[1] = ExternalProcess;', "ExternalProcess"),
+    "a command in a field": ('Field[1] = MathEval; Field[1].F = "`touch broken`";', '"`touch broken`"'),
+    "other options of meshes": ("Mesh.PartitionCreateTopology = 1;", "PartitionCreateTopology"),
+    "an attribute": ("H.F = 1;", "."),
+    "a text": ('s = "touch broken";', '"touch broken"'),
+    "joined texts": ('s = StrCat("a", "b");', "StrCat"),
+    "after a comment": ('/* // */ SystemCall "touch broken"; // */', "SystemCall"),
+    "a comment in a text": ('Physical Point("/*") = {1}; Merge "x"; // */', "Merge"),
+    "an open comment": ("/* SystemCall", "SystemCall"),
+    "an open text": ('Physical Point("a\n") = {1};', '"'),
+    "a backslash": ("Point\\\n(1) = {0, 0, 0};", "\\"),
+    "a backslash in a text": ('Physical Point("a\\") = {1};', '"'),
+    "letters that look alike": ("Рoint(1) = {0, 0, 0};", "Р"),
+    "an invisible letter": ("Point\u200b(1) = {0, 0, 0};", "\u200b"),
+    "NUL": ("Point\0(1) = {0, 0, 0};", "\0"),
+    "the shell's quotes": ("x = `id`;", "`"),
+    "names made of others": ("H~{1} = 1;", "~"),
+    "parameters of ONELAB": ('DefineConstant[ a = {1, Name "x"} ];', "Name"),
+}
+
+
+@pytest.mark.parametrize("what", FORBIDDEN)
+def test_all_else_is_refused(tmp_path: Path, what: str) -> None:
+    """By its line and word, before Gmsh sees it."""
+    text, word = FORBIDDEN[what]
+    path = written(tmp_path, f"H = 1;\n{text}\n")
+    with pytest.raises(InputError, match=r"wall.geo: line 2 has .*only words of geometry") as caught:
+        GeoFile(path=path).build(None)
+    assert repr(word)[1:-1].split("'")[0][:8] in str(caught.value)
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["wall.geo"]
+
+
+def test_gmsh_gets_no_word_but_those_of_the_lists(tmp_path: Path) -> None:
+    """A script's own names are never commands, and line 7 stays line 7."""
+    text = allowed(written(tmp_path, WALL + "Exit = 3; Merge = Exit;\n"))
+    assert "own_Exit = 3 ; own_Merge = own_Exit ;" in text
+    assert [line.split()[0] for line in text.split("\n")[6:9]] == ["For", "Line", "EndFor"]
+
+
+@pytest.mark.slow
+def test_what_does_not_end_is_ended(tmp_path: Path) -> None:
+    """A loop without end, and a list that no memory holds, whichever ends first."""
+    path = written(tmp_path, "For i In {1:1000000000}\nFor j In {1:1000000000}\nx = j;\nEndFor\nEndFor\n")
+    with pytest.raises(InputError, match="not done after 0.9 s"):
+        arrays_of(GeoFile(path=path, time_limit=0.9))
+    path = written(tmp_path, "x[] = {1:1000000000000};\n")
+    with pytest.raises(InputError, match="not done after|cannot mesh it"):
+        arrays_of(GeoFile(path=path, time_limit=1.5))
+
+
+def test_other_mistakes_are_told(tmp_path: Path) -> None:
+    path = written(tmp_path, WALL)
+    for given, said in (
+        ({"refine": -1}, "refine is -1; give a whole number of at least 0"),
+        ({"refine": 30}, "refine is 30; give a whole number of at least 0 and at most 8"),
+        ({"time_limit": 0.0}, "time_limit is 0.0; give a finite number above zero"),
+    ):
+        with pytest.raises(InputError, match=said):
+            GeoFile(path=path, **given).build(None)
+    with pytest.raises(InputError, match="cannot be read .*No such file"):
+        GeoFile(path=tmp_path / "missing.geo").build(None)
+    broken = written(tmp_path, WALL.replace("{B, 0, 0, h}", "{B, 0, 0, h"))
+    with pytest.raises(InputError, match=r"wall.geo: Gmsh cannot mesh it: .*line 4"):
+        arrays_of(GeoFile(path=broken))
+    with pytest.raises(InputError, match="no cells"):
+        arrays_of(GeoFile(path=written(tmp_path, "Point(1) = {0, 0, 0};")))

@@ -1,0 +1,95 @@
+"""The JSON schema of case files: it takes the cases that run, and refuses what they refuse."""
+
+from __future__ import annotations
+
+import json
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("dolfinx")
+
+from vi_contact.cli.entry import main
+from vi_contact.studies.cases.quantities import KEYS
+from vi_contact.studies.cases.toml_file import read_toml, with_settings
+
+pytestmark = pytest.mark.serial
+ROOT = Path(__file__).resolve().parents[2]
+FILE = ROOT / "vi_contact" / "studies" / "cases" / "case.schema.json"
+WALL = ROOT / "demos" / "cases" / "wall.toml"
+
+
+def written() -> str:
+    """What docs/make_schema.py writes."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(ROOT / "docs"))
+        return str(import_module("make_schema").text())
+
+
+def test_the_schema_is_that_of_the_signatures() -> None:
+    """After a change of what case files may say: python3 docs/make_schema.py."""
+    assert FILE.read_text(encoding="utf-8") == written()
+
+
+def test_every_key_of_the_table_of_units_is_one_of_case_files() -> None:
+    rules = json.loads(FILE.read_text(encoding="utf-8"))
+    known = {f"{name.partition('.')[2]}.{key}"
+             for name, one in rules["definitions"].items() for key in one["properties"]}
+    for table, call in (("system", "assemble"), ("run", "simulate"), ("gravity", "with_weight")):
+        known |= {f"{call}.{key}" for key in rules["properties"][table]["properties"]}
+    for unit, keys in KEYS.items():
+        for key in keys:
+            assert key in known or any(one.endswith(f".{key}") for one in known), (unit, key)
+
+
+def valid(value: Any, rule: Any, whole: Any) -> bool:
+    """Whether a value keeps to a rule of JSON schema, of the words that ours has."""
+    if "$ref" in rule:
+        return valid(value, whole["definitions"][rule["$ref"].rpartition("/")[2]], whole)
+    kinds = {"object": dict, "array": list, "string": str, "boolean": bool, "integer": int, "number": (int, float)}
+    wanted = rule.get("type", [])
+    if wanted and not any(
+        isinstance(value, kinds[one]) and (one == "boolean" or not isinstance(value, bool))
+        for one in ([wanted] if isinstance(wanted, str) else wanted)
+    ):
+        return False
+    if "const" in rule and value != rule["const"] or not all(valid(value, one, whole) for one in rule.get("allOf", [])):
+        return False
+    if "pattern" in rule and rule["pattern"] not in value:
+        return False
+    if "anyOf" in rule and not any(valid(value, one, whole) for one in rule["anyOf"]):
+        return False
+    if isinstance(value, list):
+        return all(valid(one, rule.get("items", {}), whole) for one in value)
+    if not isinstance(value, dict):
+        return True
+    known, more = rule.get("properties", {}), rule.get("additionalProperties", {})
+    return all(one in value for one in rule.get("required", [])) and all(
+        valid(one, known[key], whole) if key in known else more is not False and valid(one, more, whole)
+        for key, one in value.items())
+
+
+def test_the_schema_takes_the_cases_that_run_and_no_others(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["schema"]) == 0
+    rules = json.loads(capsys.readouterr().out)
+    folders = (FILE.parent / "builtin", FILE.parents[1] / "starters", ROOT / "demos" / "cases")
+    shipped = [path for folder in folders for path in folder.glob("*.toml")]
+    assert len(shipped) >= 6
+    for path in shipped:
+        assert valid(read_toml(path), rules, rules), path
+    tables = read_toml(WALL)
+    for setting in ("friction.type=Coulomb", "mesh.height=9 m", "scheme.type=package.module:Own"):
+        assert valid(with_settings(tables, [setting, "friction.mu=0.5"] if "friction" in setting else [setting]), rules,
+                     rules), setting
+    for setting in ("scheme.phj=1", "material.concrete.E=", "system.clamped=3", "run.steps=[1]", "solver.type=Condenst",
+                    "contct.facets=face", "mesh=", "contact.1.obstacle.points=[0.0, 0.0]"):
+        assert not valid(with_settings(tables, [setting]), rules, rules), setting
+    try:
+        import jsonschema
+    except ImportError:
+        return
+    jsonschema.Draft7Validator.check_schema(rules)
+    for path in shipped:
+        jsonschema.validate(read_toml(path), rules)

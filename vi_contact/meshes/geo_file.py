@@ -1,0 +1,125 @@
+"""Mesh a Gmsh script (.geo) that holds nothing but geometry, sizes, groups and arithmetic.
+
+Gmsh runs commands of the shell and opens files from scripts, so none is given to it as it stands. The script is cut
+into words, and written anew from those that geo_words.toml lists; names of its own get a prefix, so that none can be a
+command, and texts stand only where groups are named. A process of its own meshes it, for a limited time and in half of
+the machine's memory.
+"""
+
+import os
+import re
+import resource
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from vi_contact.core.checks import number, shown, whole
+from vi_contact.core.errors import InputError
+from vi_contact.meshes.gmsh_session import session
+from vi_contact.meshes.mesh_file import safe_copy
+
+LARGEST, MOST = 2_000_000, 8  # bytes of a script; how often it may be refined
+_LISTS = tomllib.loads(files(__package__).joinpath("geo_words.toml").read_text(encoding="utf-8"))
+_WORDS, _OPTIONS, _OF_FIELDS = (frozenset(_LISTS[name].split()) for name in ("words", "options", "fields"))
+_TOKEN = re.compile(
+    r"(?P<blank>[ \t\r]+|//[^\n]*|/\*.*?\*/|\n)|(?P<text>\"[^\"\\\x00-\x1f]*\")|(?P<name>[A-Za-z_]\w*)|"
+    r"(?P<sign>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[-+*/<>=!]=|&&|\|\||\+\+|--|[-+*/%^<>!?:=,;.#(){}\[\]])",
+    re.ASCII | re.DOTALL)
+_SET = re.compile(r"(?<![\w.])([A-Za-z_]\w*)\s*(?:=(?!=)|\[\s*\]\s*=|\(\s*\)\s*=|In\b)", re.ASCII)  # names that are set
+_ARITHMETIC = re.compile(r'"[\w\s.,+*/^()-]*"', re.ASCII)
+
+
+@dataclass(frozen=True, kw_only=True)
+class GeoFile:
+    """Describe the mesh of a Gmsh script at ``path``: its physical groups, cells of the highest dimension they have.
+
+    refine: how often Gmsh divides all cells into 2^d, new nodes on the curves of the geometry; time_limit: of the
+    meshing [s]. InputError for words that are not allowed, with their line; when Gmsh fails, or time or memory is over.
+    """
+
+    path: Path
+    refine: int = 0
+    time_limit: float = 300.0
+
+    def __post_init__(self) -> None:
+        whole("GeoFile", "refine", self.refine, most=MOST)
+        number("GeoFile", "time_limit", self.time_limit, positive=True, unit="seconds")
+
+    def build(self, gmsh: Any) -> None:
+        """Mesh the script beside this process and read the mesh into Gmsh's current model."""
+        with TemporaryDirectory(prefix="vi_contact-") as folder:
+            Path(folder, "script.geo").write_text(allowed(self.path), encoding="utf-8")
+            code = ("import sys; sys.path = sys.argv[2:]; from vi_contact.meshes.geo_file import mesh_here; "
+                    "mesh_here(int(sys.argv[1]))")
+            command = [sys.executable, "-c", code, str(self.refine), *map(os.path.abspath, sys.path)]
+            try:
+                done = subprocess.run(command, cwd=folder, text=True, errors="replace", stdin=subprocess.DEVNULL,
+                                      capture_output=True, timeout=self.time_limit)
+            except subprocess.TimeoutExpired:
+                raise InputError(f"{self.path}: Gmsh was not done after {self.time_limit:g} s: ask for larger cells, "
+                                 "or give more time_limit") from None
+            if done.returncode:
+                said = (done.stderr.strip().splitlines() or ["it ended, as where memory is over"])[-1]
+                raise InputError(f"{self.path}: Gmsh cannot mesh it: {said.replace('own_', '')}")
+            gmsh.merge(str(safe_copy(Path(folder, "made.msh"), Path(folder))))
+
+
+def mesh_here(refine: int) -> None:
+    """Mesh script.geo of the current folder as made.msh: for a process of its own."""
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
+    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    with session() as gmsh:
+        gmsh.logger.start()
+        try:
+            gmsh.merge("script.geo")
+            gmsh.model.mesh.generate(max((d for d, _ in gmsh.model.getPhysicalGroups()), default=-1))
+            for _ in range(refine):
+                gmsh.model.mesh.refine()
+            gmsh.write("made.msh")
+        finally:
+            if wrong := [line for line in gmsh.logger.get() if line.startswith("Error")]:
+                sys.exit(wrong[0])
+
+
+def allowed(path: Path) -> str:
+    """Return the script in listed words alone, each in its line. InputError like ``GeoFile``."""
+    try:
+        with open(path, "rb") as file:
+            text = file.read(LARGEST + 1).decode("utf-8")
+    except (OSError, ValueError) as error:
+        raise InputError(f"Gmsh script {shown(str(path))} cannot be read ({error}): check the path") from None
+    if len(text) > LARGEST:
+        raise InputError(f"{path}: the script has more than {LARGEST} characters: mesh it yourself")
+    return "".join(_written(path, text, set(_SET.findall(text)) - _WORDS)) + "\n"
+
+
+def _written(path: Path, text: str, own: set[str]) -> Iterator[str]:
+    """Yield the words that Gmsh gets; ``own``: names of the script."""
+    words, place, line = ["", "", ""], 0, 1
+    while place < len(text):
+        found = _TOKEN.match(text, place)
+        kind, word = (str(found.lastgroup), found[0]) if found else ("", text[place])
+        place += len(word)
+        line += word.count("\n")
+        attributes = _OPTIONS if words[-2] == "Mesh" else _OF_FIELDS if words[-2] == "]" else ()
+        if kind == "blank":
+            yield "\n" * word.count("\n")
+            continue
+        if kind == "text":
+            named = words[-1] == "(" and (words[-2] == "SetFactory" or words[-3] == "Physical")
+            fits = named or (words[-3:] == [".", "F", "="] and bool(_ARITHMETIC.fullmatch(word)))
+        elif kind == "name":
+            fits = word in attributes if words[-1] == "." else word in _WORDS or word in own
+        else:
+            fits = kind == "sign" and (word != "." or words[-1] in ("Mesh", "]"))
+        if not fits:
+            raise InputError(f"{path}: line {line} has {shown(word)}, and only words of geometry, sizes, groups and "
+                             "arithmetic are meshed here: leave it out, or mesh the script yourself and give the .msh")
+        yield f" {'own_' if word in own and words[-1] != '.' else ''}{word}"
+        words.append(word)
