@@ -20,9 +20,9 @@ from .table_calls import Spot
 FIELD, AT_START, HISTORY = Callable[[Array, float], Array], Callable[[Array], Array], Callable[[float], float]
 """Functions of points and time, of points, of the time, for which expressions may stand."""
 Dimension = tuple[int, ...]  # exponents of metre, kilogram, second, radian
-_NUMBER, _NAME = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", "[A-Za-zµμ°%]+"
-_VALUE = re.compile(rf"\s*((?>{_NUMBER}))\s*((?:1\s*/\s*)?{_NAME}[^()+]*)")
-_FACTOR = re.compile(rf"([*·/ ]?)\s*(1(?=\s*/|$)|{_NAME})(?:\^?(-?\d)|([²³]))?\s*")
+_NUMBER, _NAME = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", "[A-Za-zµμ°%]+"
+_VALUE = re.compile(rf"(?<![\w.\s])\s*((?>{_NUMBER}))\s*((?:1\s*/\s*)?{_NAME}[^()+]*)")
+_FACTOR = re.compile(rf"([*·/]?)(?:(?<!\s)\s+)?(1(?=\s*/|$)|{_NAME})(?:\^?(-?\d)|([²³]))?\s*")
 _TABLES = tomllib.loads(files(__package__).joinpath("units.toml").read_text(encoding="utf-8"))
 _UNITS = _TABLES["alone"] | {start + name: [factor * unit[0], *unit[1:]]
                              for start, factor in _TABLES["prefixes"].items()
@@ -93,7 +93,7 @@ def _unit(text: str) -> tuple[float, Dimension]:
         if found is None:
             raise InputError(f"{shown(text)} is no unit: write one as kN/m3, cm/s^2 or Pa*s")
         sign, name, digits, raised = found.groups()
-        below = sign == "/" or (below and sign in ("", " "))
+        below = sign == "/" or (below and not sign)
         power = (int(digits) if digits else {"²": 2, "³": 3}.get(raised, 1)) * (-1 if below else 1)
         if name not in _UNITS:
             known = ", ".join((*_TABLES["with_prefix"], *_TABLES["alone"]))
