@@ -29,7 +29,7 @@ _LISTS = tomllib.loads(files(__package__).joinpath("geo_words.toml").read_text(e
 _WORDS, _OPTIONS, _OF_FIELDS = (frozenset(_LISTS[name].split()) for name in ("words", "options", "fields"))
 _TOKEN = re.compile(
     r"(?P<blank>[ \t\r]+|//[^\n]*|/\*.*?\*/|\n)|(?P<text>\"[^\"\\\x00-\x1f]*\")|(?P<name>[A-Za-z_]\w*)|"
-    r"(?P<sign>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[-+*/<>=!]=|&&|\|\||\+\+|--|[-+*/%^<>!?:=,;.#(){}\[\]])",
+    r"(?P<sign>(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?|[-+*/<>=!]=|&&|\|\||\+\+|--|[-+*/%^<>!?:=,;.#(){}\[\]])",
     re.ASCII | re.DOTALL)
 _SET = re.compile(r"(?<![\w.])([A-Za-z_]\w*)\s*(?:=(?!=)|\[\s*\]\s*=|\(\s*\)\s*=|In\b)", re.ASCII)  # names that are set
 _ARITHMETIC = re.compile(r'"[\w\s.,+*/^()-]*"', re.ASCII)
