@@ -1,4 +1,4 @@
-"""``vi-contact run CASE`` and ``vi-contact cases``: options and what the commands do."""
+"""``vi-contact run CASE``, ``vi-contact cases`` and ``vi-contact new NAME``: options and what the commands do."""
 
 import argparse
 import gc
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from .. import schemes
 from ..core import stages
 from ..core.errors import InputError
-from ..studies.cases.library import FOLDER, builtin_cases, located
+from ..studies.cases.library import FOLDER, builtin_cases, copy_starter, located, starters
 from ..studies.cases.short_settings import ShortOptions
 from ..studies.cases.toml_file import read_toml
 from .errors import printable, world
@@ -52,11 +52,24 @@ def add_case_commands(commands: Any) -> None:
     schema = commands.add_parser("schema", help="print the JSON schema of case files, for editors",
                                  description="Print the JSON schema of case files: vi-contact schema > case.json.")
     schema.set_defaults(run=lambda options: FOLDER.with_name("case.schema.json").read_text("utf-8").rstrip())
+    new = commands.add_parser("new", help="write a case to begin with, and the script of its mesh",
+                              description="Write a commented case file and the Gmsh script of its mesh, to be changed.")
+    new.add_argument("name", metavar="NAME", help=", ".join(starters()))
+    new.add_argument("folder", metavar="DIR", nargs="?", help="default: NAME")
+    new.set_defaults(run=_new)
 
 
 def _cases(options: argparse.Namespace) -> str:
     lines = [f"{name:<10} {title}" for name, title in builtin_cases().items()]
     return "\n".join([*lines, f"the files: {FOLDER}"])
+
+
+def _new(options: argparse.Namespace) -> str:
+    if world().rank:
+        return ""
+    files = copy_starter(options.name, Path(options.folder or options.name))
+    steps = f"run {files[0]} --check", f"run {files[0]}", f"report results/{options.name}"
+    return "\n".join([*(f"wrote {path}" for path in files), "next:", *(f"    vi-contact {one}" for one in steps)])
 
 
 def _run(options: argparse.Namespace) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ...core.algebra import Comm
+from ...core.algebra import Comm, SerialComm
 from ...core.checks import shown
 from ...core.errors import InputError
 from ...core.files import on_root, write_atomically
@@ -13,6 +13,7 @@ from .parsing import nearest
 from .toml_file import read_toml, with_settings
 
 FOLDER = Path(__file__).parent / "builtin"
+STARTERS = Path(__file__).parents[1] / "starters"  # cases to begin with: copied, and then changed
 COPY = "case.toml"
 FORMAT = 1  # of case files
 _SET = "# set "  # before a setting, in the copy
@@ -35,6 +36,29 @@ _OF_MODELS: Mapping[str, Mapping[str, str]] = {  # case -> keys of its [model] o
 def builtin_cases() -> dict[str, str]:
     """Return the names and titles of the case files that ship with the package."""
     return {path.stem: str(read_toml(path)["title"]) for path in sorted(FOLDER.glob("*.toml"))}
+
+
+def starters() -> list[str]:
+    """Return the names of the cases to begin with."""
+    return sorted(path.stem for path in STARTERS.glob("*.toml"))
+
+
+def copy_starter(name: str, folder: Path) -> list[Path]:
+    """Copy the files of a case to begin with into a folder, made if need be, and return them; InputError for a name
+    that nobody knows, and for files that are there: they may have been changed."""
+    if name not in starters():
+        raise InputError(f"there is no case {shown(name)} to begin with: {nearest(name, starters())}")
+    files = {folder / one.name: one.read_bytes() for one in sorted(STARTERS.glob(f"{name}.*"), reverse=True)}
+    for path in (path for path in files if path.exists()):
+        raise InputError(f"'{path}' is there already: give another folder, or move it away")
+
+    def copy() -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        for path, data in files.items():
+            write_atomically(path, data)
+
+    on_root(SerialComm(), copy)
+    return list(files)
 
 
 def located(case: str) -> Path:
