@@ -17,6 +17,7 @@ from vi_contact import core, fem, meshes
 from vi_contact.core.errors import InputError
 from vi_contact.studies import read_case
 from vi_contact.studies.cases.quantities import KEYS, text_node
+from vi_contact.studies.cases.short_settings import ShortOptions
 from vi_contact.studies.cases.table_calls import Call, Spot
 
 COMM = MPI.COMM_WORLD
@@ -182,6 +183,15 @@ def test_expressions_where_none_belongs_are_refused(tmp_path: Path) -> None:
         path.write_text(BLOCK.replace(old, new), encoding="utf-8")
         with pytest.raises(InputError, match=said):
             read_case(path)
+
+
+@pytest.mark.serial
+def test_amplitudes_with_units_are_scaled() -> None:
+    tables = {"excitation": {"type": "Harmonic", "amplitude": "0.5 g", "frequency": 1.0}}
+    assert ShortOptions(scale=2.0).settings(tables) == ["excitation.amplitude=9.80665"]
+    tables["excitation"]["amplitude"] = "0.5 m"
+    with pytest.raises(InputError, match=r"--scale: \[excitation\[1\]\] amplitude is '0.5 m': 'm' is no unit of it"):
+        ShortOptions(scale=2.0).settings(tables)
 
 
 @pytest.mark.serial

@@ -65,7 +65,7 @@ class Expression:
             raise InputError(f"brackets, signs or powers in it are nested more than {DEPTH} deep")
         name = getattr(getattr(node, "func", node), "id", "")
         if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and node.value is not True:
-            yield float(node.value)
+            yield float(str(node.value))  # of a whole number with too many digits: infinite
         elif isinstance(node, ast.Name) and name == "pi":
             yield np.pi
         elif isinstance(node, ast.Name) and name in tuple(self.variables):

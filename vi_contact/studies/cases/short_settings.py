@@ -9,6 +9,8 @@ from typing import Any
 from ...core.checks import shown
 from ...core.errors import InputError
 from .parsing import nearest
+from .quantities import text_node, unit_of
+from .table_calls import Spot
 from .toml_file import toml_value, with_settings
 
 ROLLERS = [{"facets": side, "components": [1]} for side in ("left_side", "right_side")]  # of a layer shaken sideways
@@ -95,6 +97,8 @@ class ShortOptions:
         for number, one in enumerate(_tables(shaking), start=1):
             key = "scale" if one.get("type") == "GroundMotion" else "amplitude"
             value = one.get(key, 1.0 if key == "scale" else None)
+            if isinstance(value, str):
+                value = text_node(value, [float], Spot("--scale", f"excitation[{number}]", key, unit_of("", key)))
             if not isinstance(value, int | float) or isinstance(value, bool):
                 raise InputError(f"--scale: [excitation] {number} has no amplitude to scale: change its own numbers")
             place = f"excitation.{number}" if isinstance(shaking, list) else "excitation"
