@@ -7,7 +7,9 @@ import pytest
 
 from vi_contact.core.errors import ViContactError
 from vi_contact.meshes.block import BlockMesh
+from vi_contact.meshes.cut import CutOpen
 from vi_contact.meshes.extract import arrays_from_script
+from vi_contact.meshes.geo_file import GeoFile
 from vi_contact.meshes.gmsh_session import write
 from vi_contact.meshes.wall import WallMesh
 
@@ -27,6 +29,27 @@ def test_wall_and_its_sides_have_their_exact_sizes(options, comm):
     assert sizes(tags) == {"wall": 54.0, "base": 6.0, "face": 9.0, "top": 6.0, "back": 9.0}
     assert isinstance(tags["wall"], fem.Cells) and tags["wall"].mesh is mesh
     assert isinstance(tags["base"], fem.Facets) and tags["base"].name == "base"
+
+
+def test_a_script_of_gmsh_is_meshed_refined_and_cut(comm, shared_tmp):
+    """C1.2: two bodies that share an edge, from a .geo, cut open along it: sizes, and four times the cells."""
+    script = shared_tmp / "two.geo"
+    if comm.rank == 0:
+        script.write_text(
+            "Point(1) = {0, 0, 0}; Point(2) = {2, 0, 0}; Point(3) = {2, 1, 0}; Point(4) = {0, 1, 0};\n"
+            "Point(5) = {2, 3, 0}; Point(6) = {0, 3, 0};\nLine(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 4};\n"
+            "Line(4) = {4, 1}; Line(5) = {3, 5}; Line(6) = {5, 6}; Line(7) = {6, 4};\n"
+            "Curve Loop(1) = {1:4}; Plane Surface(1) = {1}; Curve Loop(2) = {5, 6, 7, -3}; Plane Surface(2) = {2};\n"
+            'MeshSize{:} = 0.5;\nPhysical Curve("joint") = {3}; Physical Curve("foot") = {1};\n'
+            'Physical Surface("rock") = {1}; Physical Surface("dam") = {2};\n', encoding="utf-8")
+    comm.Barrier()
+    cells = []
+    for refine in (0, 1):
+        source = CutOpen(GeoFile(path=script, refine=refine), "joint", inside="dam")
+        mesh, tags = fem.build_mesh(source, comm)
+        assert sizes(tags) == {"rock": 2.0, "dam": 4.0, "foot": 2.0, "joint_1": 2.0, "joint_2": 2.0}
+        cells.append(mesh.topology.index_map(2).size_global)
+    assert cells[1] == 4 * cells[0]
 
 
 @pytest.mark.parametrize("simplices", [True, False])
