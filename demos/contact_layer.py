@@ -23,14 +23,14 @@ import numpy as np
 from mpi4py import MPI
 
 import vi_contact as vc
+from demos.boundary_layer.contact_law import contact_layer
+from demos.boundary_layer.metric import Metric
+from demos.boundary_layer.scheme import BoundaryLayer
 from demos.exact.bar import ThrownBar
 from demos.exact.bouncing_bar import BouncingBar
 from demos.pictures.layer import plot_layered_bar, plot_thin_limit
 from demos.problems import wall
 from demos.problems.bar import Bar, build
-from demos.problems.layer_law import contact_layer
-from demos.problems.layer_scheme import BoundaryLayer
-from vi_contact import boundary_layer
 from vi_contact.cli import status_of
 
 # Parameters ----------------------------------------------------------------------------------------------------------
@@ -39,7 +39,7 @@ T_END = {ThrownBar: 1.4, BouncingBar: 16.0 / 3.0}  # one impact, one period [s]
 WIDTHS = (1.0, 0.5, 0.25, 0.1)  # b [m] of the bar's layers
 BLOCK = Bar(ThrownBar(length=0.3, E=1e9, rho=1.0, height=0.02, speed=10.0), elements=3, dimension=2)
 WANTED = (1.0, 0.8, 0.5, 0.2)  # restitutions of the block
-METRICS = (boundary_layer.Metric.BLENDED, boundary_layer.Metric.FLAT)
+METRICS = (Metric.BLENDED, Metric.FLAT)
 PASSAGE = 20  # time steps per b/V
 WALL_WIDTHS, WALL_SPEED = (4e-6, 2e-6, 1e-6, 5e-7), 1e-2  # b [m], V [m/s] of the wall's layers
 WALL_STEPS, WALL_PERIODS = 640, 1.5  # time steps per period of the shaking
@@ -67,7 +67,7 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
     return numbers
 
 
-def rebounds(wanted: tuple[float, ...], metrics: tuple[boundary_layer.Metric, ...]) -> dict[str, float]:
+def rebounds(wanted: tuple[float, ...], metrics: tuple[Metric, ...]) -> dict[str, float]:
     """Return the block's velocity after the impact over the one before."""
     model, numbers, width = build(BLOCK, MPI.COMM_WORLD), {}, 0.01
     problem = model.problem(mass=vc.ConsistentMass())
@@ -88,7 +88,7 @@ def rebounds(wanted: tuple[float, ...], metrics: tuple[boundary_layer.Metric, ..
 
 
 def thin_limit(
-    bar: Bar, widths: tuple[float, ...], metrics: tuple[boundary_layer.Metric, ...], out: Path
+    bar: Bar, widths: tuple[float, ...], metrics: tuple[Metric, ...], out: Path
 ) -> dict[str, float]:
     """Compute the bar's foot for every width, and beside it the exact inequality on the same mesh."""
     model, numbers, case = build(bar, MPI.COMM_WORLD), {}, bar.case
@@ -141,7 +141,7 @@ def shaken_wall(widths: tuple[float, ...], steps: int, periods: float, out: Path
     for width in widths:
         mass = np.sqrt(concrete.E * concrete.rho) * width / WALL_SPEED
         law = contact_layer(
-            0.5, mass=mass, speed=WALL_SPEED, width=width, metric=boundary_layer.Metric.FLAT
+            0.5, mass=mass, speed=WALL_SPEED, width=width, metric=Metric.FLAT
         )
         scheme = BoundaryLayer(law=law)
         found = displacements(replace(exact, surface=law.set_back(exact.surface)), scheme)

@@ -19,8 +19,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the sou
 
 import numpy as np
 
+from demos.boundary_layer.layer import Layer
+from demos.boundary_layer.metric import Metric
+from demos.boundary_layer.motion import ConstrainedSystem
+from demos.boundary_layer.particle import ParticleImpact, layer_for
+from demos.boundary_layer.trajectory import layer_motion
 from demos.pictures.layer import plot_cut_off, plot_parameters, plot_particle
-from vi_contact import boundary_layer
 from vi_contact.cli import status_of
 
 # Parameters ----------------------------------------------------------------------------------------------------------
@@ -42,17 +46,17 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
     )
     plot_parameters(np.linspace(0.25, 10.0, 12 if quick else 79), DAMPERS, out / "figure_2.png")
     numbers |= readings(RATIOS[:1] if quick else RATIOS, out)
-    layer = boundary_layer.layer_for(WANTED, mass=MASS, speed=SPEED, width=WIDTH)
-    numbers["wanted"] = boundary_layer.ParticleImpact(layer, MASS, SPEED).restitution
+    layer = layer_for(WANTED, mass=MASS, speed=SPEED, width=WIDTH)
+    numbers["wanted"] = ParticleImpact(layer, MASS, SPEED).restitution
     print(f"\nFor e = {WANTED:g} at half the layer's depth: k = {layer.k:.6f} N/m, c = {layer.c:.6f} N")
     if progress:
         print(f"Figures are in {out}.")
     return numbers
 
 
-def impact(k: float, c: float) -> boundary_layer.ParticleImpact:
+def impact(k: float, c: float) -> ParticleImpact:
     """Return the particle against this layer, a = b."""
-    return boundary_layer.ParticleImpact(boundary_layer.Layer(WIDTH, k=k, c=c), MASS, SPEED)
+    return ParticleImpact(Layer(WIDTH, k=k, c=c), MASS, SPEED)
 
 
 def table(stiffnesses: tuple[float, ...]) -> dict[str, float]:
@@ -71,15 +75,15 @@ def table(stiffnesses: tuple[float, ...]) -> dict[str, float]:
     return numbers | {"closed form - integration": worst}
 
 
-def motion(layer: boundary_layer.Layer, metric: boundary_layer.Metric = boundary_layer.Metric.DOMINANT):
+def motion(layer: Layer, metric: Metric = Metric.DOMINANT):
     """Follow a particle that enters the layer, until it has left it."""
-    wall = boundary_layer.ConstrainedSystem(np.array([[MASS]]), lambda q: q[0], lambda q: np.ones(1))
-    return boundary_layer.layer_motion(
+    wall = ConstrainedSystem(np.array([[MASS]]), lambda q: q[0], lambda q: np.ones(1))
+    return layer_motion(
         wall, layer, q0=[layer.width], v0=[-SPEED], t_end=50.0, contacts=1, metric=metric, refine=8
     )
 
 
-def collide(layer: boundary_layer.Layer, metric: boundary_layer.Metric = boundary_layer.Metric.DOMINANT):
+def collide(layer: Layer, metric: Metric = Metric.DOMINANT):
     """Return the contact of such a particle."""
     return motion(layer, metric).contacts[0]
 
@@ -88,12 +92,12 @@ def readings(ratios: tuple[float, ...], out: Path) -> dict[str, float]:
     """Draw Fig. 3, and what the cut-off and the readings of the metric change; k = c = 1."""
     numbers = {}
     print("\n reading      a/b         e    t_f [s]  x_min [m]   (k = c = 1)")
-    for metric in boundary_layer.Metric:
+    for metric in Metric:
         for ratio in (*ratios, 1.0):
-            found = collide(boundary_layer.Layer(WIDTH, k=1.0, c=1.0, start=ratio * WIDTH), metric)
+            found = collide(Layer(WIDTH, k=1.0, c=1.0, start=ratio * WIDTH), metric)
             print(f" {metric.name:9s} {ratio:6g} {found.restitution:9.5f} {found.duration:10.5f} {found.deepest:10.5f}")
             numbers[f"{metric.name} {ratio:g}"] = found.restitution
-    layers = {ratio: boundary_layer.Layer(WIDTH, k=1.0, c=1.0, start=ratio * WIDTH) for ratio in ratios}
+    layers = {ratio: Layer(WIDTH, k=1.0, c=1.0, start=ratio * WIDTH) for ratio in ratios}
     curves = {f"a/b = {ratio:g}": motion(layer) for ratio, layer in layers.items()}
     plot_cut_off(curves, impact(1.0, 1.0), out / "figure_3.png")
     return numbers

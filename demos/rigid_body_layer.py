@@ -19,9 +19,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the sou
 
 import numpy as np
 
+from demos.boundary_layer.layer import Layer
+from demos.boundary_layer.particle import layer_for
+from demos.boundary_layer.rigid_body import Ellipsoid, RigidBody
+from demos.boundary_layer.trajectory import layer_motion
 from demos.pictures.layer import plot_bounces_of_body, plot_thin_limit
-from demos.problems.rigid_body import Ellipsoid, RigidBody
-from vi_contact import boundary_layer
 from vi_contact.cli import status_of
 
 # Parameters ----------------------------------------------------------------------------------------------------------
@@ -59,8 +61,8 @@ def thin_limit(widths: tuple[float, ...], out: Path) -> dict[str, float]:
           "  b [m]        e    duration/b   largest difference of velocities")
     errors = []
     for width in widths:
-        layer = boundary_layer.layer_for(RESTITUTION, mass=BODY.normal_mass(at_plane), speed=-rate, width=width)
-        motion = boundary_layer.layer_motion(
+        layer = layer_for(RESTITUTION, mass=BODY.normal_mass(at_plane), speed=-rate, width=width)
+        motion = layer_motion(
             BODY.system(), layer, q0=at_plane + np.eye(7)[2] * width, v0=BEFORE, t_end=1.0, contacts=1
         )
         errors.append(float(np.max(np.abs(motion.v[-1] - exact))))
@@ -74,12 +76,12 @@ def thin_limit(widths: tuple[float, ...], out: Path) -> dict[str, float]:
 
 def tumbling(t_end: float, out: Path) -> dict[str, float]:
     """Follow the ellipsoid: contacts, and its energy beside the losses of the impact map."""
-    wanted = boundary_layer.layer_for(EGG_E, mass=1.0, speed=5.0, width=EGG_WIDTH)
+    wanted = layer_for(EGG_E, mass=1.0, speed=5.0, width=EGG_WIDTH)
     # V is the speed of each impact: e is the same in all
-    layer = boundary_layer.Layer(EGG_WIDTH, k=wanted.k, c=wanted.c)
+    layer = Layer(EGG_WIDTH, k=wanted.k, c=wanted.c)
     q0 = START.copy()
     q0[3:] /= np.linalg.norm(q0[3:])
-    motion = boundary_layer.layer_motion(EGG.system(), layer, q0=q0, v0=THROW, t_end=t_end, rtol=1e-9, refine=8)
+    motion = layer_motion(EGG.system(), layer, q0=q0, v0=THROW, t_end=t_end, rtol=1e-9, refine=8)
     energy = np.array([EGG.energy(q, v) for q, v in zip(motion.q, motion.v, strict=True)])
     still = np.full(len(energy), energy[0])
     print("\n   t [s]   rate in [m/s]      e     g_11 [kg]   energy lost [J]   ½ g_11 (1 - e²) ρ̇²   deepest/b")

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from vi_contact.boundary_layer.motion import ConstrainedSystem, Evaluations, check_tolerance, one_sentence
+from demos.boundary_layer.motion import ConstrainedSystem, Evaluations, check_tolerance, one_sentence
 from vi_contact.core.algebra import Array
 from vi_contact.core.checks import array, instance, several, shown
 from vi_contact.core.errors import InputError, StepFailure

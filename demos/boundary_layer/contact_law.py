@@ -26,10 +26,10 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
-from vi_contact.boundary_layer.layer import Layer, sized
-from vi_contact.boundary_layer.metric import Metric
-from vi_contact.boundary_layer.particle import damping_ratio
-from vi_contact.boundary_layer.trajectory import passage
+from demos.boundary_layer.layer import Layer, sized
+from demos.boundary_layer.metric import Metric
+from demos.boundary_layer.particle import damping_ratio
+from demos.boundary_layer.trajectory import passage
 from vi_contact.core.algebra import Array
 from vi_contact.core.checks import instance, number, shown
 from vi_contact.core.errors import InputError

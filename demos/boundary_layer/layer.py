@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from scipy.special import expit
 
-from ..core.algebra import Array
-from ..core.checks import number, optional
-from ..core.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.checks import number, optional
+from vi_contact.core.errors import InputError
 
 LARGEST, LARGEST_FORCE = 1e60, 1e150  # of lengths, speeds and masses; of k and c: products of their squares are finite
 

@@ -14,7 +14,7 @@ What a point on its way through the layer is subject to can be read in two ways,
 
 from enum import Enum
 
-from .layer import Layer
+from demos.boundary_layer.layer import Layer
 
 
 class Metric(Enum):

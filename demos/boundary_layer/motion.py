@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from ..core.algebra import Array
-from ..core.checks import array, function, number
-from ..core.errors import InputError, StepFailure
-from .layer import sized
+from demos.boundary_layer.layer import sized
+from vi_contact.core.algebra import Array
+from vi_contact.core.checks import array, function, number
+from vi_contact.core.errors import InputError, StepFailure
 
 EVALUATIONS = 100_000  # of the acceleration in one motion
 DIFFERENCE_STEP = 6e-6  # of a central difference over the size of its argument: eps to the power 1/3

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from vi_contact.boundary_layer.layer import sized
-from vi_contact.boundary_layer.motion import ConstrainedSystem, check_positive
+from demos.boundary_layer.layer import sized
+from demos.boundary_layer.motion import ConstrainedSystem, check_positive
 from vi_contact.core.algebra import Array
 from vi_contact.core.checks import array, number, shape_of
 from vi_contact.core.errors import InputError

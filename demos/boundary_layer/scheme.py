@@ -17,7 +17,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from demos.problems.layer_law import ContactLayer
+from demos.boundary_layer.contact_law import ContactLayer
 from vi_contact.core.algebra import Array, EffectiveMatrix, max_abs
 from vi_contact.core.checks import instance
 from vi_contact.core.errors import InputError, StepFailure

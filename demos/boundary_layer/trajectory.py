@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ..core.algebra import Array
-from ..core.checks import array, instance, number, optional, whole
-from ..core.errors import InputError, StepFailure
-from .layer import Layer
-from .metric import Metric
-from .motion import ConstrainedSystem, Evaluations, check_tolerance, one_sentence
+from demos.boundary_layer.layer import Layer
+from demos.boundary_layer.metric import Metric
+from demos.boundary_layer.motion import ConstrainedSystem, Evaluations, check_tolerance, one_sentence
+from vi_contact.core.algebra import Array
+from vi_contact.core.checks import array, instance, number, optional, whole
+from vi_contact.core.errors import InputError, StepFailure
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def layer_motion(
         StepFailure: the integrator stopped, or did not come to an end; the message names the time.
     """
     owner = "layer_motion"
-    instance(owner, "system", system, ConstrainedSystem, "give one, such as those of demos/problems/rigid_body.py")
+    instance(owner, "system", system, ConstrainedSystem, "give one, as demos/boundary_layer/rigid_body.py does")
     instance(owner, "layer", layer, Layer, "give a Layer")
     instance(owner, "metric", metric, Metric, "give Metric.DOMINANT, FULL, BLENDED or FLAT")
     q, v = array(owner, "q0", q0, (None,)), array(owner, "v0", v0, (None,))

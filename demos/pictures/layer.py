@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from vi_contact.boundary_layer.layer import Layer
-from vi_contact.boundary_layer.particle import ParticleImpact
-from vi_contact.boundary_layer.trajectory import Trajectory
+from demos.boundary_layer.layer import Layer
+from demos.boundary_layer.particle import ParticleImpact
+from demos.boundary_layer.trajectory import Trajectory
 from vi_contact.core.algebra import Array
 from vi_contact.plots.histories import canvas, save
 

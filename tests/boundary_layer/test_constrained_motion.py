@@ -7,14 +7,14 @@ import pytest
 from layer_numbers import DEEPEST, DURATION, RESTITUTION, C, K
 from scipy.special import ellipk
 
-from demos.problems.bilateral_motion import bilateral_motion
-from demos.problems.rigid_body import Ellipsoid, RigidBody, rotation
-from vi_contact.boundary_layer import motion as layer_motions
-from vi_contact.boundary_layer.layer import Layer
-from vi_contact.boundary_layer.metric import Metric
-from vi_contact.boundary_layer.motion import ConstrainedSystem
-from vi_contact.boundary_layer.particle import ParticleImpact, damping_ratio, layer_for, restitution
-from vi_contact.boundary_layer.trajectory import LayerContact, Trajectory, layer_motion
+from demos.boundary_layer import motion as layer_motions
+from demos.boundary_layer.bilateral import bilateral_motion
+from demos.boundary_layer.layer import Layer
+from demos.boundary_layer.metric import Metric
+from demos.boundary_layer.motion import ConstrainedSystem
+from demos.boundary_layer.particle import ParticleImpact, damping_ratio, layer_for, restitution
+from demos.boundary_layer.rigid_body import Ellipsoid, RigidBody, rotation
+from demos.boundary_layer.trajectory import LayerContact, Trajectory, layer_motion
 from vi_contact.core.errors import InputError, StepFailure
 
 pytestmark = pytest.mark.serial

@@ -11,12 +11,12 @@ import pytest
 from bar import bar, bouncing, energy, run, thrown
 from chain import chain_problem
 
+from demos.boundary_layer import scheme as layered
+from demos.boundary_layer.contact_law import ContactLayer, contact_layer
+from demos.boundary_layer.layer import Layer
+from demos.boundary_layer.metric import Metric
+from demos.boundary_layer.scheme import BoundaryLayer
 from demos.exact.bar import ThrownBar
-from demos.problems import layer_scheme as layered
-from demos.problems.layer_law import ContactLayer, contact_layer
-from demos.problems.layer_scheme import BoundaryLayer
-from vi_contact.boundary_layer.layer import Layer
-from vi_contact.boundary_layer.metric import Metric
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.state_checks import initial_state

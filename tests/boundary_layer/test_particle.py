@@ -7,8 +7,8 @@ import pytest
 from layer_numbers import DEEPEST, DURATION, RESTITUTION, C, K
 from scipy.integrate import quad
 
-from vi_contact.boundary_layer.layer import Layer
-from vi_contact.boundary_layer.particle import ParticleImpact, damping_ratio, layer_for, restitution
+from demos.boundary_layer.layer import Layer
+from demos.boundary_layer.particle import ParticleImpact, damping_ratio, layer_for, restitution
 from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial

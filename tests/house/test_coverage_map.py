@@ -22,9 +22,6 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "bem/test_energetic.py": "bem.loads bem.poincare_steklov",
     "bem/test_fundamental_solution.py": "bem.rules",
     "bem/test_thin_bodies.py": "bem.element_pairs bem.quadrature",
-    "boundary_layer/test_constrained_motion.py":
-        "boundary_layer.metric boundary_layer.motion boundary_layer.trajectory",
-    "boundary_layer/test_particle.py": "boundary_layer.layer",
     "cli/test_fuzz_cli.py": "cli.errors",
     "cli/test_entry.py": "cli.options studies.cases.library",
     "cli/test_motion.py": "plots.records",

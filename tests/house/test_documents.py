@@ -181,7 +181,7 @@ def test_import_needs_numpy_and_scipy_only(hidden: tuple[str, ...]) -> None:
 
 
 ROOMS = ["core", "fem", "solvers", "schemes", "soil", "engineering", "ground_motion", "bem", "beam",
-         "boundary_layer", "studies", "plots"]
+         "studies", "plots"]
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))

@@ -13,23 +13,23 @@ import numpy as np
 from misuses_core import COUNT, FLAG, FUNCTION, NEEDED, NOT_NEGATIVE, NUMBER, POSITIVE, THING, Table, but, calls, rights
 
 import vi_contact as vc
+from demos.boundary_layer.bilateral import bilateral_motion
+from demos.boundary_layer.contact_law import ContactLayer, contact_layer
+from demos.boundary_layer.layer import Layer
+from demos.boundary_layer.motion import ConstrainedSystem
+from demos.boundary_layer.particle import ParticleImpact, damping_ratio, layer_for, restitution
+from demos.boundary_layer.rigid_body import Ellipsoid, RigidBody
+from demos.boundary_layer.scheme import BoundaryLayer
+from demos.boundary_layer.trajectory import layer_motion
 from demos.problems.beam_contract import StepForces, beam_problem, rod_forces, rod_problem, rubbing_problem
-from demos.problems.bilateral_motion import bilateral_motion
 from demos.problems.boundary_elements import disk_contact, disk_problem, embedded_problem, square_problem
 from demos.problems.disk import Disk, Push
 from demos.problems.embedded import Embedded
 from demos.problems.joined_bodies import TwoBodies
-from demos.problems.layer_law import ContactLayer, contact_layer
-from demos.problems.layer_scheme import BoundaryLayer
 from demos.problems.loose_segments import from_segments
 from demos.problems.published_beam import readings
-from demos.problems.rigid_body import Ellipsoid, RigidBody
 from demos.problems.square import Square
 from vi_contact import beam, bem
-from vi_contact.boundary_layer.layer import Layer
-from vi_contact.boundary_layer.motion import ConstrainedSystem
-from vi_contact.boundary_layer.particle import ParticleImpact, damping_ratio, layer_for, restitution
-from vi_contact.boundary_layer.trajectory import layer_motion
 
 SQUARE = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
 EIGHT = [(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)]
