@@ -10,7 +10,7 @@ The sides of the soil are tied, as level ground moves. Data, figures, mesh and t
     bash demos/run.sh raft --size 3e5 --steps 50    # 7 GB, six minutes until the first step
     bash demos/run.sh raft --size 1e6 --steps 4     # without a factor: minutes a step, and hours for the gravity stage
     python3 meshes raft --size 2.4 --soil-size 1.6 --far 8 -o demos/cases/raft.msh
-    vi-contact run demos/cases/raft.toml --out results/raft_case    # gravity, then the frame of the ground: no release
+    vi-contact run demos/cases/raft.toml --out results/raft_case    # the same stages from a case file
 """
 
 from __future__ import annotations

@@ -18,6 +18,7 @@ from vi_contact.studies.cases.case import _TABLES
 from vi_contact.studies.cases.own_classes import is_protocol
 from vi_contact.studies.cases.parsing import Words, choices_of, is_list, is_path, members_of
 from vi_contact.studies.cases.quantities import AT_START, FIELD, HISTORY, Expression, unit_of
+from vi_contact.studies.cases.stage_tables import BY_KEY, WHOLE
 from vi_contact.studies.cases.table_calls import Callee
 from vi_contact.studies.cases.vocabulary import words
 
@@ -36,6 +37,7 @@ def text() -> str:
     """Return the schema (draft 7) of case files."""
     found = _Schema(words(Path()))
     properties = {name: found.call(one) if isinstance(one, Callee) else found.of(one) for name, one in _TABLES.items()}
+    properties["stage"] = {"type": "array", "items": _stage(properties), "description": "stages, one after the other"}
     head = {
         "$schema": DRAFT, "title": "A case file of vi_contact", "type": "object", "additionalProperties": False,
         "required": ["mesh"],
@@ -44,6 +46,15 @@ def text() -> str:
     inside = {"properties": {"format": {"const": 1}, **properties}, "definitions": definitions}
     parts = [json.dumps(head)[1:-1], *(f"{json.dumps(key)}: {{\n{_lines(one)}\n}}" for key, one in inside.items())]
     return "{" + ",\n".join(parts) + "}\n"
+
+
+def _stage(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the schema of a stage: tables of the case that it replaces, or of which it replaces keys."""
+    kind = {"anyOf": [{"const": "static"}, {"const": "dynamic"}]}
+    keys = {"name": _PLAIN[str], "type": kind, "release": _PLAIN[bool]}
+    parts = {key: tables[key] | {"required": []} for key in BY_KEY}
+    return {"type": "object", "additionalProperties": False, "required": ["name", "type"],
+            "properties": keys | parts | {key: tables[key] for key in WHOLE}}
 
 
 def _lines(table: dict[str, Any]) -> str:

@@ -86,6 +86,9 @@ def test_the_schema_takes_the_cases_that_run_and_no_others(capsys: pytest.Captur
     for setting in ("scheme.phj=1", "material.concrete.E=", "system.clamped=3", "run.steps=[1]", "solver.type=Condenst",
                     "contct.facets=face", "mesh=", "contact.1.obstacle.points=[0.0, 0.0]"):
         assert not valid(with_settings(tables, [setting]), rules, rules), setting
+    staged = read_toml(ROOT / "demos" / "cases" / "raft.toml")
+    for setting in ("stage.1.type=statc", "stage.1.sistem.clamped=base", "stage.2.release=1", "stage.2.name="):
+        assert not valid(with_settings(staged, [setting]), rules, rules), setting
     try:
         import jsonschema
     except ImportError:

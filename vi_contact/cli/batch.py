@@ -15,8 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import ViContactError
+from ..core.step import State
 from ..run.simulate_many import Ended, simulate_many
 from ..studies.cases.case import Case, read_case
+from ..studies.cases.stages import leading
 from ..studies.cases.vocabulary import Parts
 from .entry import status_of
 from .errors import told, world
@@ -37,21 +39,24 @@ def results(asked: Mapping[str, Any], comm: Any, tell: Callable[[float], None]) 
             yield number, error
         else:
             runs[number] = case, {"out": Path(folder), "restart": restart, "wall_time": asked["wall_time"]}
-    parts = next(iter(runs.values()))[0].parts(comm) if runs else None
-    if parts is not None and parts.steady:
-        yield from _together(runs, parts, tell)
+    if not runs:
+        return
+    case, _ = next(iter(runs.values()))
+    reached, parts, state = leading(case, comm)
+    if parts.steady and (reached is None or reached.number == len(case.stages) - 1):
+        yield from _together(runs, parts, state, tell)
         return
     for done, (number, (case, more)) in enumerate(runs.items(), start=1):
         try:
-            yield number, case.run(comm, progress=False, **more)
+            yield number, case.run(comm, progress=False, reached=reached, **more)
         except ViContactError as error:
             yield number, error
         tell(done / len(runs))
 
 
-def _together(runs: Runs, parts: Parts, tell: Callable[[float], None]) -> Iterator[Ended]:
-    """Make runs of one body, which begin at rest in the same state."""
-    state, calls = None, []
+def _together(runs: Runs, parts: Parts, state: State | None, tell: Callable[[float], None]) -> Iterator[Ended]:
+    """Make runs of one body, which begin at rest in the same state; None: that of the first one."""
+    calls = []
     with ExitStack() as stack:
         for case, more in runs.values():
             calls.append(stack.enter_context(case.call(parts, more["out"], state)) | more)

@@ -51,7 +51,7 @@ def _of_state(problem: ContactProblem, state: State) -> Iterator[str]:
 def initial_state(problem: ContactProblem, t: float = 0.0) -> State:
     """Return u0 and v0 of the system in the rotated basis, without reaction; InputError when u0 is in the obstacle."""
     system, surface = problem.equations, problem.surface
-    gap = surface.gap(t) - surface.normal_values(system.u0)
+    gap = np.where(surface.rigid, surface.gap(t) - surface.normal_values(system.u0), np.inf)
     sizes = np.array([np.max(-gap, initial=-np.inf), max_abs(system.u0), np.max(surface.gap0, initial=0.0)])
     behind, *size = surface.comm.max(sizes)
     if behind > 1e-9 * max(size):

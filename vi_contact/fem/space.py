@@ -125,6 +125,7 @@ class FemSpace(NodalSpace):
         self._P = PetscMatrix(self._selection()) if tied else None
         self.forms: Any = None  # the ElasticForms of the system made on it; stress output needs them
         self.quadrature_degree: int | None = None  # of all its forms; None: as UFL estimates it
+        self.stands: Array | None = None  # (k, d) where supports hold nodes that an earlier stage had moved [m]
 
     def compiled(self, form: Any) -> Any:
         """Return a form compiled, its integrals with the degree of the space, if any, unless they say their own."""
@@ -239,7 +240,7 @@ class FemSpace(NodalSpace):
     def prescribed_values(self, t: float, derivative: int = 0) -> Array:
         """Return the full owned vector of U(x, t) or its time derivative; zero on free components.
 
-        Where conditions meet, the later one counts.
+        Where conditions meet, the later one counts; what they say is added to where an earlier stage left the nodes.
         """
         values = np.zeros((len(self.nodes), self.dimension))
         defects = []
@@ -250,7 +251,7 @@ class FemSpace(NodalSpace):
                 defects.append(defect)
         if defects:
             refuse(defects, self.comm)
-        return values.ravel()
+        return (values if derivative or self.stands is None else values + self.stands).ravel()
 
     def expand(self, u: Array, t: float, derivative: int = 0) -> Array:
         """Expand a free vector -> nodal values (owned nodes, d), prescribed components included."""

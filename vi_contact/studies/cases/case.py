@@ -5,6 +5,7 @@
     [system]          fem.assemble                         [run]      the other arguments of simulate
     [[contact]]       fem.contact_surface, .contact_pair   [gravity]  with_weight, then static_equilibrium
     [friction] [impact] [mass] [[excitation]]              [[check]]  formulas to compare with (engineering.checks)
+    [[stage]]  what replaces these tables in stages that follow one another
 """
 
 import math
@@ -37,10 +38,11 @@ from ...run.method import with_defaults
 from ...run.recorders import Contact, Energy, Steps
 from ...run.simulate import Solution, simulate
 from ...run.time_steps import StepPlan, step_plan
-from ...solvers.automatic import Automatic
 from .library import base_folder, check_format, keep_copy, refuse_retired, refuse_retired_model
 from .own_classes import packages
 from .parsing import Words, arguments, nearest, read
+from .stage_tables import Stage, split
+from .stages import Reached, run_stages
 from .strain_compatible import CALL, iterate
 from .table_calls import Call, Callee, Group, Node, Spot, build, callee, needs_body, nodes_in
 from .toml_file import read_toml, with_settings
@@ -75,7 +77,8 @@ class Case:
     """Hold a case file that has been read and checked; nothing is computed yet.
 
     path: of the file; tables: its content, with the settings; settings: the KEY=VALUE made after reading; nodes: the
-    calls that its tables are; allowed: the packages whose classes it may name; ready: mesh and groups, when they are.
+    calls that its tables are; allowed: the packages whose classes it may name; ready: mesh and groups, when they are;
+    stages: of [[stage]]; nodes, and what all but ``run`` and ``check`` do, are those of the last one then.
     """
 
     path: Path
@@ -84,6 +87,7 @@ class Case:
     nodes: Mapping[str, Node] = field(repr=False)
     allowed: tuple[str, ...] = ()
     ready: tuple[Any, Tags] | None = field(default=None, repr=False)
+    stages: tuple[Stage, ...] = ()
 
     @property
     def out(self) -> Path | None:
@@ -102,6 +106,8 @@ class Case:
 
     def check(self) -> None:
         """Make everything that needs no mesh, so that a wrong value or record file is told at once; InputError."""
+        for stage in self.stages[:-1]:
+            stage.case.check()
         for table, node in self.nodes.items():
             if table not in ("title", "mesh", "system", "contact", "gravity") and not needs_body(node):
                 self._made(table)
@@ -141,15 +147,19 @@ class Case:
 
     def run(
         self, comm: Any, *, out: str | Path | None = None, restart: bool | str | Path = False, progress: bool = True,
-        changed: bool = False, wall_time: str | None = None,
+        changed: bool = False, wall_time: str | None = None, reached: Reached | None = None,
     ) -> Solution:
         """Compute the whole run; collective. ``out``: the run folder, by default the one of [run], if any.
 
         Without ``steps`` and ``t_end`` it lasts as long as the excitation. A problem with weight starts from its static
-        equilibrium. The folder gets a copy of the case, ``case.toml``. Raises as ``simulate``.
+        equilibrium. The folder gets a copy of the case, ``case.toml``. Stages run one after the other, but for those
+        that are ``reached`` already. Raises as ``simulate``.
         """
         self.check()
         folder = self.out if out is None else Path(out)
+        if self.stages:
+            return run_stages(self, comm, folder, restart=restart, reached=reached, progress=progress,
+                              changed=changed, wall_time=wall_time)
         if "strain_compatible" in self.nodes:
             return iterate(self, comm, folder, restart=restart, progress=progress, wall_time=wall_time)
         parts = self.parts(comm)
@@ -176,7 +186,11 @@ class Case:
         if "steps" not in own and "t_end" not in own:
             own["t_end"] = self._duration(parts)
         solver = self._made("solver")
-        problem, state = self._at_rest(parts, problem, solver) if state is None else (problem, state)
+        if state is None and parts.weighted:
+            from ...run.static import static_equilibrium  # late: other runs need none of it
+
+            first = solver.primary if isinstance(solver, CrossChecked) else solver
+            state = static_equilibrium(problem, solver=first)
         ranks = problem.system.algebra.comm
         with locked(ranks, None if folder is None else run_folder(ranks, folder)):
             if folder is not None:
@@ -204,7 +218,9 @@ class Case:
         none = empty_surface(system.algebra.comm, system.space.dimension)
         surfaces = self._several("contact", system=system, tags=tags) or (none,)
         surface = joined_surfaces(*surfaces) if len(surfaces) > 1 else surfaces[0]
-        return Parts(system, surface, tags, "gravity" in self.nodes)
+        calls = [one for one in nodes_in(self.nodes["system"]) if isinstance(one, Call)]
+        rising = any(one.callee.name == "upgoing" and "motion" not in one.arguments for one in calls)
+        return Parts(system, surface, tags, "gravity" in self.nodes, moved=rising)
 
     def _shaking(self) -> dict[str, Any]:
         """Return the excitations for what is built before the system is; none where they need it themselves."""
@@ -217,8 +233,8 @@ class Case:
             return self.ready
         script = self._made("mesh")
         mesh, tags = read_mesh(script.path, comm) if isinstance(script, MeshFile) else build_mesh(script, comm)
-        for node in self.nodes.values():
-            for one in nodes_in(node):
+        for case in [stage.case for stage in self.stages] or [self]:
+            for one in (one for node in case.nodes.values() for one in nodes_in(node)):
                 if isinstance(one, Group):
                     one.build({"tags": tags})
         return mesh, tags
@@ -226,19 +242,8 @@ class Case:
     def _problem(self, parts: Parts) -> ContactProblem:
         return ContactProblem(
             parts.system, parts.surface, friction=self._made("friction") or Frictionless(), impact=self._made("impact"),
-            excitation=self.excitations(system=parts.system), mass=self._made("mass"),
+            excitation=() if parts.moved else self.excitations(system=parts.system), mass=self._made("mass"),
         )
-
-    def _at_rest(
-        self, parts: Parts, problem: ContactProblem, solver: Solver | None
-    ) -> tuple[ContactProblem, State | None]:
-        """Return the problem and its equilibrium under its weight."""
-        own = (solver.primary if isinstance(solver, CrossChecked) else solver) or Automatic()
-        if not parts.weighted:
-            return problem, None
-        from ...run.static import static_equilibrium  # late: other runs need none of it
-
-        return problem, static_equilibrium(problem, solver=own)
 
     def _duration(self, parts: Parts) -> float:
         """Return the time until the last excitation ends [s]."""
@@ -263,13 +268,19 @@ def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence
     refuse_retired(tables)
     refuse_retired_model(path, tables.get("model"))
     for name in tables:
-        if name not in ("format", *_TABLES):
-            raise InputError(f"{path}: unknown table [{name}]: {nearest(name, ('format', *_TABLES))}")
+        if name not in ("format", *_TABLES, "stage"):
+            raise InputError(f"{path}: unknown table [{name}]: {nearest(name, ('format', *_TABLES, 'stage'))}")
     if "mesh" not in tables:
         raise InputError(f"{path}: there is no table [mesh]: give the mesh of the body")
-    given = {"run": {}, "system": {}} | tables
-    nodes = {name: _node(name, given, Spot(str(path), "", name), known) for name in _TABLES if name in given}
-    return Case(path, tables, tuple(settings), nodes, allowed)
+    whole = Case(path, tables, tuple(settings), {}, allowed)
+    stages = tuple(replace(one, case=replace(whole, nodes=_nodes(one.tables, one.label, known)))
+                   for one in split(path, tables))
+    return replace(whole, nodes=stages[-1].case.nodes if stages else _nodes(tables, str(path), known), stages=stages)
+
+
+def _nodes(tables: Mapping[str, Any], source: str, known: Words) -> dict[str, Node]:
+    given = {"run": {}, "system": {}} | dict(tables)
+    return {name: _node(name, given, Spot(source, "", name), known) for name in _TABLES if name in given}
 
 
 def _node(name: str, tables: Mapping[str, Any], spot: Spot, known: Words) -> Node:

@@ -10,6 +10,7 @@ from ...core.checks import shown
 from ...core.errors import InputError
 from .parsing import nearest
 from .quantities import text_node, unit_of
+from .stage_tables import refuse_own
 from .table_calls import Spot
 from .toml_file import toml_value, with_settings
 
@@ -39,7 +40,10 @@ class ShortOptions:
         """
         first = [*self._motion(tables), *self._step(), *self._methods(tables)]
         after = with_settings(dict(tables), [*first, *given])
-        return [*first, *given, *self._scale(after), *self._cross_check(after)]
+        last = [*self._scale(after), *self._cross_check(after)]
+        for setting in (*first, *last):
+            refuse_own(tables, setting, "a short option")
+        return [*first, *given, *last]
 
     def _motion(self, tables: Mapping[str, Any]) -> list[str]:
         """Replace what shakes by records; the run lasts as long as they do."""

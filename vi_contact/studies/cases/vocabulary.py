@@ -114,11 +114,13 @@ def first_mode_period(system: SemiDiscreteSystem, *, parts: float) -> float:
     return 1.0 / (number("the period", "parts", parts, positive=True) * engineering.lowest_frequency(system))
 
 
-def heterogeneous(E: float | Expression, nu: float | Expression, rho: float | Expression) -> Heterogeneous:
+def heterogeneous(
+    E: float | Expression, nu: float | Expression, rho: float | Expression, xi: float | Expression = 0.0
+) -> Heterogeneous:
     def of(value: float | Expression) -> Any:
         return (lambda x, own=Places(value): own(x.T)) if isinstance(value, Expression) else value
 
-    return Heterogeneous(of(E), of(nu), of(rho))
+    return Heterogeneous(of(E), of(nu), of(rho), of(xi))
 
 
 def analytic_gap(function: Expression) -> core.AnalyticGap:
@@ -131,6 +133,14 @@ def resultants(
 ) -> engineering.Resultants:
     """Record ``Resultants``; part: the name of a [[contact]] or of a boundary group, or a box."""
     return engineering.Resultants(name, centre, normal=normal, part=part)
+
+
+def upgoing(
+    excitations: Any, motion: Record | Excitation | Sequence[Excitation] | None = None, *,
+    direction: tuple[float, ...] = (1.0, 0.0), dt: float | None = None, outcrop: bool = True,
+) -> Any:
+    """Return ``soil.upgoing`` of a motion, or of the run's excitations, which then come up through the base alone."""
+    return soil.upgoing(excitations if motion is None else motion, direction=direction, dt=dt, outcrop=outcrop)
 
 
 def compliant_base(
@@ -153,25 +163,27 @@ def free_field(
 class Parts:
     """Hold what a problem is made of.
 
-    tags: groups of the mesh; weighted: it carries its weight, and starts from its equilibrium.
+    tags: groups of the mesh; weighted: it carries its weight, and starts from its equilibrium; moved: the excitations
+    come up through its base, and are no inertia load.
     """
 
     system: SemiDiscreteSystem
     surface: ContactSurface
     tags: Any
     weighted: bool = False
+    moved: bool = False
 
     @property
     def steady(self) -> bool:
         """Say whether they serve other excitations too: nothing in them moves with these."""
-        return not (self.system.companions or self.surface.companions)
+        return not (self.system.companions or self.surface.companions or self.moved)
 
 
 _FUNCTIONS: Mapping[Any, Mapping[str, Callable[[], Any]]] = {  # kind -> word -> what it calls, when asked
     MeshFile: {"read_mesh": lambda: MeshFile},
     Dashpots: {"CompliantBase": lambda: compliant_base, "FreeField": lambda: free_field},
     CompliantBase: {"CompliantBase": lambda: compliant_base},
-    UpgoingVelocity: {"upgoing": lambda: soil.upgoing},
+    UpgoingVelocity: {"upgoing": lambda: upgoing},
     ContactSurface: {"contact_surface": lambda: surface, "contact_pair": lambda: pair},
     ImpactLaw: {"Elastic": lambda: laws.Elastic},
     Record: {"read_record": lambda: record, "synthetic": lambda: ground_motion.synthetic},

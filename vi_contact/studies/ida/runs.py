@@ -15,6 +15,7 @@ from ...ground_motion.record import Record
 from ...run.files.folder import SUMMARY
 from ...run.files.reading import read_object
 from ..cases.case import Case, read_case
+from ..cases.stage_tables import refuse_own
 from ..cases.toml_file import toml_value
 
 Row = dict[str, Any]
@@ -52,6 +53,7 @@ def _record(path: Path, settings: tuple[str, ...], allowed: tuple[str, ...]) -> 
 
 def ground_motions(case: Case) -> list[tuple[str, Mapping[str, Any]]]:
     """Return (key, table) of the ground motions of a case; InputError unless it is shaken by records alone."""
+    refuse_own(case.tables, "excitation", f"{case.path}: ida")
     tables = case.tables.get("excitation", [])
     found: list[tuple[str, Mapping[str, Any]]] = [("excitation", tables)]
     if not isinstance(tables, dict):
