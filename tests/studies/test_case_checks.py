@@ -1,7 +1,8 @@
-"""Tables [[check]] of case files: read as calls, compared from the run folder alone, printed by ``vi-contact post``."""
+"""S4.1, S4.7: tables [[check]] of case files, compared from the run folder alone, printed by ``vi-contact post``."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ pytest.importorskip("dolfinx")
 
 from mpi4py import MPI
 
+import vi_contact
 from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
 from vi_contact.studies import comparisons, read_case
@@ -67,20 +69,30 @@ def test_checks_of_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert active.found == rest.found and np.isnan(active.expected) and "steeper" in active.applies
     assert main(["post", "checks", str(out)]) == 0
     said = capsys.readouterr().out
-    assert "AtRest: expected 3333.3 N/m, found 3333.3 N/m, ratio 1\n" in said and "K0 = ν/(1-ν)" in said
+    assert "AtRest: expected 3333.3, found 3333.3 N/m, ratio 1\n" in said and "K0 = ν/(1-ν)" in said
     assert "Rankine: does not apply: the ground is steeper" in said and "nu = 0.25 -" in said
     assert (out / "checks.csv").read_text(encoding="utf-8").count("\n") == 3
 
 
 @pytest.mark.parametrize(("change", "words"), [
     (("AtRest", "Okabe"), "unknown type 'Okabe'"), (("nu = 0.25\npart", "mu = 0.25\npart"), "unknown key 'mu'"),
-    (("nu = 0.25\npart", "nu = 0.75\npart"), "nu is 0.75: give a Poisson's ratio"),
+    (("nu = 0.25\npart", "nu = 0.75\npart"), "nu is 0.75: give one from 0 to 0.5"),
     (("AtRest", "mine.checks:Own"), "takes no classes but its own"),
 ])
 def test_wrong_tables_are_refused_before_the_run(tmp_path: Path, change: tuple[str, str], words: str) -> None:
     (tmp_path / "layer.toml").write_text(LAYER.replace(*change), encoding="utf-8")
     with pytest.raises(InputError, match=rf"\[check\[1\].*{words}"):
         read_case(tmp_path / "layer.toml").check()
+
+
+def test_the_page_prints_what_it_says(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """S4.7: the case of docs/guide/checks.md, run from its text."""
+    page = (Path(vi_contact.__file__).parents[1] / "docs" / "guide" / "checks.md").read_text(encoding="utf-8")
+    case, printed = (re.findall(rf"```{kind}\n(.*?)```", page, re.DOTALL)[0] for kind in ("toml", "text"))
+    (tmp_path / "layer.toml").write_text(case, encoding="utf-8")
+    read_case(tmp_path / "layer.toml").run(MPI.COMM_SELF, out=tmp_path / "out", progress=False)
+    assert main(["post", "checks", str(tmp_path / "out")]) == 0
+    assert capsys.readouterr().out == f"{printed}table: {tmp_path / 'out' / 'checks.csv'}\n"
 
 
 def test_a_run_without_checks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from box_frame import BoxFrame
 from mpi4py import MPI
 from scipy.optimize import brentq
 
 from vi_contact import Condensed, ContactProblem, LinearElastic, State, fem, static_equilibrium
 from vi_contact.core.surfaces import ContactSurface, empty_surface
 from vi_contact.core.system import SemiDiscreteSystem
+from vi_contact.engineering.checks.racking_ratio import flexibility as flexible
 from vi_contact.meshes.extract import MeshArrays, add_arrays
 from vi_contact.meshes.grid import Grid, add_grids
 
@@ -128,7 +128,7 @@ def racking(box: LinedBox, flexibility: float, *, nu: float = 0.3) -> float:
     """gamma_frame/gamma_soil of a box of this flexibility ratio, tied to the soil or bilateral without friction."""
     soil = LinearElastic(E=1e8, nu=nu, rho=1900.0)
     bending = box.thickness**3 / 12.0
-    unit = BoxFrame(box.width, box.height, bending, bending, bending).flexibility(soil.shear_modulus)
+    unit = flexible(soil.shear_modulus, box.width, box.height, bending, bending, bending)
     lining = LinearElastic(E=unit / flexibility, nu=0.0, rho=2400.0)
     mesh, tags = fem.build_mesh(box, MPI.COMM_SELF)
     held = [

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 pytest.importorskip("dolfinx")
-from box_frame import racking_ratio
 from buried import GAMMA, LinedBox, Rings, displacement, racking
 from mpi4py import MPI
 from thick_lining import ThickLining
 
 from vi_contact import Condensed, ContactProblem, LinearElastic, State, fem, static_equilibrium
 from vi_contact.core.surfaces import empty_surface
+from vi_contact.engineering.checks.racking_ratio import racking_ratio
 from vi_contact.meshes.cut import Welded
 
 pytestmark = pytest.mark.serial

@@ -132,18 +132,18 @@ def _loop(options: argparse.Namespace) -> str:
 
 
 def _checks(options: argparse.Namespace) -> str:
-    """Print a block of lines for each check, and write them as a table."""
     from ..studies.cases.checks import comparisons
 
     found, table = comparisons(options.folder), _table_path(options)
     if not found:
         raise InputError(f"{options.folder}: its case has no [[check]] tables: docs/guide/checks.md lists the checks")
-    rows = [[one.name, one.formula, one.source, "; ".join(f"{name} = {x:.6g} {unit}" for name, (x, unit) in
-             one.inputs.items()), one.expected, one.found, one.unit, one.ratio, one.applies] for one in found]
-    write_csv(table, ["name", "formula", "source", "inputs", "expected", "found", "unit", "ratio", "applies"], rows)
-    said = [f"{one.name}: " + (f"does not apply: {one.applies}" if one.applies else
-            f"expected {one.expected:.5g} {one.unit}, found {one.found:.5g} {one.unit}, ratio {one.ratio:.4g}")
-            + f"\n    {one.formula}   ({one.source})\n    {row[3]}" for one, row in zip(found, rows, strict=True)]
+    inputs = ["; ".join(f"{key} = {value:.6g} {unit}" for key, (value, unit) in one.inputs.items()) for one in found]
+    write_csv(table, ["name", "formula", "source", "inputs", "expected", "found", "unit", "ratio", "applies"], (
+        [one.name, one.formula, one.source, given, one.expected, one.found, one.unit, one.ratio, one.applies]
+        for one, given in zip(found, inputs, strict=True)))
+    said = [f"{one.name}: " + (f"does not apply: {one.applies}" if one.applies else f"expected {one.expected:.5g}, "
+            f"found {one.found:.5g} {one.unit}, ratio {one.ratio:.4g}") + f"\n    {one.formula}   ({one.source})\n    "
+            + given for one, given in zip(found, inputs, strict=True)]
     return "\n".join([*said, f"table: {table}"])
 
 

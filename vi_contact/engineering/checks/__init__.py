@@ -1,12 +1,10 @@
-"""Check a run against the formulas of textbooks: each prints its formula, inputs and range, docs/guide/checks.md.
-
->>> from vi_contact.engineering.checks import AtRest
->>> import numpy as np
->>> AtRest(height=5.0, rho=2000.0, nu=0.3, gravity=10.0).compare({"N_wall": np.array([1.1e5])}).expected
-107142.85714285714
-"""
+"""Check a run against the formulas of textbooks: each prints its formula, inputs and range, docs/guide/checks.md."""
 
 from ...core.lazy import lazy
 
-_CONTENTS = {"earth_pressure_static": ("AtRest", "Coulomb", "Rankine")}
+_CONTENTS = {
+    "earth_pressure_static": ("AtRest", "Coulomb", "Rankine"),
+    "earth_pressure_seismic": ("MononobeOkabe", "VeletsosYounan", "Wood"),
+    "housner": ("Housner",), "newmark_block": ("NewmarkBlock",), "racking_ratio": ("RackingRatio",),
+}
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

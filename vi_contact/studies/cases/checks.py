@@ -11,10 +11,7 @@ from .table_calls import Spot, build, callee
 
 
 def comparisons(folder: str | Path) -> tuple[Comparison, ...]:
-    """Return the comparisons of a run folder, one for each [[check]] of the case it keeps; none without a case.
-
-    InputError for a folder without a run, and for a table that is wrong. Needs no finite elements.
-    """
+    """Return the comparisons of a run folder, one for each [[check]] of the case it keeps; InputError without a run."""
     from ...run.files.reading import read_run  # late: h5py
 
     folder = Path(folder)

@@ -1,0 +1,71 @@
+"""Expect how a rigid block rocks on rigid ground (Housner, Bull. Seism. Soc. Am. 53, 1963)."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...core.algebra import Array
+from ...core.units import STANDARD_GRAVITY
+from .comparison import Check, History, Numbers
+
+FINE = 2e-4  # CHOSEN: longest step of the rigid block, over 1/p: its angles are those of shorter steps to 0.1 %
+
+
+@dataclass(frozen=True, kw_only=True)
+class Housner(Check):
+    """Expect the largest angle of a uniform block of this width and height [m], or the time of its first impact.
+
+    of: "angle" [rad] or "impact" [s] after the first row; theta: column of the angle, anticlockwise positive, whose
+    first row is the start, at rest; acceleration: of the ground. It applies to blocks that rock and do not overturn;
+    they do not slide or bounce. One history in a long motion is chaotic: compare many, or the first impacts.
+    """
+
+    formula = "θ'' = -p² (± sin(α - |θ|) - a/g cos(α - |θ|)), p² = 3g/4R, θ' times 1 - 1.5 sin²α where θ = 0"
+    source = "Housner 1963"
+    units = {"width": "m", "height": "m", "gravity": "m/s²"}
+    answers = {"angle": "rad", "impact": "s"}
+    reads = ("t", "{theta}", "{acceleration}")
+    width: float
+    height: float
+    of: str = "angle"
+    gravity: float = STANDARD_GRAVITY
+    theta: str = "theta_base"
+    acceleration: str = "a_g_x"
+
+    def rocking(self, t: Array, acceleration: Array, theta: float) -> Array:
+        """Return the angle [rad] at times t (n,) after a start at rest; it stays beyond alpha where it overturns."""
+        alpha, angles, rate = math.atan(self.width / self.height), np.full(len(t), theta), 0.0
+        p2, kept = 1.5 * self.gravity / math.hypot(self.width, self.height), 1.0 - 1.5 * math.sin(alpha) ** 2
+        for row, length in enumerate(np.diff(t)):
+            parts = min(math.ceil(length * math.sqrt(p2) / FINE), 400)  # of sizes that no block has, fewer
+            first, last = acceleration[row : row + 2]
+            for push in (first + (last - first) * (np.arange(parts) + 0.5) / parts).tolist():
+                lean, left = math.copysign(1.0, theta or rate or push), alpha - abs(theta)
+                falls = p2 * (push / self.gravity * math.cos(left) - lean * math.sin(left))
+                if theta == rate == 0.0 and falls * lean <= 0.0 or left < 0.0:
+                    continue
+                rate += length / parts * falls
+                new = theta + length / parts * rate
+                theta, rate = (kept * new, kept * rate) if new * theta < 0.0 else (new, rate)
+            angles[row + 1] = theta
+        return angles
+
+    def numbers(self, history: History) -> Numbers:
+        t, angle, push = history["t"], history[self.theta], history[self.acceleration]
+        rigid, alpha = self.rocking(t, push, float(angle[0])), math.atan(self.width / self.height)
+        both = (float(np.abs(one).max()) if self.of == "angle" else landing(t, one) for one in (rigid, angle))
+        expected, found = both
+        why = "" if self.width < math.sqrt(2.0) * self.height else "the first impact stops a block as wide as this"
+        why = why or ("" if rigid.any() else "the ground never accelerates by g b/h: a rigid block does not rock")
+        why = why or ("" if np.abs(rigid).max() < alpha else "the rigid block overturns")
+        why = why or ("the rigid block does not land in this time" if math.isnan(expected) else "")
+        return expected, found, why, {"alpha": (alpha, "rad"), "theta0": (float(angle[0]), "rad")}
+
+
+def landing(t: Array, theta: Array) -> float:
+    """Return the time [s] from the first row until the angle, once above 1e-3 of its largest, is zero; nan if never."""
+    start = int(np.argmax(np.abs(theta) > 1e-3 * np.abs(theta).max()))
+    row = start + int(np.argmax(theta[start:] * theta[start] <= 0.0))
+    share = theta[row] / (theta[row] - theta[row - 1]) if row > start else math.nan
+    return float(t[row] - share * (t[row] - t[row - 1]) - t[0])
