@@ -63,6 +63,16 @@ dt = 0.01
 steps = 60
 """
 
+STAGES = """
+[[stage]]
+name = "gravity"
+type = "static"
+[[stage]]
+name = "motion"
+type = "dynamic"
+"""
+
+
 def written(folder: Path, text: str = CASE) -> Path:
     (folder / "case.toml").write_text(text)
     return folder / "case.toml"
@@ -116,6 +126,17 @@ def test_units_of_curves(tmp_path):
     assert asked["curves"][0] == (tags["lower"], soil.SoilCurves.darendeli(mean_stress=1e5, plasticity=15))
 
 
+def test_with_stages_the_last_one_tells_the_strains(tmp_path):
+    """Gravity as a stage of its own: the same run, its folders within those of the runs."""
+    plain = read_case(written(tmp_path)).run(COMM, progress=False)
+    staged = read_case(written(tmp_path, CASE + STAGES)).run(COMM, out=tmp_path / "out", progress=False)
+    for name in ("contact_resultant", "largest_shear_strain"):
+        scale = np.abs(plain.history[name]).max()
+        assert np.abs(staged.history[name] - plain.history[name]).max() < 1e-6 * scale
+    assert (tmp_path / "out" / "stages" / "1_gravity").is_dir()
+    assert (tmp_path / "out" / "iterations" / "1" / "stages" / "1_gravity").is_dir()
+
+
 @pytest.mark.parametrize(("old", "new", "words"), [
     ('["upper", {', '["uper", {', "uper"),
     ("plasticity = 15", "plasticity = 300", "end at 200 %"),
@@ -133,12 +154,14 @@ def test_what_is_refused(tmp_path, old, new, words):
         read_case(written(tmp_path, CASE.replace(old, new, 1))).run(COMM, progress=False)
 
 
-def test_no_restart_and_no_study(tmp_path):
+def test_no_restart_no_static_end_and_no_study(tmp_path):
     case = read_case(written(tmp_path))
     with pytest.raises(InputError, match="cannot be continued: run it from the start"):
         case.run(COMM, out=tmp_path / "out", restart=True)
     with pytest.raises(InputError, match="take it out for a study of many"), case.call(case.parts(COMM), None):
         pass
+    with pytest.raises(InputError, match="the last stage, which is static"):
+        read_case(written(tmp_path, CASE + STAGES.replace("dynamic", "static"))).run(COMM)
 
 
 def test_the_command_runs_it(tmp_path, capsys):

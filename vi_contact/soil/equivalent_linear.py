@@ -41,21 +41,16 @@ class SiteResponse:
     surface: Record
     iterations: int
 
-    @property
-    def materials(self) -> tuple[LinearElastic, ...]:
-        """Return the strain-compatible materials of the layers from the top: G found, rho and nu as they were."""
-        return tuple(LinearElastic(2.0 * float(shear) * (1.0 + one.nu), one.nu, one.rho)
-                     for shear, (_, one, _) in zip(self.shear, self.layers, strict=True))
-
     def column(self, *, frequency: float, height: float) -> SoilColumn:
         """Return the column for runs in time, base at y = 0, damped by beta = xi / (pi f) at this frequency [Hz]; its
-        elements have at most this height [m]."""
+        elements have at most this height [m], and Poisson's ratio is that of the layers."""
         f, most = (number("SiteResponse.column", name, one, positive=True)
                    for name, one in (("frequency", frequency), ("height", height)))
         thick = np.array([thickness for thickness, _, _ in self.layers])
         parts = np.ceil(thick / most * (1.0 - 1e-9)).astype(int)
-        values = np.array([(one.lame_lambda, one.shear_modulus, one.rho, 0.0, xi / (np.pi * f))
-                           for one, xi in zip(self.materials, self.damping, strict=True)])
+        rows = zip(self.layers, self.shear, self.damping, strict=True)
+        values = np.array([(2.0 * one.nu / (1.0 - 2.0 * one.nu) * shear, shear, one.rho, 0.0, xi / (np.pi * f))
+                           for (_, one, _), shear, xi in rows])
         heights = np.concatenate([[0.0], np.cumsum(np.repeat(thick / parts, parts)[::-1])])
         return SoilColumn(heights, *np.repeat(values, parts, axis=0)[::-1].T)
 

@@ -157,11 +157,11 @@ class Case:
         """
         self.check()
         folder = self.out if out is None else Path(out)
+        if "strain_compatible" in self.nodes:
+            return iterate(self, comm, folder, restart=restart, progress=progress, wall_time=wall_time)
         if self.stages:
             return run_stages(self, comm, folder, restart=restart, reached=reached, progress=progress,
                               changed=changed, wall_time=wall_time)
-        if "strain_compatible" in self.nodes:
-            return iterate(self, comm, folder, restart=restart, progress=progress, wall_time=wall_time)
         parts = self.parts(comm)
         with self.call(parts, folder, changed=changed) as call:
             if folder is not None:

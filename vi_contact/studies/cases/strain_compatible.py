@@ -3,7 +3,8 @@
     [strain_compatible]
     curves = [["sand", {type = "SoilCurves.vucetic_dobry", plasticity = 15}]]
 
-Every run is a whole one, in DIR; those before the last one are kept in DIR/iterations/1, 2, …
+Every run is a whole one, in DIR, all stages with the same soil; those before the last one are kept in
+DIR/iterations/1, 2, …
 """
 
 import shutil
@@ -33,16 +34,23 @@ def iterate(case: Any, comm: Any, folder: Path | None, *, restart: bool | str | 
     damping = given.arguments.get("damping")
     if not isinstance(damping, Call) or damping.callee.name != "DampingRatio":
         raise InputError(f"{spot} gives every cell its damping ratio: give [system.damping] type = \"DampingRatio\"")
+    if case.stages and case.stages[-1].static:
+        raise InputError(f"{spot} goes by the strains of the last stage, which is static: give a dynamic one")
     mesh, tags = case.meshed(comm)
+
+    def softened(one: Any, material: Any, *strain: Any) -> Any:
+        own = one.nodes.get("record", (Energy(), Contact()))
+        nodes = {name: node for name, node in one.nodes.items() if name != "strain_compatible"}
+        nodes["system"] = replace(nodes["system"], arguments=nodes["system"].arguments | {"material": material})
+        nodes["record"] = (*(own if isinstance(own, tuple) else (own,)), *strain)
+        return replace(one, nodes=nodes, ready=(mesh, tags))
 
     def run(material: Any, strain: Any) -> Any:
         if folder is not None:
             on_root(ranks, partial(_set_aside, folder / "iterations", next(numbers)))
-        own = case.nodes.get("record", (Energy(), Contact()))
-        nodes = {name: node for name, node in case.nodes.items() if name != "strain_compatible"}
-        nodes["system"] = replace(given, arguments=given.arguments | {"material": material})
-        nodes["record"] = (*(own if isinstance(own, tuple) else (own,)), strain)
-        return replace(case, nodes=nodes, ready=(mesh, tags)).run(comm, out=folder, **options)
+        stages = tuple(replace(stage, case=softened(stage.case, material, *[strain][stage is not case.stages[-1] :]))
+                       for stage in case.stages)
+        return replace(softened(case, material, strain), stages=stages).run(comm, out=folder, **options)
 
     each = given.arguments.get("material", ()), case.nodes["strain_compatible"]
     material, asked = (build(one, {"tags": tags}) for one in each)
