@@ -111,6 +111,8 @@ def test_a_case_is_the_calls_of_python(tmp_path):
     assert folders == list(range(1, len(expected.changes))) and len(folders) >= 2
     for folder in (out, out / "iterations" / "1"):
         assert (folder / "history.csv").is_file() and (folder / "case.toml").is_file()
+    changes = json.loads((out / "strain_compatible.json").read_text())["changes"]
+    assert np.allclose(changes, expected.changes, rtol=1e-5) and changes[-1] < 0.01
     assert json.loads((out / "summary.json").read_text())["status"] == "finished"
     first, last = (np.loadtxt(path / "history.csv", delimiter=",", skiprows=1, usecols=1)
                    for path in (out / "iterations" / "1", out))

@@ -13,7 +13,6 @@ from ..core.checks import array, check_word, number, shown
 from ..core.errors import InputError
 
 LINEAR = 0.95  # G/Gmax where a table must begin: below its first strain the soil has the values of its first row
-ANY = 1e9  # a shear strain beyond all others
 ATMOSPHERE = 101325.0  # Pa
 _TABLES = tomllib.loads(files(__package__).joinpath("curves.toml").read_text(encoding="utf-8"))
 
@@ -52,7 +51,7 @@ class SoilCurves:
     def linear(cls, damping: float) -> "SoilCurves":
         """Return those of what keeps its stiffness and this damping ratio at any strain: a structure, stiff rock."""
         xi = number("SoilCurves.linear", "the damping ratio", damping, not_negative=True)
-        return cls((ANY**-1, ANY), (1.0, 1.0), (xi, xi), f"linear, {xi:g}")
+        return cls((1e-9, 1e9), (1.0, 1.0), (xi, xi), f"linear, {xi:g}")
 
     @classmethod
     def seed_idriss(cls, bound: str = "mean") -> "SoilCurves":
@@ -113,6 +112,5 @@ class SoilCurves:
 
     def at(self, strain: Array) -> tuple[Array, Array]:
         """Return (G/Gmax, damping ratio) at these shear strains; beyond the last strain its values."""
-        place = np.log(np.maximum(strain, self.strain[0]))
-        known = np.log(self.strain)
+        place, known = np.log(np.maximum(strain, self.strain[0])), np.log(self.strain)
         return np.interp(place, known, self.reduction), np.interp(place, known, self.damping)

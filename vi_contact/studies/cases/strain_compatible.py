@@ -4,7 +4,7 @@
     curves = [["sand", {type = "SoilCurves.vucetic_dobry", plasticity = 15}]]
 
 Every run is a whole one, in DIR, all stages with the same soil; those before the last one are kept in
-DIR/iterations/1, 2, …
+DIR/iterations/1, 2, …, and DIR/strain_compatible.json has the largest relative change of G or xi after each.
 """
 
 import shutil
@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import InputError
-from ...core.files import on_root
+from ...core.files import on_root, to_json, write_atomically
 from ...fem.communicators import MpiComm
 from ...run.files.folder import LOCK, locked, run_folder
 from ...run.recorders import Contact, Energy
@@ -55,7 +55,11 @@ def iterate(case: Any, comm: Any, folder: Path | None, *, restart: bool | str | 
     each = given.arguments.get("material", ()), case.nodes["strain_compatible"]
     material, asked = (build(one, {"tags": tags}) for one in each)
     with locked(ranks, None if folder is None else run_folder(ranks, folder)):
-        return strain_compatible(mesh, material, run=run, **asked).solution
+        found = strain_compatible(mesh, material, run=run, **asked)
+        if folder is not None:
+            told = to_json({"changes": found.changes}).encode()
+            on_root(ranks, partial(write_atomically, folder / "strain_compatible.json", told))
+        return found.solution
 
 
 def _set_aside(place: Path, number: int) -> None:
