@@ -7,7 +7,7 @@ cover = 5.0;         // soil above the roof
 depth = 16.0;        // of the soil, down to the rock
 far_side = 24.0;     // soil beside the box
 size = 1.0;          // of the cells of the box and round it, which the case file divides into four each
-far = 5.0;           // of the cells at the ends of the mesh
+far = 4.4;           // of the cells at the ends of the mesh
 
 top = -cover;
 bottom = -cover - H;
