@@ -1,6 +1,6 @@
 """Draw the pictures of docs/guide/practice.md from runs of the starter cases: python3 demos/pictures/practice.py RESULTS.
 
-RESULTS holds the run folders wall, dam, pier and culvert; the pictures are written beside them.
+RESULTS holds the run folders wall, dam, pier, pounding and culvert; the pictures are written beside them.
 """
 
 import math
@@ -88,11 +88,26 @@ def culvert(axes: Any, h: History) -> None:
     roof.set_title("mean pressure on the roof [kPa]")
 
 
-CASES: Mapping[str, Callable[[Any, History], None]] = {"wall": wall, "dam": dam, "pier": pier, "culvert": culvert}
+def pounding(axes: Any, h: History) -> None:
+    """Sways at the height of the lower roof, forces of contact, base shears."""
+    sway, force, shear = axes
+    sway.plot(h["t"], 1e3 * h["u_x_left_second"], label="left frame")
+    sway.plot(h["t"], 1e3 * (h["u_x_right_roof"] + 0.03), label="right frame, 30 mm away")
+    sway.legend(fontsize=8, frameon=False, loc="lower right")
+    sway.set_title("sways at the lower roof [mm]")
+    force.plot(h["t"], h["contact_resultant"] / 1e6, lw=0.8)
+    force.set_title("contact force [MN]")
+    for one in ("left", "right"):
+        shear.plot(h["t"], h[f"reaction_x_{one}"] / 1e3, lw=0.8, label=one)
+    shear.legend(fontsize=8, frameon=False, loc="lower right")
+    shear.set_title("force of the ground on the feet [kN]")
+
+
+CASES: Mapping[str, Callable[[Any, History], None]] = {"wall": wall, "dam": dam, "pier": pier, "pounding": pounding, "culvert": culvert}
 
 
 def main(results: Path) -> None:
-    """Draw all four."""
+    """Draw all five."""
     for name, draw in CASES.items():
         figure, axes = plt.subplots(1, 3, figsize=(11.0, 2.9), layout="constrained")
         draw(axes, vc.read_run(results / name).history)
