@@ -1,4 +1,4 @@
-"""Draw the pictures of docs/guide/practice.md from runs of the starter cases: python3 demos/pictures/practice.py RESULTS.
+"""Draw the pictures of docs/guide/practice.md from runs of the cases: python3 demos/pictures/practice.py RESULTS.
 
 RESULTS holds the run folders wall, dam, pier, pounding and culvert; the pictures are written beside them.
 """
@@ -103,7 +103,9 @@ def pounding(axes: Any, h: History) -> None:
     shear.set_title("force of the ground on the feet [kN]")
 
 
-CASES: Mapping[str, Callable[[Any, History], None]] = {"wall": wall, "dam": dam, "pier": pier, "pounding": pounding, "culvert": culvert}
+CASES: Mapping[str, Callable[[Any, History], None]] = {
+    "wall": wall, "dam": dam, "pier": pier, "pounding": pounding, "culvert": culvert,
+}
 
 
 def main(results: Path) -> None:
