@@ -28,12 +28,12 @@ from mpi4py import MPI
 
 import vi_contact as vc
 from demos.pictures import raft as pictures
+from demos.pictures.histories import plot_certificate, plot_energy
 from meshes.raft import RaftMesh
 from vi_contact import engineering, fem, ground_motion, soil
 from vi_contact.cli import status_of
 from vi_contact.plots.bodies import film, plot_deformed
 from vi_contact.plots.faces import plot_faces
-from vi_contact.plots.histories import plot_certificate, plot_energy
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 SOIL = vc.LinearElastic.from_wave_speeds(400.0, 200.0, 1900.0)  # c_P, c_S [m/s], rho [kg/m³]

@@ -21,11 +21,11 @@ import numpy as np
 from mpi4py import MPI
 
 import vi_contact as vc
+from demos.pictures.histories import plot_certificate, plot_energy
 from vi_contact import fem, soil
 from vi_contact.cli import status_of
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
-from vi_contact.plots.histories import plot_certificate, plot_energy
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 SOIL = vc.LinearElastic.from_wave_speeds(500.0, 250.0, 1900.0)  # c_P, c_S [m/s], rho [kg/m³]

@@ -23,12 +23,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the sou
 from mpi4py import MPI
 
 import vi_contact as vc
+from demos.pictures.histories import draw_histories
 from demos.pictures.runs import plot_runs
 from demos.problems import wall as wall_model
 from vi_contact import fem
 from vi_contact.cli import main as command
 from vi_contact.cli import status_of
-from vi_contact.plots.run_pictures import draw_histories
 from vi_contact.solvers.volume.route import Volume
 from vi_contact.solvers.volume.snes import ReducedNewton
 

@@ -128,7 +128,7 @@ def test_wrong_cases_are_one_sentence(arguments, word, capsys):
         (["post", "spectrum", "run", "a_g_x", "--out", "run/history.csv"], "history.csv is read by this command"),
         (["post", "peaks", "run", "--out", "run/../run/checkpoint.npz"], "checkpoint.npz is read by this command"),
         (["post", "spectrum", "run", "a_g_x", "--out", "x.png"], "give a name such as x.csv"),
-        (["report", "run", "--out", "page.docx"], "a picture ends in"),
+        (["report", "run", "--out", "page.docx"], "is an .html or a .pdf file"),
     ],
 )
 def test_no_input_is_overwritten(tmp_path, monkeypatch, capsys, arguments, word):

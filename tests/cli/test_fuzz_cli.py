@@ -87,7 +87,11 @@ WRONG: dict[str, dict[str, list[str]]] = {  # command -> option -> values; an op
     },
     **{command: {"": ["", "--steps 3", "--out x", "--k 1 2", "--help", "--motion FILE --scale 2"]}
        for command in ("wall", "channel", "beam", "layer")},  # answered by the command that has taken their place
-    "report": {"": ["nowhere", "FILE", "FOLDER", "RUN --out x.docx", "RUN --show nosuch", "RUN --show t,u_x_end"]},
+    "report": {"": ["nowhere", "FILE", "FOLDER", "RUN --out x.docx", "RUN --show nosuch", "RUN --show t,u_x_end",
+                    "RUN --refine"]},
+    "plot": {"": ["nowhere", "FOLDER", "RUN", "RUN --times x", "RUN --out nowhere", "RUN --magnify 0"]},
+    "film": {"": ["nowhere", "FOLDER", "RUN", "RUN --between 1", "RUN --between 2,1", "RUN --out x.avi",
+                  "RUN --fps 0"]},
     "post peaks RUN": {"": ["nosuch", "--out nowhere/x", "--out RUN/history.csv"]},
     "post spectrum RUN": {"a_x_end --periods": PERIODS, "a_x_end --damping": ["1", "nan", "-1"],
                           "": ["u_x_end", "nosuch"]},

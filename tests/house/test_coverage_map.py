@@ -61,7 +61,6 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "ground_motion/test_spectra.py": "ground_motion.intensity",
     "ground_motion/test_synthetic.py": "ground_motion.ec8 ground_motion.kanai_tajimi",
     "house/test_architecture.py": "core.lazy",
-    "house/test_demos.py": "plots.run_pictures",
     "laws/test_excitation.py": "core.excitation_values ground_motion.excitation",
     "meshes/test_ball.py": "meshes.checks meshes.extract meshes.mesh_file",
     "meshes/test_mesh_files.py": "meshes.channel",
@@ -71,7 +70,8 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "models/test_channel.py": "studies.cases.short_settings",
     "models/test_wall.py": "core.units",
     "plots/test_faces.py": "plots.bodies",
-    "plots/test_report.py": "cli.report run.files.reading",
+    "plots/test_report.py":
+        "cli.pictures cli.post plots.charts plots.pages plots.sections run.files.reading studies.report",
     "run/test_folder.py": "core.files run.files.history run.files.stored_rows run.files.table",
     "run/test_fuzz_folders.py": "run.files.writer run.session",
     "run/test_march.py": "core.state_checks",

@@ -129,7 +129,7 @@ try:
 except vc.InputError as error:
     print(error)
 """).splitlines()
-    assert told[0] == "finished 3" and told[1].endswith("needs h5py, which is missing here: install it, or run without")
+    assert told[0] == "finished 2" and told[1].endswith("needs h5py, which is missing here: install it, or run without")
     assert not list(tmp_path.iterdir())
 
 

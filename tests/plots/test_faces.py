@@ -7,7 +7,6 @@ import shutil
 import sys
 import warnings
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -28,7 +27,7 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.files import open_hdf5
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.two_blocks import TwoBlocks
-from vi_contact.plots import bodies, faces, run_pictures
+from vi_contact.plots import bodies, faces
 from vi_contact.plots.bodies import film, plot_deformed
 from vi_contact.plots.deformed import OPEN, SLIP, STICK, contact_states, read_frames
 from vi_contact.plots.faces import Painter, faces_of, leading, moments, plot_faces
@@ -228,11 +227,11 @@ def test_all_pictures_of_a_run(
     from PIL import Image
 
     run = runs["hexahedra"]
-    monkeypatch.setattr(run_pictures, "film", partial(film, times=[0.012, 0.021, 0.03]))
-    names = ["certificate.png", "faces.png", "deformed.png", "film.gif"]
-    assert [path.name for path in run_pictures.draw_run(run, tmp_path, title="Blocks")] == names
+    drawn = bodies.draw_run(run, tmp_path, title="Blocks")
+    assert [path.name for path in drawn] == ["deformed.png", "faces.png"]
+    film(run, tmp_path / "film.gif", times=[0.012, 0.021, 0.03], title="Blocks")
     shown = sorted(set(moments(run.history)))
-    assert [axis.get_title() for axis in figures[0].axes[: len(shown)]] == [
+    assert [axis.get_title() for axis in figures[1].axes[: len(shown)]] == [
         f"face towards -y, t = {t:.4g} s" for t in shown
     ]
     with Image.open(tmp_path / "film.gif") as moving:
@@ -244,11 +243,14 @@ def test_all_pictures_of_a_run(
     assert min(np.mean(np.abs(one - two)) for one, two in zip(shots, shots[1:], strict=False)) > 0.2
 
 
-def test_films_and_what_is_no_film(runs: Any, tmp_path: Path) -> None:
+def test_films_and_what_is_no_film(runs: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A film of bodies whose contact was not recorded; other files, columns and damaged folders in one sentence."""
     run = runs["tetrahedra"]
     assert film(replace(run, contact=None), tmp_path / "film.gif", times=[0.03]).stat().st_size > 5000
-    with pytest.raises(InputError, match=r"'film\.mp4'"):
+    with pytest.raises(InputError, match=r"name 'film\.avi'"):
+        film(run, tmp_path / "film.avi")
+    monkeypatch.setattr("matplotlib.animation.FFMpegWriter.isAvailable", lambda: False)
+    with pytest.raises(InputError, match="needs ffmpeg"):
         film(run, tmp_path / "film.mp4")
     for times, words in (([], "times is empty"), (["soon"], "times is .*give real numbers")):
         for draw in (plot_faces, plot_deformed, film):
@@ -266,6 +268,13 @@ def test_films_and_what_is_no_film(runs: Any, tmp_path: Path) -> None:
     (copy.folder / "fields" / "mesh.h5").unlink()
     with pytest.raises(InputError, match=r"mesh\.h5' is missing or damaged"):
         plot_faces(copy, tmp_path / "none.png")
+
+
+def test_a_film_of_ffmpeg(runs: Any, tmp_path: Path) -> None:
+    if shutil.which("ffmpeg") is None:
+        pytest.skip("no ffmpeg here: apt-get install ffmpeg brings it")
+    found = film(runs["hexahedra"], tmp_path / "film.mp4", times=[0.012, 0.03], title="A long title " * 9).read_bytes()
+    assert found[4:8] == b"ftyp" and len(found) > 3_000
 
 
 def test_rendering(runs: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

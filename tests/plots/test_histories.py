@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from kept_figures import keep_figures
 
-from vi_contact.plots import histories as plotting
-from vi_contact.plots import maps
+from demos.pictures import histories as plotting
 
 pytestmark = pytest.mark.serial
 pytest.importorskip("matplotlib")
@@ -42,7 +41,7 @@ def history(n: int = 401, m: int = 11) -> dict[str, Any]:
 @pytest.fixture
 def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """The figures that were saved, kept open to be looked into."""
-    return keep_figures(monkeypatch, plotting, maps)
+    return keep_figures(monkeypatch, plotting)
 
 
 DRAW = {
@@ -52,7 +51,7 @@ DRAW = {
     "excitation": plotting.plot_excitation,
     "energy": plotting.plot_energy,
     "certificate": plotting.plot_certificate,
-    "contact": lambda h, path: maps.plot_contact(h, path, position=np.linspace(0.75, 8.25, 11)),
+    "contact": lambda h, path: plotting.plot_contact(h, path, position=np.linspace(0.75, 8.25, 11)),
 }
 PANELS = {"points": 3, "excitation": 1, "energy": 2, "certificate": 2, "contact": 3}  # the colour bar is an axis too
 
@@ -120,7 +119,7 @@ def test_nothing_happened(tmp_path):
 
 def test_one_contact_point_is_visible(tmp_path, figures):
     """A map of one row has a height."""
-    maps.plot_contact(history(m=1), tmp_path / "c.png", position=np.array([4.0]))
+    plotting.plot_contact(history(m=1), tmp_path / "c.png", position=np.array([4.0]))
     mesh = figures[0].axes[0].collections[0]
     corners = mesh.get_coordinates()
     assert corners.shape[0] == 2 and np.ptp(corners[:, :, 1]) > 0.0
@@ -129,7 +128,7 @@ def test_one_contact_point_is_visible(tmp_path, figures):
 def test_held_points_that_pull_are_not_called_open(tmp_path, figures):
     h = history()
     h["pressure"] -= 1e5
-    maps.plot_contact(h, tmp_path / "c.png", position=np.linspace(0.75, 8.25, 11))
+    plotting.plot_contact(h, tmp_path / "c.png", position=np.linspace(0.75, 8.25, 11))
     low, high = figures[0].axes[0].collections[0].get_clim()
     assert low == -high == -np.abs(h["pressure"]).max() / 1e3
     assert "negative: pull" in figures[0].axes[-1].get_ylabel()
@@ -145,7 +144,7 @@ def test_the_users_matplotlib_is_left_alone(tmp_path):
 
 def test_contact_map_is_sorted_by_position(tmp_path, figures):
     h = history()
-    maps.plot_contact(h, tmp_path / "c.png", position=np.linspace(8.25, 0.75, 11))
+    plotting.plot_contact(h, tmp_path / "c.png", position=np.linspace(8.25, 0.75, 11))
     drawn = np.asarray(figures[0].axes[0].collections[0].get_array()).reshape(11, 401)
     np.testing.assert_allclose(drawn, h["pressure"][:, ::-1].T / 1e3)
     assert "[kPa]" in figures[0].axes[-1].get_ylabel()

@@ -25,11 +25,12 @@ from demos.pictures.channel_interface import (
     plot_rocking,
 )
 from demos.pictures.channel_mesh import animate, read_bodies
+from demos.pictures.histories import draw_histories
 from demos.problems.channel import Channel, ChannelModel, build
 from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.channel import ChannelMesh
-from vi_contact.plots.run_pictures import draw_run
+from vi_contact.plots.bodies import draw_run, film
 from vi_contact.run.files.reading import read_run
 from vi_contact.run.static import static_equilibrium
 
@@ -175,12 +176,12 @@ def test_the_film(run: Any, tmp_path: Path) -> None:
         "openings": {"top": opening(history, "19", (-1.0, 0.0))},
     }
     path = animate(folder, tmp_path / "channel.gif", **arguments)
-    with Image.open(path) as film:
-        assert film.n_frames == 3 and path.stat().st_size < 500_000
+    with Image.open(path) as moving:
+        assert moving.n_frames == 3 and path.stat().st_size < 500_000
         shots = []
         for k in range(3):
-            film.seek(k)
-            shots.append(np.asarray(film.convert("L"), dtype=float))
+            moving.seek(k)
+            shots.append(np.asarray(moving.convert("L"), dtype=float))
     assert min(np.mean(np.abs(one - two)) for one, two in zip(shots, shots[1:], strict=False)) > 0.5
     with pytest.raises(InputError, match=r"'film\.mp4'"):
         animate(folder, tmp_path / "film.mp4", **arguments)
@@ -188,8 +189,10 @@ def test_the_film(run: Any, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_pictures_of_a_plane_run_from_its_folder_alone(run: Any, tmp_path: Path) -> None:
-    """What a run of the command left is enough: histories, map of the contact, deformed bodies, film."""
+    """What a run of the command left is enough: deformed bodies, film; histories and the map of the contact."""
+    read = read_run(run[2])
     with plain_pictures():  # how they are arranged is seen above
-        drawn = [path.name for path in draw_run(read_run(run[2]), tmp_path, title="Channel")]
-    assert {"excitation.png", "energy.png", "certificate.png", "contact.png", "deformed.png", "film.gif"} <= set(drawn)
-    assert all((tmp_path / name).stat().st_size > 3_000 for name in drawn)
+        drawn = draw_run(read, tmp_path, title="Channel")
+        drawn += [film(read, tmp_path / "film.gif"), *draw_histories(read.history, read.contact, tmp_path, title="$")]
+    assert {path.name for path in drawn} >= {"deformed.png", "film.gif", "excitation.png", "energy.png", "contact.png"}
+    assert all(path.stat().st_size > 3_000 for path in drawn)

@@ -1,4 +1,4 @@
-"""Run folders read back, the page about a run, its commands, and the example of docs/guide/outputs.md."""
+"""Run folders read back, the pages of a report, its commands, and the example of docs/guide/outputs.md."""
 
 from __future__ import annotations
 
@@ -15,17 +15,22 @@ from typing import Any
 import numpy as np
 import pytest
 from chain import chain_problem
+from written_runs import write_run
 
 import vi_contact as vc
 from vi_contact import engineering
 from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
-from vi_contact.plots.report import header_facts, plot_report, table_rows
+from vi_contact.plots.charts import smoothed
+from vi_contact.plots.pages import write_pages
+from vi_contact.plots.sections import Section, header_facts, sections_of
 from vi_contact.run.files.reading import ContactGeometry, RunFolder, read_run
+from vi_contact.studies.report import report
 
 pytestmark = pytest.mark.serial
 pytest.importorskip("matplotlib")
 ROOT = Path(__file__).resolve().parents[2]
+G = 9.80665
 
 
 @pytest.fixture(scope="module")
@@ -80,61 +85,167 @@ def test_killed_and_damaged_runs(solved: tuple[Path, vc.Solution], tmp_path: Pat
         read_run(tmp_path / "nothing")
 
 
-def texts(run: RunFolder, monkeypatch: pytest.MonkeyPatch, **options: Any) -> tuple[list[Any], list[str]]:
-    """(panels, all words) of the page."""
-    from matplotlib.figure import Figure
+def pages(run: RunFolder, path: Path, monkeypatch: pytest.MonkeyPatch, sections: list[Section]) -> tuple[Any, Any]:
+    """(axes, all words) of the pages."""
+    from matplotlib.backends.backend_pdf import PdfPages
     from matplotlib.text import Text
 
-    kept: list[Figure] = []
-    monkeypatch.setattr(Figure, "savefig", lambda self, path, **more: kept.append(self))
-    plot_report(run, "page.png", **options)
-    axes = [axis for axis in kept[0].axes if axis.axison and not hasattr(axis, "_colorbar")]
-    words = [one.get_text() for one in kept[0].findobj(Text)]
-    tables = [table for axis in kept[0].axes for table in axis.tables]
-    words += [cell.get_text().get_text() for table in tables for cell in table.get_celld().values()]
-    return axes, words
-
-
-def test_page_of_a_channel(solved: tuple[Path, vc.Solution], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Facts, ten panels with labelled axes that hold something, maps by arc length, peaks; no warnings."""
-    run = channel(read_run(solved[0]))
+    kept: list[Any] = []
+    save = PdfPages.savefig
+    monkeypatch.setattr(PdfPages, "savefig", lambda self, figure: (kept.append(figure), save(self, figure)))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        axes, words = texts(run, monkeypatch, title="A channel")
-    assert len(axes) == 10
+        write_pages(path, "A channel $x", header_facts(run), sections, "vi_contact")
+    axes = [axis for figure in kept for axis in figure.axes if axis.axison and not hasattr(axis, "_colorbar")]
+    return axes, [one.get_text() for figure in kept for one in figure.findobj(Text)]
+
+
+def test_pages_of_a_channel(solved: tuple[Path, vc.Solution], monkeypatch: Any, tmp_path: Path) -> None:
+    """Every axis is labelled and holds something, maps go by arc length, texts stay on the page; no warnings."""
+    run = channel(read_run(solved[0]))
+    sections = sections_of(run, {})
+    axes, words = pages(run, tmp_path / "page.pdf", monkeypatch, sections)
+    assert [one.title for one in sections] == [
+        "Ground motion", "Base shear, thrust, uplift and sliding",
+        "Accelerations, low-passed and raw", "Histories", "Certificate and energies in words",
+        "Peak values of all columns",
+    ]
+    charts = sum(len(one.charts) + len(one.drawings) for one in sections)
+    assert len(axes) == charts > 11
     for axis in axes:
-        assert axis.get_xlabel() and axis.get_ylabel() and axis.get_title(loc="left")
-        assert axis.lines or axis.collections
+        assert axis.get_xlabel() and axis.get_ylabel() and (axis.lines or axis.collections)
+        box = axis.get_tightbbox()
+        size = axis.figure.bbox
+        assert box.x0 > 0.0 and box.x1 < size.x1 and box.y0 > 0.0 and box.y1 < size.y1, axis.get_title(loc="left")
     assert sum(axis.get_ylabel() == "arc length [m]" for axis in axes) == 2
-    said = " ".join(words)
-    for word in ("A channel", f"{run.facts['energy_defect']:.2e}", f"{run.history['certificate'].max():.2e}", "0.005 s",
-                 "ZienkiewiczWoodTaylor", "a_g_x", "contact_resultant", "u_x_end"):
+    said = " ".join(words).replace("\n", " ")
+    worst = run.history["certificate"].max()
+    for word in ("A channel $x", f"{run.facts['energy_defect']:.4g}", f"{worst:.1e}", "0.005 s", "a_g_x",
+                 "ZienkiewiczWoodTaylor", "contact_resultant", "u_x_end", "not convergent", "1e-09 was"):
         assert word in said, word
-    row = next(row for row in table_rows(run) if row.name == "u_x_end")
-    assert row.max == run.history["u_x_end"].max() and f"{row.max:.4g}" in said
+    assert f"{run.history['u_x_end'].max():.4g}" in said
+    assert (tmp_path / "page.pdf").read_bytes()[:5] == b"%PDF-"
 
 
-def test_page_without_motion_contact_and_energy(solved: tuple[Path, vc.Solution], monkeypatch: Any) -> None:
-    """A run that recorded one probe and was not shaken: its history and the certificates, nothing empty."""
+def test_what_was_not_recorded_has_no_section(solved: tuple[Path, vc.Solution]) -> None:
+    """A run that recorded one probe and was not shaken: its history, the certificates, the peaks; chosen columns."""
     run = read_run(solved[0])
     names = ("t", "k", "iterations", "certificate", "escalated", "a_g_x", "u_x_end")
     bare = replace(run, history={name: run.history[name] for name in names} | {"a_g_x": np.zeros(301)}, contact=None,
                    columns={name: run.columns[name] for name in names})
-    axes, _ = texts(bare, monkeypatch)
-    assert [axis.get_title(loc="left") for axis in axes] == ["displacement", "certificate of every step"]
-    chosen, _ = texts(run, monkeypatch, columns=[["N_right", "contact_resultant"]])
-    assert "N_right, contact_resultant" in [axis.get_title(loc="left") for axis in chosen]
+    found = sections_of(bare, {})
+    assert [one.title for one in found] == ["Histories", "Certificate and energies in words",
+                                            "Peak values of all columns"]
+    assert [chart.title for one in found for chart in one.charts] == ["displacement", "certificate of every step"]
+    chosen = sections_of(run, {}, [["N_right", "contact_resultant"]])
+    (histories,) = (one for one in chosen if one.title == "Histories")
+    assert [chart.title for chart in histories.charts] == ["N_right, contact_resultant"]
     for columns, text in (([["nonsense"]], "no column 'nonsense'"), ([["N_right", "u_x_end"]], "different units")):
         with pytest.raises(InputError, match=text):
-            plot_report(run, "page.png", columns=columns)
-    with pytest.raises(InputError, match="is a .png"):
-        plot_report(run, "page.doc")
+            sections_of(run, {}, columns)
+    with pytest.raises(InputError, match="is an .html or a .pdf file"):
+        report(solved[0], out=solved[0] / "page.doc")
+
+
+def table(sections: list[Section], title: str, place: int = 0) -> dict[str, dict[str, str]]:
+    """Rows of a table of a section by their first cell, or the column they are about."""
+    (section,) = (one for one in sections if one.title.startswith(title))
+    found = section.tables[place]
+    rows = [dict(zip(found.header, row, strict=True)) for row in found.rows]
+    return {row.get("column", row[found.header[0]]): row for row in rows}
+
+
+def test_numbers_of_the_report(tmp_path: Path) -> None:
+    """Closed forms: peaks, height at the largest thrust, what is left of the slip, safety, a sine with the jump of
+    one step, the spectrum of a harmonic motion at short periods, the ledger over its largest energy."""
+    dt, n = 0.005, 2001
+    t = dt * np.arange(n)
+    thrust = 1e5 * (1.0 + np.sin(np.pi * t / t[-1]))  # largest in the middle
+    jump = np.zeros(n)
+    jump[700] = 300.0
+    columns = {
+        "a_g_x": ("m/s2", "ground", 2.0 * np.sin(2.0 * np.pi * t)), "reaction_x_base": ("N", "shear", -3.0 * thrust),
+        "N_stem": ("N", "thrust", thrust), "T_stem": ("N", "shear", -0.2 * thrust),
+        "height_stem": ("m", "height", np.where(t < 0.02, np.nan, 1.0 + t)), "sliding_stem": ("m", "slip", 1e-3 * t),
+        "margin_stem": ("-", "margin", np.where(t < 0.02, np.nan, 0.6 + 0.2 * np.cos(np.pi * t / t[-1]))),
+        "a_x_top": ("m/s2", "acceleration", 4.0 * np.sin(4.0 * np.pi * t) + jump),
+        "energy_kinetic": ("J", "kinetic", np.full(n, 3.0)), "energy_strain": ("J", "strain", np.full(n, 5.0)),
+        "work_input": ("J", "work", 2.0 * t), "energy_defect": ("J", "defect", np.full(n, 8e-13)),
+    }
+    found = sections_of(read_run(write_run(tmp_path / "run", columns, dt=dt)), {})
+    rows = table(found, "Base shear")
+    assert rows["reaction_x_base"]["largest in size"] == "-600" and rows["reaction_x_base"]["unit"] == "kN"
+    assert rows["N_stem"]["largest in size"] == "200" and rows["N_stem"]["at t [s]"] == "5"
+    assert rows["height_stem"]["largest in size"] == "6" and rows["sliding_stem"]["at the end"] == "10"
+    assert rows["sliding_stem"]["at the start"] == "0" and rows["sliding_stem"]["unit"] == "mm"
+    safety = table(found, "Base shear", 1)["stem"]
+    assert safety["factor of safety against sliding, smallest"] == "1.667" == safety["at the end"]  # 1 / (1 - 0.4)
+    (row,) = table(found, "Accelerations").values()
+    low, raw = (float(row[name]) for name in ("peak below 25 Hz [m/s²]", "raw peak, not convergent at impacts [m/s²]"))
+    assert raw == pytest.approx(300.0)  # the sine is zero there
+    fall = 2.0 * 25.0 * (np.pi / 8.0) / np.sin(np.pi / 8.0)  # ∫ df / (1 + (f / 25 Hz)⁸)
+    assert low == pytest.approx(300.0 * dt * fall, rel=0.05)
+    (motion,) = (one for one in found if one.title == "Ground motion")
+    (_, spectrum) = motion.charts
+    full = spectrum.lines[1]
+    assert full.x[0] == pytest.approx(0.02) and spectrum.lines[0].x[0] >= 10.0 * dt > full.x[0]
+    assert full.y[0] * G == pytest.approx(2.0, rel=0.02)  # stiff oscillators feel the ground's own peak
+    assert table(found, "Certificate")["kinetic"]["over the largest energy"] == "0.375"
+    (certificate,) = (one for one in found if one.title.startswith("Certificate"))
+    assert "1.0e-13 of the largest energy (8 J)" in certificate.sentences[2]
+
+
+def test_low_passed_peaks_converge_where_raw_ones_do_not() -> None:
+    """A velocity jump of 1 m/s in one step: raw peaks double with every half step, those below 25 Hz are 51 m/s²."""
+    found = []
+    for dt in (4e-3, 2e-3, 1e-3):
+        a = np.zeros(round(4.0 / dt) + 1)
+        a[len(a) // 2] = 1.0 / dt
+        run = RunFolder(Path(), {"t": dt * np.arange(len(a)), "a_x_top": a}, {"a_x_top": ("m/s2", "a")}, {}, None)
+        raw, low, corner = smoothed(run, "a_x_top")
+        assert raw.acceleration.max() == 1.0 / dt and corner == 25.0
+        found.append(low.acceleration.max())
+    limit = 50.0 * (np.pi / 8.0) / np.sin(np.pi / 8.0)
+    errors = np.abs(np.array(found) / limit - 1.0)
+    assert errors[0] < 0.06 and np.all(errors[1:] < 0.3 * errors[:-1]), errors
+
+
+def test_the_model_as_it_was_described(tmp_path: Path) -> None:
+    """Bodies, supports, contact, periods and sketch of model.json; odd and damaged ones are no tracebacks."""
+    wave = np.sin(np.arange(40.0))
+    model = {
+        "title": "$", "dimension": 2, "mass": 1.5e4, "periods": [0.5, 0.25, 0.125], "warnings": ["dt is long"],
+        "bodies": [{"name": "wall", "cells": 8, "mass": 1.5e4, "material": {"name": "C30", "E": 3e10}}],
+        "supports": [{"kind": "clamped", "groups": ["base", "toe"], "components": ["x", "y"]}],
+        "contact": [{"name": "stem", "points": 2, "size": 4.0, "friction": "0.5", "places": [[0.0, 1.0], [0.0, 2.0]]}],
+        "outline": [{"group": "base", "lines": [[0.0, 0.0, 3.0, 0.0]]}, {"group": "", "lines": [[0, 0, 0, 4.0]]}],
+    }
+    folder = write_run(tmp_path / "run", {"u_x_top": ("m", "u", wave)}, dt=0.1, model=model)
+    run = read_run(folder)
+    section = sections_of(run, model)[0]
+    assert section.sentences[-2].endswith("at the start: 0.5, 0.25, 0.125 s.")
+    assert section.sentences[-1] == "Warning: dt is long."
+    assert [list(one.header) for one in section.tables] == [
+        ["name", "cells", "mass", "material"], ["kind", "groups", "components"], ["name", "points", "size", "friction"]
+    ]
+    assert section.tables[0].rows[0][-1] == "name = C30, E = 3e+10"
+    _, written = report(folder, out=tmp_path / "page.pdf")
+    assert [path.name for path in written] == ["page.pdf", "peaks.csv", "model.png"]
+    deep: Any = []
+    for _ in range(900):
+        deep = [deep]
+    for odd in (None, 5, "x", [5], {"a": deep}, deep):
+        keys = ("bodies", "supports", "waves", "periods", "mass", "warnings", "records", "contact")
+        assert sections_of(run, dict.fromkeys(keys, odd))
+        (folder / "model.json").write_text(json.dumps(model | {"outline": odd, "contact": odd}))
+        with pytest.raises(InputError, match=r"model\.json' is damaged"):
+            report(folder, out=tmp_path / "page.pdf")
 
 
 def test_commands(solved: tuple[Path, vc.Solution], capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """Every command writes what it says; mistakes are one sentence."""
     folder, run = solved
-    assert main(["report", str(folder)]) == 0
+    assert main(["report", str(folder), "--out", str(folder / "report.pdf")]) == 0
     assert (folder / "report.pdf").read_bytes()[:5] == b"%PDF-"
     numbers = [name for name in run.columns if run.history[name].ndim == 1]
     counters = ("t", "k", "iterations", "escalated")
@@ -152,6 +263,10 @@ def test_commands(solved: tuple[Path, vc.Solution], capsys: pytest.CaptureFixtur
     for wrong, text in (
         (["report", str(tmp_path)], "no history.csv"),
         (["report", str(folder), "--out", str(tmp_path / "no" / "page.pdf")], "folder that exists"),
+        (["report", str(folder), "--out", str(tmp_path / "page.svg")], "is an .html or a .pdf file"),
+        (["report", str(folder), "--refine"], "holds no case.toml"),
+        (["plot", str(folder)], "no frames in"),
+        (["film", str(folder), "--out", str(tmp_path / "x.mp4")], "no frames in"),
         (["post", "loop", str(folder), "u_x_end", "nothing"], "no column 'nothing'"),
         (["post", "spectrum", str(folder), "u_x_end"], "no acceleration"),
     ):
@@ -180,4 +295,4 @@ def test_example_of_the_documentation(tmp_path: Path) -> None:
     described = json.loads((run.folder / "columns.json").read_text())
     for name in ("uplift_face", "height_upper", "theta_face", "racking_wall", "reaction_M_base", "M_third", "a_x_top"):
         assert described[name]["unit"] and name in run.history
-    assert plot_report(run, tmp_path / "page.png").stat().st_size > 50_000
+    assert vc.studies.report(run.folder, out=tmp_path / "page.pdf")[1][0].stat().st_size > 30_000

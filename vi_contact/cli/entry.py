@@ -27,10 +27,12 @@ def parser(command: str = "") -> argparse.ArgumentParser:
     add_ida_commands(commands)
     if command not in commands.choices:
         from .motion import add_motion_commands
-        from .report import add_report_commands
+        from .pictures import add_picture_commands
+        from .post import add_post_commands
 
         add_motion_commands(commands)
-        add_report_commands(commands)
+        add_picture_commands(commands)
+        add_post_commands(commands)
     return top
 
 

@@ -13,7 +13,7 @@ from ..core.files import write_csv
 from ..core.step import Columns
 
 HEADER = ("name", "quantity", "unit", "max", "t_max", "min", "t_min")
-GROWS = "; at impacts its peak depends on dt"
+GROWS = "; raw, not convergent at impacts: it grows as dt falls"
 _NOT_PEAKS = ("t", "k", "iterations", "escalated")
 
 

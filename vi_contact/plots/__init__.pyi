@@ -1,21 +1,15 @@
 # ruff: noqa
 # Made from __init__.py by docs/make_api.py, for checkers of types and editors.
+from .bodies import draw_run as draw_run
 from .bodies import film as film
 from .bodies import plot_deformed as plot_deformed
 from .deformed import read_frames as read_frames
 from .faces import plot_faces as plot_faces
-from .histories import plot_certificate as plot_certificate
-from .histories import plot_energy as plot_energy
-from .histories import plot_excitation as plot_excitation
-from .histories import plot_points as plot_points
-from .maps import plot_contact as plot_contact
 from .overview import plot_overview as plot_overview
 from .records import plot_loop as plot_loop
 from .records import plot_motion as plot_motion
 from .records import plot_spectra as plot_spectra
 from .records import plot_transfer as plot_transfer
-from .report import plot_report as plot_report
-from .run_pictures import draw_run as draw_run
 from .studies import plot_ida as plot_ida
 
-__all__: list[str] = ['draw_run', 'film', 'plot_certificate', 'plot_contact', 'plot_deformed', 'plot_energy', 'plot_excitation', 'plot_faces', 'plot_ida', 'plot_loop', 'plot_motion', 'plot_overview', 'plot_points', 'plot_report', 'plot_spectra', 'plot_transfer', 'read_frames']
+__all__: list[str] = ['draw_run', 'film', 'plot_deformed', 'plot_faces', 'plot_ida', 'plot_loop', 'plot_motion', 'plot_overview', 'plot_spectra', 'plot_transfer', 'read_frames']

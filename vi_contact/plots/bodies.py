@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,10 @@ import numpy as np
 from ..core.algebra import Array, Indices
 from ..core.checks import number, optional
 from ..core.errors import InputError
+from ..core.files import frames_of
 from ..run.files.reading import ContactGeometry, RunFolder
-from .deformed import nearest, plane_normals, read_frames
-from .faces import Painter, add_polygons, faces_of, leading, limit, moments, sheet
+from .deformed import contact_states, nearest, plane_normals, read_frames
+from .faces import Painter, add_polygons, faces_of, leading, limit, moments, name_states, plot_faces, sheet
 from .histories import STYLE, plain, save, scale, scaled, shaken
 
 DRAWN = 0.1  # of the size of the bodies: how large their largest displacement is drawn, if it is not larger
@@ -29,7 +31,7 @@ class Scene:
 
     ``points`` (s, d) [m] of their nodes; ``polygons`` (p, corners), the number of the ``body`` (p,) of each; u (k, s,
     d) [m], drawn ``magnified`` times; von Mises stresses (k, p) [Pa]. ``contact``: where it was recorded its
-    conditions, their nodes (m,), the ``sides`` (n, corners) of elements between them and pressures (k, m) [Pa].
+    conditions, their nodes (m,), the ``sides`` (n, corners) of elements between them, pressures [Pa] and states (k, m).
     """
 
     times: Array
@@ -43,6 +45,7 @@ class Scene:
     sides: Indices
     nodes: Indices
     pressure: Array
+    states: Array
 
     @classmethod
     def of(cls, run: RunFolder, times: Sequence[float], magnified: float | None) -> "Scene":
@@ -59,10 +62,13 @@ class Scene:
         seen = np.union1d(corners, nodes)  # of degree 2 contact is at mid-points too
         u, stress = map(np.array, zip(*((u[seen], s[cells]) for _, u, s in map(frames.at, found)), strict=True))
         size, largest = float(np.ptp(frames.points[seen], axis=0).max()), float(np.linalg.norm(u, axis=2).max())
-        pressure = np.zeros((len(found), 0)) if contact is None else history["pressure"][nearest(history["t"], found)]
+        rows, pressure = nearest(history["t"], found), np.zeros((len(found), 0))
+        states = pressure
+        if contact is not None:
+            pressure, states = history["pressure"][rows], contact_states(history)[rows]
         return cls(found, frames.points[seen], np.searchsorted(seen, corners), frames.bodies[cells], u, stress,
                    magnified or _round_down(DRAWN * size / (largest or np.inf)), contact, sides,
-                   np.searchsorted(seen, nodes), pressure)
+                   np.searchsorted(seen, nodes), pressure, states)
 
     @property
     def up(self) -> str:
@@ -89,11 +95,12 @@ class Scene:
         """Return the colours of the pressures."""
         return Painter.of_pressure(self.pressure)
 
-    def draw(self, axis: Any, k: int) -> None:
+    def draw(self, axis: Any, k: int, states: bool = False) -> None:
         """Draw the bodies at the time number k, each with edges of a colour of its own; in the plane dots inside of
-        them with the contact pressure, those of both sides of a corner apart."""
+        them with the contact pressure, or the ``states`` of the points, those of both sides of a corner apart."""
         moved, colours = self.moved(k), self.stresses.colours(self.stress[k])
         flat, polygons = moved.shape[1] == 2, moved[self.polygons]
+        colours = np.full_like(colours, 0.95) if states else colours
         if not flat:
             colours[:, :3] *= 0.6 + 0.4 * np.abs(plane_normals(polygons) @ LIGHT)[:, None]
         edges = [BODIES[body % len(BODIES)] for body in self.body]
@@ -103,7 +110,8 @@ class Scene:
         limit(axis, every.min(axis=0), every.max(axis=0), margin=0.03, up=self.up)
         if flat and self.contact is not None:
             inwards = INWARDS * float(np.ptp(self.points, axis=0).max()) * self.contact.normals
-            self.pressures.dots(axis, moved[self.nodes] - inwards, self.pressure[k])
+            painter, values = (Painter.of_states(), self.states) if states else (self.pressures, self.pressure)
+            painter.dots(axis, moved[self.nodes] - inwards, values[k])
 
 
 def _round_down(factor: float) -> float:
@@ -118,46 +126,56 @@ def plot_deformed(
 ) -> Path:
     """Draw the bodies of a run with fields, in plane or space, in the frames next to ``times`` [s] (None: the first,
     the last, and when most happens), coloured by von Mises stress, the edges of elements by body; in the plane dots
-    show the contact pressure. In space y points upwards where contact is along y rather than z, else z.
+    show the contact pressure, and below which points are open, stick and slip. In space y points upwards where contact
+    is along y rather than z, else z.
 
     ``magnified``: how many times larger displacements are drawn; a round number that shows them when None. InputError
     for a run without fields or in one dimension.
     """
     scene = Scene.of(run, moments(run.history) if times is None else times, magnified)
-    figure, axes = sheet([scene.points.shape[1] == 2], len(scene.times), (4.2, 3.8))
-    for k, axis in enumerate(axes[0]):
-        scene.draw(axis, k)
-        axis.set_title(f"t = {scene.times[k]:.4g} s", fontsize=9)
+    flat = scene.points.shape[1] == 2
+    with_states = flat and scene.contact is not None
+    figure, axes = sheet([flat] * (1 + with_states), len(scene.times), (4.2, 3.8))
+    for row, line in enumerate(axes):
+        for k, axis in enumerate(line):
+            scene.draw(axis, k, states=row > 0)
+            axis.set_title(f"t = {scene.times[k]:.4g} s", fontsize=9)
     scene.stresses.bar(figure, list(axes[0]), extend="max")
-    if scene.points.shape[1] == 2 and scene.contact is not None:
+    if with_states:
         scene.pressures.bar(figure, list(axes[0]))
+        name_states(figure, "slip" in run.history)
     return save(figure, path, _headed(title, scene))
 
 
 def _headed(title: str, scene: Scene) -> str:
-    return plain(title) + (f" (displacements x {scene.magnified:g})" if scene.magnified != 1.0 else "")
+    """A title on lines that fit above the picture."""
+    told = f" (displacements x {scene.magnified:g})" if scene.magnified != 1.0 else ""
+    return "\n".join(wrap(plain(title) + told, 64))
 
 
 def film(
     run: RunFolder, path: str | Path, *, times: Sequence[float] | None = None, magnified: float | None = None,
     column: str | None = None, title: str = "", fps: int = 10,
 ) -> Path:
-    """Write a GIF of the frames next to ``times`` [s] (None: up to 48 around the one in which most happens): the bodies
-    as ``plot_deformed`` draws them, in space beside them the pressure on each contact face, and below a ``column`` of
-    the history with the moment marked, and dashed the acceleration of the ground.
+    """Write a GIF or, by ffmpeg, an MP4 of the frames next to ``times`` [s] (None: up to 48 around that in which most
+    happens): the bodies as ``plot_deformed`` draws them, in space beside them the pressure on each contact face, and
+    below a ``column`` of the history with the moment marked, and dashed the acceleration of the ground.
 
-    InputError for another kind of file, a column that the run does not have, and as ``plot_deformed``.
+    InputError for another kind of file, .mp4 without ffmpeg, a column that the run does not have, and as
+    ``plot_deformed``.
     """
     import matplotlib
-    from matplotlib.animation import PillowWriter
+    from matplotlib.animation import FFMpegWriter, PillowWriter
     from matplotlib.figure import Figure
 
-    if Path(path).suffix != ".gif":
-        raise InputError(f"films are GIF files: name '{Path(path).name}' so, or draw moments with plot_deformed")
+    if Path(path).suffix not in (".gif", ".mp4"):
+        raise InputError(f"films are .gif or .mp4 files: name '{Path(path).name}' so, or draw moments: plot_deformed")
+    if Path(path).suffix == ".mp4" and not FFMpegWriter.isAvailable():
+        raise InputError("an .mp4 needs ffmpeg, which is not found: install it, or name the film .gif")
     scene = Scene.of(run, _around(run) if times is None else times, magnified)
     flat, contact = scene.points.shape[1] == 2, scene.contact
     faces = [] if flat or contact is None else faces_of(contact, scene.sides)
-    writer = PillowWriter(fps=fps)
+    writer = (PillowWriter if Path(path).suffix == ".gif" else FFMpegWriter)(fps=fps)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(6.6 + 3.4 * len(faces), 6.0), layout="constrained")
         wide = [1.6, *[1.0] * len(faces)]
@@ -209,3 +227,20 @@ def _trace(axis: Any, run: RunFolder, column: str, times: Array) -> Any:
             behind.plot(history["t"], history[f"a_g_{ground}"], color="0.6", lw=0.9, ls="--")
         behind.set_ylabel("$a_g$ [m/s²]", color="0.4")
     return axis.axvline(times[0], color="tab:red", lw=1.2)
+
+
+def draw_run(
+    run: RunFolder, out: str | Path, *, title: str, times: Sequence[float] | None = None,
+    magnified: float | None = None,
+) -> list[Path]:
+    """Draw into the folder ``out`` what a run has data for: with fields deformed.png, the bodies and their contact, and
+    in space with ``Contact()`` faces.png, next to the ``times`` [s] (None: the first, the last, and when most happens).
+
+    ``magnified``: how many times larger displacements are drawn, None: so that they are seen.
+    """
+    drawn, contact, history = [], run.contact, run.history
+    if frames_of(run.folder) and read_frames(run).cells.shape[1] > 2:  # no bars
+        drawn.append(plot_deformed(run, Path(out) / "deformed.png", times=times, magnified=magnified, title=title))
+    if contact is not None and contact.points.shape[1] == 3 and "active" in history:
+        drawn.append(plot_faces(run, Path(out) / "faces.png", times=times, title=title))
+    return drawn

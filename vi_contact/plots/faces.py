@@ -216,7 +216,7 @@ def plot_faces(
             _arrows(under, face, drawn * slip[column])
             over.set_title(f"{face.name}, t = {history['t'][row]:.4g} s", fontsize=9)
     painter.bar(figure, list(axes.ravel()))
-    _legend(figure, longest, "slip" in history)
+    name_states(figure, "slip" in history, longest)
     return save(figure, path, plain(title))
 
 
@@ -242,8 +242,8 @@ def _arrows(axis: Any, face: Face, slip: Array) -> None:
         axis.quiver(*ends, *ways, color="black", **(flat if face.axes is not None else {"lw": 0.8}))
 
 
-def _legend(figure: Any, longest: float, frictional: bool) -> None:
-    """What the colours of the states mean, and how long the longest arrow is."""
+def name_states(figure: Any, frictional: bool, longest: float = 0.0) -> None:
+    """Write below what the colours of the states mean and, where there are arrows, how long the longest is [m]."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 

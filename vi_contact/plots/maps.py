@@ -1,15 +1,18 @@
 """Draw maps of contact quantities over position and time, for surfaces that are lines: straight, bent or U-shaped."""
 
-from pathlib import Path
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..core.algebra import Array, Indices
-from .histories import History, cell_edges, panels, save, scaled
+from .histories import cell_edges, scaled
 
 STRAIGHT = 1e-6  # of its length: what a line of points may deviate
+NO_GAP = 1e-15  # of the length of the contact line
 ROWS = 1200  # of a map: more instants than a page has dots are gathered
+Drawing = Callable[[Any], None]  # draws on one axis
 
 
 def arc_position(points: Array, normals: Array | None = None) -> tuple[Array, str]:
@@ -63,30 +66,15 @@ def draw_map(
     axis: Any, t: Array, position: Array, values: Array, unit: str, *, title: str, axis_label: str, colours: str
 ) -> None:
     """Draw values (rows, m) as colours, zero white; points at the same place (corners) side by side in their order."""
-    image, prefixed, _ = _coloured(axis, t, position, values, unit, colours)
+    image, prefixed, _ = coloured(axis, t, position, values, unit, colours)
     axis.figure.colorbar(image, ax=axis, pad=0.02, fraction=0.06)
     axis.set(xlabel="time [s]", ylabel=axis_label)
     axis.set_title(f"{title} [{prefixed}] (white: none)", loc="left")
 
 
-def plot_contact(history: History, path: str | Path, *, position: Array, axis_label: str = "position [m]") -> Path:
-    """Draw a map of contact pressure over position and time, and the uplift ratio. ``position``: (m,) of the points.
-
-    Open points are white; held points that pull are blue.
-    """
-    figure, (top, bottom) = panels(2, (9.0, 6.0), height_ratios=(3, 1))
-    pressure = np.reshape(history["pressure"], (len(history["t"]), -1))
-    image, unit, pulling = _coloured(top, history["t"], position, pressure, "Pa", "magma_r")
-    meaning = "negative: pull" if pulling else "white: open"
-    figure.colorbar(image, ax=top, label=f"contact pressure [{unit}] ({meaning})")
-    top.set(ylabel=axis_label, title="Contact pressure")
-    bottom.plot(history["t"], history["contact_uplift"], color="black", lw=0.9)
-    bottom.set(ylabel="uplift ratio [-]", ylim=(-0.05, 1.05))
-    return save(figure, path)
-
-
-def _coloured(axis: Any, t: Array, position: Array, values: Array, unit: str, colours: str) -> tuple[Any, str, bool]:
-    """(image, unit with its prefix, whether some values are negative): from white upwards, or to both sides of it."""
+def coloured(axis: Any, t: Array, position: Array, values: Array, unit: str, colours: str) -> tuple[Any, str, bool]:
+    """Draw values in colours: return (image, unit with its prefix, whether some are negative), from white upwards or to
+    both sides of it."""
     from matplotlib import colormaps
 
     order = np.argsort(position, kind="stable")
@@ -100,3 +88,24 @@ def _coloured(axis: Any, t: Array, position: Array, values: Array, unit: str, co
         cell_edges(t), cell_edges(position[order]), shown.T, cmap=palette, vmin=low, vmax=size, rasterized=True
     )
     return image, prefixed, pulling
+
+
+def maps_of(run: Any) -> list[Drawing]:
+    """Return what draws the maps of the contact line of a run, of its pressure and, if it opens, of its opening."""
+    contact, history = run.contact, run.history
+    if contact is None or "pressure" not in history or contact.points.shape[1] != 2 or len(contact.points) < 3:
+        return []
+    shown = [("pressure", "Pa")] if np.any(history["pressure"]) else []
+    size = float(np.ptp(contact.points, axis=0).max())
+    if float(np.max(history["gap"])) > NO_GAP * size:
+        shown.append(("gap", "m"))
+    return [partial(_map, run=run, column=column, unit=unit) for column, unit in shown]
+
+
+def _map(axis: Any, run: Any, column: str, unit: str) -> None:
+    position, label = arc_position(run.contact.points, run.contact.normals)
+    values = np.reshape(run.history[column], (len(run.history["t"]), -1))
+    open_gap = column == "gap"
+    t, shown = thinned(run.history["t"], np.maximum(values, 0.0) if open_gap else values)
+    draw_map(axis, t, position, shown, unit, title="opening" if open_gap else "contact pressure", axis_label=label,
+             colours="Blues" if open_gap else "magma_r")

@@ -1,7 +1,7 @@
 """Study a problem that is written down: case files, and many runs of one case.
 
 ``read_case(path)`` reads a TOML file whose tables are calls of the Python interface, its ``run(comm)`` computes it;
-``run_ida`` makes an incremental dynamic analysis of it: docs/guide/studies.md.
+``run_ida`` makes an incremental dynamic analysis of it: docs/guide/studies.md; ``report(folder)`` reports on a run.
 >>> from vi_contact.studies import read_case
 >>> from vi_contact.studies.cases.library import located  # of the cases that ship
 >>> read_case(located("wall"), ["run.steps=10"]).tables["run"]["steps"]
@@ -10,5 +10,6 @@
 
 from ..core.lazy import lazy
 
-_CONTENTS = {"cases.case": ("Case", "read_case"), "cases.checks": ("comparisons",), "ida.ida": ("IDA", "run_ida")}
+_CONTENTS = {"cases.case": ("Case", "read_case"), "cases.checks": ("comparisons",), "ida.ida": ("IDA", "run_ida"),
+             "refinement": ("refine",), "report": ("report",)}
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

@@ -17,6 +17,7 @@ STARTERS = Path(__file__).parents[1] / "starters"  # cases to begin with: copied
 COPY = "case.toml"
 FORMAT = 1  # of case files
 _SET = "# set "  # before a setting, in the copy
+_FROM = "# its paths are relative to "  # before a folder, in the copy
 _RETIRED = {"beam": "timoshenko_beam", "layer": "particle_layer"}  # cases of before -> demos that draw the same
 _SUPPORTS = "clamped, prescribed, tied and dashpots in [system]"
 _OF_MODELS: Mapping[str, Mapping[str, str]] = {  # case -> keys of its [model] of before -> where they are in its file
@@ -98,16 +99,26 @@ def check_format(path: Path, tables: Mapping[str, Any]) -> None:
 
 
 def base_folder(path: Path) -> Path:
-    """Return the folder to which relative paths of a case belong: its own, or where one is, for those that ship."""
-    return Path() if path.parent == FOLDER else path.parent
+    """Return the folder to which relative paths of a case belong: its own, where one is for those that ship, of a copy
+    in a run folder that of the case it was made from."""
+    own = Path() if path.parent == FOLDER else path.parent
+    told = _marked(path, _FROM) if path.name == COPY else []
+    return Path(told[0]) if told else own
+
+
+def _marked(path: Path, mark: str) -> list[str]:
+    """What follows a mark at the beginnings of lines."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    return [line.removeprefix(mark) for line in lines if line.startswith(mark)]
 
 
 def keep_copy(path: Path, settings: Sequence[str], folder: Path, comm: Comm) -> None:
     """Write a copy of the case file into the run folder, with the settings as comments. Collective."""
     made = "".join(f"{_SET}{' '.join(setting.split(chr(10)))}\n" for setting in settings)
+    made += f"{_FROM}{base_folder(path).resolve()}\n"
 
     def copy() -> None:
-        text = re.sub(rb"(?m)^# set ", b"# once set ", path.read_bytes())  # of the run that this is a copy of
+        text = re.sub(rb"(?m)^# (set|its paths) ", rb"# once \1 ", path.read_bytes())  # of the run this is a copy of
         if (folder / COPY).resolve() != path.resolve():
             write_atomically(folder / COPY, made.encode() + text)
 
@@ -119,6 +130,9 @@ def read_copy(folder: Path) -> dict[str, Any]:
     path = folder / COPY
     if not path.is_file():
         return {}
-    tables = read_toml(path)
-    lines = path.read_text(encoding="utf-8").splitlines()
-    return with_settings(tables, [line.removeprefix(_SET) for line in lines if line.startswith(_SET)])
+    return with_settings(read_toml(path), copied_settings(folder))
+
+
+def copied_settings(folder: Path) -> list[str]:
+    """Return the settings KEY=VALUE that were made when the case of a run folder ran."""
+    return _marked(folder / COPY, _SET)

@@ -1,4 +1,4 @@
-"""``vi-contact report`` and ``vi-contact post peaks|spectrum|transfer|loop|checks``: options and what each does."""
+"""``vi-contact post peaks|spectrum|transfer|loop|checks``: options and what each does."""
 
 import argparse
 from pathlib import Path
@@ -9,25 +9,14 @@ from ..core.files import write_csv
 from ..engineering import floor_spectrum, hysteresis, peaks, recorded_motion, transfer_function, write_peaks
 from ..plots.records import plot_loop, plot_spectra, plot_transfer
 from ..run.files.folder import FILES
-from ..studies.cases.library import read_copy, refuse_retired
 from .options import PICTURES, add_actions, output_file, spaced
 
 if TYPE_CHECKING:
     from ..run.files.reading import RunFolder
 
 
-def add_report_commands(commands: Any) -> None:
-    """Add ``report`` and ``post`` to the commands of the top parser."""
-    report = commands.add_parser(
-        "report", help="one page about a run, and its pictures", description="One page about a run, from the files in "
-        "its folder alone, and beside it its peak values in peaks.csv and its pictures."
-    )
-    report.add_argument("folder", metavar="DIR", help="output folder of a run")
-    report.add_argument("--out", metavar="FILE", help=".pdf, .png or .svg (default DIR/report.pdf)")
-    report.add_argument("--title", help="default: that of the case, or the name of the folder")
-    report.add_argument("--show", metavar="COLUMN[,COLUMN...]", action="append",
-                        help="a panel with these columns, of one unit; repeat for more (default: the page chooses)")
-    report.set_defaults(run=_report)
+def add_post_commands(commands: Any) -> None:
+    """Add ``post`` to the commands of the top parser."""
     parsers = add_actions(commands, "post", "numbers and pictures from the folder of a run", {
         "peaks": (_peaks, "largest and smallest value of every column, as a table"),
         "spectrum": (_spectrum, "floor response spectra of recorded accelerations, as CSV and picture"),
@@ -54,24 +43,6 @@ def add_report_commands(commands: Any) -> None:
     loop.add_argument("deformation", metavar="DEFORMATION", help="column such as u_x_top or theta_base")
     loop.add_argument("force", metavar="FORCE", help="column such as reaction_x_base or M_base")
     loop.add_argument("--turn", action="store_true", help="turn the sign of the force")
-
-
-def _report(options: argparse.Namespace) -> str:
-    from ..plots.report import plot_report
-    from ..plots.run_pictures import draw_run
-
-    folder = Path(options.folder)
-    tables = read_copy(folder)
-    refuse_retired(tables)
-    run = _run(options)
-    out = output_file(options.out or folder / "report.pdf", picture=True)
-    title = str(options.title or tables.get("title") or f"Run {folder.resolve().name}")
-    shown = None if options.show is None else [one.split(",") for one in options.show]
-    page = plot_report(run, out, title=title, columns=shown)
-    table = write_peaks(out.with_name("peaks.csv"), peaks(run.history, run.columns))
-    drawn = draw_run(run, out.parent, title=title)
-    pictures = ", ".join(path.name for path in drawn)
-    return f"report: {page}\ntable: {table}\npictures in {drawn[0].parent}: {pictures}"
 
 
 def _run(options: argparse.Namespace) -> "RunFolder":

@@ -1,0 +1,75 @@
+"""Report on the run of a case: what its folder holds, the checks that the case asks for, and its discretisation."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ..core.errors import InputError
+from ..core.version import __version__
+from ..engineering.peak_values import peaks, write_peaks
+from ..plots.bodies import draw_run
+from ..plots.histories import save
+from ..plots.pages import write_pages
+from ..plots.sections import Section, Table, header_facts, number, sections_of
+from ..plots.sketch import sketch
+from ..plots.web_page import can_write, write_web_page
+from ..run.files.folder import MODEL
+from ..run.files.reading import read_object, read_run
+from .cases.checks import comparisons
+from .cases.library import read_copy, refuse_retired
+from .refinement import refinement
+
+WRITERS = {".html": write_web_page, ".pdf": write_pages}
+
+
+def report(
+    folder: str | Path, *, out: str | Path | None = None, title: str | None = None,
+    columns: Sequence[Sequence[str]] | None = None, failed: Mapping[str, str] | None = None,
+) -> tuple[Section, list[Path]]:
+    """Write the report on a run folder, the table peaks.csv and the pictures beside it; return what it says of
+    discretisation error, and their paths.
+
+    ``out``: an .html or .pdf file; None: report.pdf in the folder and, with jinja2 and plotly, report.html.
+    ``columns``: groups of columns of one unit, a chart each, in place of those that move; ``failed``: what ``refine``
+    returned. What has no data is left out. InputError as of ``read_run``, for a run of one row, columns that do not
+    exist, another kind of file, .html without jinja2 and plotly, and a damaged model.json.
+    """
+    folder = Path(folder)
+    case = read_copy(folder)
+    refuse_retired(case)
+    run = read_run(folder)
+    heading = str(title or case.get("title") or f"Run {folder.resolve().name}")
+    pages = [Path(out)] if out is not None else [folder / f"report.{end}" for end in ("pdf", "html")[: 1 + can_write()]]
+    if pages[0].suffix.lower() not in WRITERS:
+        raise InputError(f"'{pages[0]}': a report is an .html or a .pdf file")
+    model, sketched = _model(folder, pages[0].with_name("model.png"))
+    sections, drawn = sections_of(run, model, columns), draw_run(run, pages[0].parent, title=heading)
+    sections[:0] = [replace(sections.pop(0), pictures=sketched)] if model else []
+    more = [_checks(folder), error := refinement(run, failed or {}), Section("Pictures", pictures=drawn)]
+    sections[-2:-2] = [one for one in more if one.sentences or one.tables or one.pictures]
+    for page in pages:
+        WRITERS[page.suffix.lower()](page, heading, header_facts(run), sections, f"vi_contact {__version__}")
+    table = write_peaks(pages[0].with_name("peaks.csv"), peaks(run.history, run.columns))
+    return error, [*pages, table, *sketched, *drawn]
+
+
+def _model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Path]]:
+    """What model.json says, and its sketch; nothing where there is none."""
+    if not (folder / MODEL).is_file():
+        return {}, []
+    try:
+        model = read_object(folder / MODEL)
+        return model, [save(sketch(model), picture)]
+    except (OSError, KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+        raise InputError(f"'{folder / MODEL}' is damaged ({str(error)[:200]}): restore it, or delete it") from error
+
+
+def _checks(folder: Path) -> Section:
+    """What the run found beside the formulas that its case names."""
+    rows = [[one.name, one.formula, ", ".join(f"{name} = {number(value)} {unit}" for name, (value, unit) in
+             one.inputs.items()), number(one.expected), number(one.found), one.unit,
+             f"does not apply: {one.applies}" if one.applies else number(one.ratio), one.source]
+            for one in comparisons(folder)]
+    header = ("check", "formula", "inputs", "expected", "found", "unit", "found / expected", "source")
+    return Section("Checks against formulas", tables=[Table(header, rows)] if rows else [])
