@@ -35,7 +35,7 @@ from api_source import (
 PAGE = ROOT / "docs" / "reference" / "api.md"
 ROOMS = (
     "core", "laws", "fem", "solvers", "vi", "schemes", "run", "soil", "engineering", "engineering.checks",
-    "ground_motion", "bem", "beam", "meshes", "studies", "plots",
+    "ground_motion", "bem", "meshes", "studies", "plots",
 )
 CONTRACT = (
     ("core.step", ("Scheme", "Solver", "PreparedSolver", "Recorder")),

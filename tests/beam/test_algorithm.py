@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from demos.problems import published_beam as source
-from vi_contact.beam.algorithm import BeamRun, BeamStepper, run_beam
-from vi_contact.beam.elements import Elements
-from vi_contact.beam.tip import ExactFriction, RegularisedFriction
-from vi_contact.beam.values import Rod, Start, TimoshenkoBeam
+from demos.problems.beam.algorithm import BeamRun, BeamStepper, run_beam
+from demos.problems.beam.elements import Elements
+from demos.problems.beam.tip import ExactFriction, RegularisedFriction
+from demos.problems.beam.values import Rod, Start, TimoshenkoBeam
 from vi_contact.core.errors import InputError, StepFailure
 
 pytestmark = pytest.mark.serial

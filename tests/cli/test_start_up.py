@@ -11,7 +11,7 @@ import pytest
 pytestmark = pytest.mark.serial
 WITHOUT = (  # what the wall has no use for
     "gmsh", "matplotlib", "scipy.optimize", "scipy.integrate", "scipy.spatial", "scipy.interpolate",
-    "vi_contact.beam", "vi_contact.bem", "vi_contact.plots", "vi_contact.studies.ida",
+    "vi_contact.bem", "vi_contact.plots", "vi_contact.studies.ida",
     "vi_contact.ground_motion.formats", "vi_contact.run.files.reading",
 )
 CODE = """

@@ -16,7 +16,6 @@ PACKAGE = Path(vi_contact.__file__).parent
 TESTS = Path(__file__).parents[1]
 
 COVERS = {  # test file -> modules without a test file of their own; tests reach some of them through their users
-    "beam/test_algorithm.py": "beam.tip beam.values",
     "bem/test_boundary_operators.py": "bem.loops",
     "bem/test_contact.py": "bem.contact_run bem.uzawa_space_time",
     "bem/test_energetic.py": "bem.loads bem.poincare_steklov",

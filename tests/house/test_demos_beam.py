@@ -9,8 +9,8 @@ from demo_runs import demo
 from kept_figures import keep_figures
 
 from demos.pictures import beam as plotting_beam
+from demos.problems import beam
 from demos.problems.published_beam import published_start
-from vi_contact import beam
 
 pytestmark = pytest.mark.serial
 

@@ -180,7 +180,7 @@ def test_import_needs_numpy_and_scipy_only(hidden: tuple[str, ...]) -> None:
     assert done.returncode == 0, done.stderr
 
 
-ROOMS = ["core", "fem", "solvers", "schemes", "soil", "engineering", "ground_motion", "bem", "beam",
+ROOMS = ["core", "fem", "solvers", "schemes", "soil", "engineering", "ground_motion", "bem",
          "studies", "plots"]
 
 

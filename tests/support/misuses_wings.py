@@ -21,6 +21,7 @@ from demos.boundary_layer.particle import ParticleImpact, damping_ratio, layer_f
 from demos.boundary_layer.rigid_body import Ellipsoid, RigidBody
 from demos.boundary_layer.scheme import BoundaryLayer
 from demos.boundary_layer.trajectory import layer_motion
+from demos.problems import beam
 from demos.problems.beam_contract import StepForces, beam_problem, rod_forces, rod_problem, rubbing_problem
 from demos.problems.boundary_elements import disk_contact, disk_problem, embedded_problem, square_problem
 from demos.problems.disk import Disk, Push
@@ -29,7 +30,7 @@ from demos.problems.joined_bodies import TwoBodies
 from demos.problems.loose_segments import from_segments
 from demos.problems.published_beam import readings
 from demos.problems.square import Square
-from vi_contact import beam, bem
+from vi_contact import bem
 
 SQUARE = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
 EIGHT = [(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)]

@@ -2,7 +2,7 @@
 
 ``run_beam`` follows the source; demos/problems/beam_contract.py makes of both problems for any scheme and solver:
 docs/theory/beam.md.
->>> from vi_contact.beam import Elements
+>>> from demos.problems.beam import Elements
 >>> Elements(4).nodes(2.0)  # m, of those that move: the clamped end does not
 array([0.5, 1. , 1.5, 2. ])
 """

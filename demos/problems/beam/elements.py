@@ -19,9 +19,10 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ..core.algebra import Array
-from ..core.checks import attributes, counted, number, whole
-from ..core.errors import InputError
+from vi_contact.core.algebra import Array
+from vi_contact.core.checks import attributes, counted, number, whole
+from vi_contact.core.errors import InputError
+
 from .values import Rod, TimoshenkoBeam
 
 MOST = 5_000_000  # elements

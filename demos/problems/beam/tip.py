@@ -13,8 +13,8 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-from ..core.checks import attributes
-from ..core.errors import StepFailure
+from vi_contact.core.checks import attributes
+from vi_contact.core.errors import StepFailure
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.algebra import Array
-from ..core.checks import array, attributes, function, optional, shape_of
+from vi_contact.core.algebra import Array
+from vi_contact.core.checks import array, attributes, function, optional, shape_of
 
 Profile = Callable[[Array], Array]
 
