@@ -109,12 +109,13 @@ def _checks(options: argparse.Namespace) -> str:
     if not found:
         raise InputError(f"{options.folder}: its case has no [[check]] tables: docs/guide/checks.md lists the checks")
     inputs = ["; ".join(f"{key} = {value:.6g} {unit}" for key, (value, unit) in one.inputs.items()) for one in found]
-    write_csv(table, ["name", "formula", "source", "inputs", "expected", "found", "unit", "ratio", "applies"], (
-        [one.name, one.formula, one.source, given, one.expected, one.found, one.unit, one.ratio, one.applies]
+    head = "name", "formula", "source", "range", "inputs", "expected", "found", "unit", "ratio", "applies"
+    write_csv(table, head, (
+        [one.name, one.formula, one.source, one.range, given, one.expected, one.found, one.unit, one.ratio, one.applies]
         for one, given in zip(found, inputs, strict=True)))
     said = [f"{one.name}: " + (f"does not apply: {one.applies}" if one.applies else f"expected {one.expected:.5g}, "
             f"found {one.found:.5g} {one.unit}, ratio {one.ratio:.4g}") + f"\n    {one.formula}   ({one.source})\n    "
-            + given for one, given in zip(found, inputs, strict=True)]
+            f"for {one.range}\n    {given}" for one, given in zip(found, inputs, strict=True)]
     return "\n".join([*said, f"table: {table}"])
 
 

@@ -1,10 +1,12 @@
 """Set what a run found beside what a formula expects: what all checks of ``engineering.checks`` have in common."""
 
 import math
+import tomllib
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from importlib.resources import files
+from typing import Any
 
 from ...core.algebra import Array
 from ...core.checks import between, check_word, number
@@ -12,10 +14,8 @@ from ...core.checks import between, check_word, number
 History = Mapping[str, Array]  # column -> values (rows,)
 Inputs = Mapping[str, tuple[float, str]]  # name -> (value, unit)
 Numbers = tuple[float, float, str, Inputs]  # expected, found, why it does not apply, inputs taken from the run
-LIMITS = {  # of fields that need not be above zero
-    "nu": (0.0, 0.5), "phi": (0.0, 1.57), "delta": (0.0, 1.57), "slope": (-1.57, 1.57), "batter": (-1.57, 1.57),
-    "surcharge": (0.0, math.inf), "kh": (0.0, 10.0), "kv": (-0.9, 0.9),
-}
+_FILE = files(__package__).joinpath("checks.toml")
+_SAID: Mapping[str, Mapping[str, Any]] = tomllib.loads(_FILE.read_text(encoding="utf-8"))
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,7 @@ class Comparison:
 
     name, formula, source: of the check; inputs: name -> (value, unit) of what went into the formula; applies: empty, or
     the sentence that says why the formula does not apply: then ``expected`` is nan. found: nan without its columns.
+    range: where it applies, in words.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Comparison:
     found: float
     unit: str
     applies: str = ""
+    range: str = ""
 
     @property
     def ratio(self) -> float:
@@ -45,24 +47,23 @@ class Comparison:
 class Check(ABC):
     """Compare a run with a formula: base of all checks, frozen dataclasses with fields in SI units, angles in radians.
 
-    units: of the fields that the formula takes; answers: what ``of`` may ask for -> unit; reads: columns, with fields.
-    InputError for other answers, and numbers that are not above zero, or not as LIMITS say.
+    checks.toml tells what each says of itself. InputError for numbers that are not above zero, or beyond its limits.
     """
 
-    formula: ClassVar[str]
-    source: ClassVar[str]
-    units: ClassVar[Mapping[str, str]]
-    answers: ClassVar[Mapping[str, str]]
-    reads: ClassVar[tuple[str, ...]]
     of: str = ""
+
+    @property
+    def said(self) -> Mapping[str, Any]:
+        """Return formula, source, range, fields and answers with their units, and the columns that are read."""
+        return _SAID[type(self).__name__]
 
     def __post_init__(self) -> None:
         name = type(self).__name__
-        check_word(f"{name}: of", self.of, tuple(self.answers))
+        check_word(f"{name}: of", self.of, tuple(self.said["answers"]))
         for key, (value, unit) in self.given().items():
-            if key in LIMITS:
+            if key in _SAID["limits"]:
                 angle = " radians, 30 degrees are 0.5236" if unit == "rad" else ""
-                low, high = LIMITS[key]
+                low, high = _SAID["limits"][key]
                 between(f"{name}: {key}", value, low, high, f"give one from {low:g} to {high:g}{angle}")
             else:
                 number(name, key, value, positive=True, unit=unit)
@@ -73,13 +74,14 @@ class Check(ABC):
 
     def given(self) -> Inputs:
         """Return the fields that the formula takes."""
-        every = {name: (getattr(self, name), unit) for name, unit in self.units.items()}
+        every = {name: (getattr(self, name), unit) for name, unit in self.said["fields"].items()}
         return {name: one for name, one in every.items() if one[0] is not None}
 
     def compare(self, history: History) -> Comparison:
         """Return the comparison for the history of a run: column -> values (rows,), as of a solution or run folder."""
-        lacking = [name for one in self.reads if (name := one.format(**vars(self))) not in history]
+        lacking = [name for one in self.said["reads"] if (name := one.format(**vars(self))) not in history]
         lack: Numbers = math.nan, math.nan, f"the run has no column {', '.join(lacking[:1])}: record it", {}
         expected, found, why, more = lack if lacking else self.numbers(history)
-        return Comparison(type(self).__name__, self.formula, self.source, {**self.given(), **more},
-                          math.nan if why else expected, found, self.answers[self.of], why)
+        texts = {name: self.said[name] for name in ("formula", "source", "range")}
+        return Comparison(type(self).__name__, inputs={**self.given(), **more}, expected=math.nan if why else expected,
+                          found=found, unit=self.said["answers"][self.of], applies=why, **texts)

@@ -42,10 +42,6 @@ class MononobeOkabe(Coulomb):
     kh, kv: accelerations towards the wall and upwards, of gravity. It applies as Coulomb's wedge does.
     """
 
-    formula = "N = K_AE cos δ (1-kv) (ρ g H²/2 + q H), K_AE(φ, δ, slope, batter, ψ), tan ψ = kh/(1-kv)"
-    source = "Okabe 1924; Mononobe and Matsuo 1929"
-    units = Coulomb.units | {"kh": "-", "kv": "-"}
-    largest = True
     kh: float
     kv: float = 0.0
 
@@ -62,7 +58,6 @@ class _Layer(EarthPressure):
     acceleration: column of the ground's.
     """
 
-    reads = ("t", "N_{part}", "height_{part}", "uplift_{part}", "{acceleration}")
     nu: float
     c_s: float
     on_left: bool = False
@@ -94,9 +89,6 @@ class Wood(_Layer):
     applies below 0.3 of the layer's lowest frequency, c_s/(4 H); that of a motion is max a/(pi (max v - min v)).
     """
 
-    formula = "ΔN = F(ν, L/H) ρ a H², exact in plane strain; a the peak towards the wall"
-    source = "Wood 1973, EERL 73-05"
-    units = {"height": "m", "rho": "kg/m³", "nu": "-", "c_s": "m/s", "length": "m"}
     length: float | None = None
 
     def added(self, t: Array, push: Array) -> tuple[float, float, str]:
@@ -115,9 +107,6 @@ class VeletsosYounan(_Layer):
     damping: xi of the soil, hysteretic; w_n = n pi c_s/(2 H), n odd. Slow ones give 3 to 6 % more than ``Wood``'s.
     """
 
-    formula = "ΔN = max Q(t), Q(ω) = κ ρ H² a(ω) Σ 16/(nπ)³ / √(1 - (ω/ω_n)²/(1+2iξ)), κ = 2/√((1-ν)(2-ν))"
-    source = "Veletsos and Younan 1994"
-    units = {"height": "m", "rho": "kg/m³", "nu": "-", "c_s": "m/s", "damping": "-"}
     damping: float = 0.05
 
     def added(self, t: Array, push: Array) -> tuple[float, float, str]:

@@ -7,14 +7,11 @@ An elastic soil does not yield: its pressure is that at rest, and active and pas
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
 from ...core.units import STANDARD_GRAVITY
 from .comparison import Check, History, Numbers
-
-SOIL = {"height": "m", "rho": "kg/m³", "surcharge": "Pa", "gravity": "m/s²", "width": "m"}
 
 
 def wedge(phi: float, delta: float, slope: float, batter: float, *, psi: float = 0.0, passive: bool = False) -> float:
@@ -42,9 +39,6 @@ class EarthPressure(Check):
     surcharge: q [Pa]; width: of the model across its plane [m].
     """
 
-    answers = {"thrust": "N/m", "height": "m"}
-    reads: ClassVar[tuple[str, ...]] = ("N_{part}", "height_{part}")
-    largest: ClassVar[bool] = False  # to compare with the largest thrust, and not with the first row, at rest
     height: float
     rho: float
     part: str = "wall"
@@ -62,7 +56,7 @@ class EarthPressure(Check):
         factor, why = self.coefficient()
         own, extra = 0.5 * self.rho * self.gravity * self.height**2, self.surcharge * self.height
         thrust, height = history[f"N_{self.part}"], history[f"height_{self.part}"]
-        row = int(np.argmax(thrust)) if self.largest else 0
+        row = int(np.argmax(thrust)) if "largest" in self.said else 0  # the first is that of rest
         if self.of == "height":
             return self.height * (own / 3.0 + extra / 2.0) / (own + extra), float(height[row]), why, {}
         return factor * (own + extra), float(thrust[row]) / self.width, why, {}
@@ -75,9 +69,6 @@ class AtRest(EarthPressure):
     nu: Poisson's ratio. The wall is smooth and does not move; for sand, nu of K0 = 1 - sin(phi) is K0/(1 + K0).
     """
 
-    formula = "N = K0 (ρ g H²/2 + q H), K0 = ν/(1-ν)"
-    source = "plane strain without lateral strain"
-    units = SOIL | {"nu": "-"}
     nu: float
 
     def coefficient(self) -> tuple[float, str]:
@@ -91,9 +82,6 @@ class Rankine(EarthPressure):
     phi, slope [rad]. It applies up to slope = phi: steeper ground does not stand.
     """
 
-    formula = "N = K (ρ g H²/2 + q H), K = cos²β (cos β ∓ s)/(cos β ± s), s² = cos²β - cos²φ"
-    source = "Rankine 1857"
-    units = SOIL | {"phi": "rad", "slope": "rad"}
     phi: float
     slope: float = 0.0
     passive: bool = False
@@ -112,9 +100,6 @@ class Coulomb(EarthPressure):
     surfaces that are curved slide at less), and phi - slope - psi >= 0.
     """
 
-    formula = "N = K cos δ (ρ g H²/2 + q H), K(φ, δ, slope, batter) of the worst plane wedge"
-    source = "Coulomb 1776"
-    units = SOIL | {"phi": "rad", "delta": "rad", "slope": "rad", "batter": "rad"}
     phi: float
     delta: float = 0.0
     slope: float = 0.0

@@ -21,11 +21,6 @@ class Housner(Check):
     they do not slide or bounce. One history in a long motion is chaotic: compare many, or the first impacts.
     """
 
-    formula = "θ'' = -p² (± sin(α - |θ|) - a/g cos(α - |θ|)), p² = 3g/4R, θ' times 1 - 1.5 sin²α where θ = 0"
-    source = "Housner 1963"
-    units = {"width": "m", "height": "m", "gravity": "m/s²"}
-    answers = {"angle": "rad", "impact": "s"}
-    reads = ("t", "{theta}", "{acceleration}")
     width: float
     height: float
     of: str = "angle"

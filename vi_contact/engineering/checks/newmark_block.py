@@ -37,11 +37,6 @@ class NewmarkBlock(Check):
     ground's accelerations. It applies while the block stays on the plane, and where it stands without motion.
     """
 
-    formula = "u'' = w - r sgn u', w = g sin β - a_x cos β + a_y sin β, r = μ (g cos β + a_x sin β + a_y cos β)"
-    source = "Newmark 1965"
-    units = {"mu": "-", "slope": "rad", "gravity": "m/s²"}
-    answers = {"": "m"}
-    reads = ("t", "{slip}", "{acceleration}", "{vertical}")
     mu: float
     slope: float = 0.0
     one_sided: bool = False

@@ -30,12 +30,6 @@ class RackingRatio(Check):
     of the box and of four points of the ground far away, at the same depths. It applies up to F = 10, from 1.5 H down.
     """
 
-    formula = "R = 4 (1-ν) F/(3-4ν+F), F = G H W²/(12 EI_roof) ψ(EI, H/W)"
-    source = "Wang 1993; Penzien 2000"
-    units = {"width": "m", "height": "m", "wall": "N m²/m", "roof": "N m²/m", "invert": "N m²/m",
-             "shear_modulus": "Pa", "nu": "-", "depth": "m"}
-    answers = {"": "-"}
-    reads = ("racking_{box}", "racking_{free}")
     width: float
     height: float
     wall: float
