@@ -150,6 +150,20 @@ def test_a_support_that_carries_load_is_not_forgotten(shared_tmp: Path) -> None:
     assert said in f"{told.value}"
 
 
+def test_after_the_shock_the_house_rests_where_it_has_slid(shared_tmp: Path) -> None:
+    """A static stage after the motion, on the same dashpots: the slip stays but for the 3 % by which points slide on as
+    the swinging load leaves them; the house carries its weight."""
+    old, new = 'name = "aftershock"\ntype = "dynamic"', 'name = "rest"\ntype = "static"'
+    text = HOUSE.split("excitation = [{")[0].replace(old, new)
+    settings = [one for one in QUICK if "stage" not in one]
+    found = case(shared_tmp, text, *settings).run(COMM, out=shared_tmp / "run", progress=False).history
+    before = vc.read_run(shared_tmp / "run" / "stages" / "2_shock").history
+    first, last = before["contact_max_slip"][[0, -1]]
+    assert last > 2.0 * first > 0.0 and found["contact_max_slip"][0] == pytest.approx(last, rel=0.1)
+    assert found["contact_resultant"][0] == pytest.approx(3.0 * 4.0 * 800.0 * 9.80665, rel=1e-9)
+    assert found["energy_kinetic"][0] == 0.0 < before["energy_kinetic"][-1]
+
+
 class PowerFailure(Exception):
     """What ends a run without a word."""
 

@@ -58,7 +58,8 @@ def _spaces(static: ContactProblem, problem: ContactProblem) -> tuple[FemSpace, 
     if not isinstance(before, FemSpace) or not isinstance(after, FemSpace) or before.mesh is not after.mesh:
         raise InputError("release needs two problems of fem.assemble on one mesh")
     if largest(before.comm, not np.array_equal(static.surface.points, problem.surface.points)):
-        raise InputError("the static stage has other contact points than the problem: give both the same boundaries")
+        raise InputError("the static stage has other contact points than the problem, as clamped nodes are none: name "
+                         "the same ones for both (points=)")
     return before, after
 
 

@@ -179,7 +179,7 @@ class Case:
         parts: as of ``parts``, of this case or of one with the same body; state: at rest, when it is known.
         """
         if "strain_compatible" in self.nodes:
-            raise InputError(f"{self.path}: [strain_compatible] is for single runs: take it out for a study of many")
+            raise InputError(f"{self.path}: [strain_compatible] is for single runs: take it out for stages and studies")
         problem = self._problem(parts)
         own = {name: value for name, value in self._made("run", system=parts.system).items() if name != "out"}
         own |= {"changed": True} if changed else {}
