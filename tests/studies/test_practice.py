@@ -20,6 +20,7 @@ from vi_contact.cli.entry import main
 from vi_contact.core.units import STANDARD_GRAVITY as G
 from vi_contact.studies import comparisons, read_case
 from vi_contact.studies.cases.library import STARTERS
+from vi_contact.studies.cases.stages import leading
 
 pytestmark = pytest.mark.serial
 NAMES = ("wall", "dam", "pier", "culvert")
@@ -73,6 +74,13 @@ def test_wall_stands_between_active_pressure_and_that_at_rest(tmp_path: Path) ->
     assert list(found) == ["AtRest", "Rankine", "Coulomb", "MononobeOkabe", "Wood", "VeletsosYounan"]
     assert found["Rankine"].expected == pytest.approx(np.tan(np.radians(28.0)) ** 2 * soil, rel=1e-9)
     assert found["Rankine"].found == history["N_stem"][0] and found["MononobeOkabe"].found == history["N_stem"].max()
+
+
+def test_wall_shares_its_gravity_stage_and_its_matrices_over_records() -> None:
+    """What a study computes once for all records, without a folder for the fields that the case writes."""
+    reached, parts, state = leading(read_case(STARTERS / "wall.toml", [LARGE]), MPI.COMM_SELF)
+    assert reached is not None and reached.number == 1 and parts.steady and state is not None
+    assert state.r_n.max() > 0.0
 
 
 def test_dam_has_the_resultant_of_weight_water_and_uplift(tmp_path: Path) -> None:

@@ -48,7 +48,7 @@ def leading(case: Any, comm: Any) -> tuple[Reached | None, Parts, State | None]:
         return None, case.parts(comm), None
     reached = Reached(0, case.meshed(comm))
     while reached.number < len(case.stages) - 1 and case.stages[reached.number].static:
-        reached, _ = _made(case.stages[reached.number], reached, comm, None, {"progress": False})
+        reached, _ = _made(case.stages[reached.number], reached, comm, None, {"progress": False, "fields": None})
     return reached, *_entered(case.stages[reached.number], reached, comm)[1:]
 
 
