@@ -82,7 +82,7 @@ def test_both_columns_and_their_difference(tmp_path: Path, capsys: pytest.Captur
     own, *others = (float(np.max(np.abs(one.history["u_x_end"]))) for one in (base, fine, short))
     told = [f"{own:.4g}"]
     for other in others:
-        told += [f"{other:.4g}", f"{round(100.0 * (other / own - 1.0), 2):+g} %"]
+        told += [f"{other:.4g}", f"{round(100.0 * (other / own - 1.0), 2) + 0.0:+g} %"]
     assert rows["u_x_end"] == ["u_x_end", "m", *told]
     assert own > 1e-3 and all(abs(other / own - 1.0) > 1e-4 for other in others)
     assert "a_x_end, raw: not convergent at impacts" in rows

@@ -108,7 +108,7 @@ def write_pages(
         pages.table(Table(("", ""), facts))
         for section in sections:
             pages.y += 0.12
-            pages.words(section.title, 11.0, keep=1.2, weight="bold")
+            pages.words(section.title, 11.0, keep=1.2 if section.sentences or section.tables else 4.0, weight="bold")
             for sentence in section.sentences:
                 pages.words(sentence)
             for table in section.tables:

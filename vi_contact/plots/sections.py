@@ -115,9 +115,9 @@ def _result_rows(run: RunFolder, title: str, prefixes: tuple[str, ...]) -> Itera
     t = run.history["t"]
     for name in (name for name in run.columns if name.startswith(prefixes)):
         values = run.history.get(name, np.zeros((0, 0)))
-        if values.ndim != 1 or np.isnan(values).all():
-            continue
         kind, _, part = name.partition("_")
+        if values.ndim != 1 or np.isnan(values).all() or kind == "height" and not np.nan_to_num(values).any():
+            continue  # the thrust on a level part has no height
         thrust = run.history.get(f"N_{part}") if kind in ("height", "level") else None
         row = int(np.nanargmax(np.abs(values) if thrust is None else thrust + 0.0 * values))
         shown, unit = scaled(values, run.columns[name][0])

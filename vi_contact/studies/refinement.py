@@ -94,7 +94,7 @@ def refinement(run: RunFolder, failed: Mapping[str, str]) -> Section:
         base, like = _size(one), max(_size(other) for other in own if other.unit == one.unit)
         told = [_size(each[one.name]) if one.name in each else np.nan for each in found.values()]
         if base > NOISE * like:
-            pairs = [(number(other), f"{round(100.0 * (other / base - 1.0), 2):+g} %") for other in told]
+            pairs = [(number(other), f"{round(100.0 * (other / base - 1.0), 2) + 0.0:+g} %") for other in told]
             mark = ", raw: not convergent at impacts" if one.quantity.endswith(GROWS) else ""
             rows.append([one.name + mark, one.unit, number(base), *(text for pair in pairs for text in pair)])
     return Section("Discretisation error", [SAY["refined"], *said], [Table(header, rows, sortable=True)])

@@ -9,7 +9,6 @@ from ..core.errors import InputError
 from ..core.version import __version__
 from ..engineering.peak_values import peaks, write_peaks
 from ..plots.bodies import draw_run
-from ..plots.histories import save
 from ..plots.pages import write_pages
 from ..plots.sections import Section, Table, header_facts, number, sections_of
 from ..plots.sketch import sketch
@@ -60,7 +59,8 @@ def _model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Path]]:
         return {}, []
     try:
         model = read_object(folder / MODEL)
-        return model, [save(sketch(model), picture)]
+        sketch(model).savefig(picture, dpi=130, bbox_inches="tight")
+        return model, [picture]
     except (OSError, KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise InputError(f"'{folder / MODEL}' is damaged ({str(error)[:200]}): restore it, or delete it") from error
 
