@@ -157,7 +157,7 @@ def table(sections: list[Section], title: str, place: int = 0) -> dict[str, dict
 
 def test_numbers_of_the_report(tmp_path: Path) -> None:
     """Closed forms: peaks, height at the largest thrust, what is left of the slip, safety, a sine with the jump of
-    one step, the spectrum of a harmonic motion at short periods, the ledger over its largest energy."""
+    one step, the spectrum of a harmonic motion at short periods, the ledger over its largest energy (V11.2)."""
     dt, n = 0.005, 2001
     t = dt * np.arange(n)
     thrust = 1e5 * (1.0 + np.sin(np.pi * t / t[-1]))  # largest in the middle
@@ -196,7 +196,8 @@ def test_numbers_of_the_report(tmp_path: Path) -> None:
 
 
 def test_low_passed_peaks_converge_where_raw_ones_do_not() -> None:
-    """A velocity jump of 1 m/s in one step: raw peaks double with every half step, those below 25 Hz are 51 m/s²."""
+    """A velocity jump of 1 m/s in one step: raw peaks double with every half step, those below 25 Hz are 51 m/s²
+    (V11.2)."""
     found = []
     for dt in (4e-3, 2e-3, 1e-3):
         a = np.zeros(round(4.0 / dt) + 1)
@@ -207,7 +208,7 @@ def test_low_passed_peaks_converge_where_raw_ones_do_not() -> None:
         found.append(low.acceleration.max())
     limit = 50.0 * (np.pi / 8.0) / np.sin(np.pi / 8.0)
     errors = np.abs(np.array(found) / limit - 1.0)
-    assert errors[0] < 0.06 and np.all(errors[1:] < 0.3 * errors[:-1]), errors
+    assert errors[0] < 0.021 and np.all(errors[1:] < 0.3 * errors[:-1]), errors
 
 
 def test_the_model_as_it_was_described(tmp_path: Path) -> None:

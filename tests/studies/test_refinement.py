@@ -64,7 +64,7 @@ def written(folder: Path) -> Path:
 
 def test_both_columns_and_their_difference(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Twice the elements along each side, twice the steps, of the same duration; the table has their numbers; nothing
-    that is there is computed again; another case is. Paths stay relative to the case that was run."""
+    that is there is computed again; another case is. Paths stay relative to the case that was run (V11.3)."""
     case, out = written(tmp_path), tmp_path / "out" / "run"
     assert main(["run", str(case), "--out", str(out), "--quiet"]) == 0
     assert base_folder(out / "case.toml") == tmp_path
