@@ -1,6 +1,7 @@
 """``vi-contact report``, ``plot`` and ``film``: options and what the commands do."""
 
 import argparse
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +43,8 @@ def add_picture_commands(commands: Any) -> None:
 
 
 def _report(options: argparse.Namespace) -> str:
-    import mpi4py.MPI  # noqa: F401  # first: ``world`` finds it
+    with suppress(ImportError):  # a report needs no MPI
+        import mpi4py.MPI  # noqa: F401  # first: ``world`` finds it
 
     from ..studies.refinement import refine
     from ..studies.report import report
@@ -55,9 +57,9 @@ def _report(options: argparse.Namespace) -> str:
         return ""
     columns = None if options.show is None else [one.split(",") for one in options.show]
     told, written = report(options.folder, out=options.out, title=options.title, columns=columns, failed=failed)
-    rows = [f"{row[0]:<48}" + "".join(f"{cell:>13}" for cell in row[1:]) for table in told.tables
-            for row in (table.header, *table.rows)]
-    return "\n".join([*(told.sentences if options.refine else ()), *rows, *map(str, written)])
+    lines = [*told.sentences, *(f"{row[0]:<48}" + "".join(f"{cell:>13}" for cell in row[1:]) for table in told.tables
+                                for row in (table.header, *table.rows))]
+    return "\n".join([*(lines if options.refine else ()), *map(str, written)])
 
 
 def _plot(options: argparse.Namespace) -> str:
