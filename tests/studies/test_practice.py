@@ -23,7 +23,6 @@ from vi_contact.studies.cases.library import STARTERS
 from vi_contact.studies.cases.stages import leading
 
 pytestmark = pytest.mark.serial
-NAMES = ("wall", "dam", "pier", "culvert")
 LARGE = "mesh.refine=0"  # the quick size that each case names
 EXACT = 1e-9  # of the weight: sums of forces and moments of linear equations that are solved to round-off
 
@@ -46,13 +45,25 @@ def run(name: str, out: Path, *more: str) -> Any:
     return history
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", ["wall", "dam", "culvert"])
 def test_starter_is_written_and_checked(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """``new`` copies case and script into any folder, and --check reads them there."""
     assert main(["new", name, str(tmp_path / "mine")]) == 0
     assert sorted(one.name for one in (tmp_path / "mine").iterdir()) == [f"{name}.geo", f"{name}.toml"]
     assert main(["run", str(tmp_path / "mine" / f"{name}.toml"), "--check", "--set", LARGE]) == 0
     assert "contact" in capsys.readouterr().out
+
+
+def test_from_new_to_report_in_four_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                             capsys: pytest.CaptureFixture[str]) -> None:
+    """Those that ``new`` prints, in the quick size, in any folder."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "pier"]) == 0
+    commands = [line.split()[1:] for line in capsys.readouterr().out.split("next:")[1].splitlines() if line]
+    quick = ["--quiet", "--set", LARGE, "--set", "fields="]
+    assert main([*commands[0], *quick]) == 0
+    assert main([*commands[1], *quick, "--set", "run.t_end=", "--steps", "20"]) == 0
+    assert main(commands[2]) == 0 and (tmp_path / "results" / "pier" / "report.pdf").stat().st_size > 10_000
 
 
 def test_wall_stands_between_active_pressure_and_that_at_rest(tmp_path: Path) -> None:
