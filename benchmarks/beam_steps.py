@@ -21,9 +21,9 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import vi_contact as vc  # noqa: E402
-from demos.problems import beam  # noqa: E402
+from demos import beam  # noqa: E402
+from demos.beam.contract import beam_problem  # noqa: E402
 from demos.problems import published_beam as source  # noqa: E402
-from demos.problems.beam_contract import beam_problem  # noqa: E402
 
 STEPS, DT = 1000, 0.002
 

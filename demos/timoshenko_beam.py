@@ -21,9 +21,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the sou
 import numpy as np
 
 import vi_contact as vc
+from demos import beam
+from demos.beam.contract import beam_problem, rubbing_problem
 from demos.pictures.beam import plot_beam_energies, plot_regularisation, plot_rubbing, plot_shapes, plot_tips
-from demos.problems import beam
-from demos.problems.beam_contract import beam_problem, rubbing_problem
 from demos.problems.published_beam import published_elements, published_mu, published_start, readings
 from vi_contact.cli import status_of
 

@@ -23,8 +23,8 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from demos.problems.beam.elements import Elements, beam_matrices, rod_matrices
-from demos.problems.beam.values import Rod, Start, TimoshenkoBeam
+from demos.beam.elements import Elements, beam_matrices, rod_matrices
+from demos.beam.values import Rod, Start, TimoshenkoBeam
 from vi_contact.core.algebra import Array
 from vi_contact.core.checks import array, function, instance, number, optional, provides, whole
 from vi_contact.core.errors import InputError

@@ -10,9 +10,9 @@ for. eps is printed as 102/5, read as 10⁻²/5 = 0.002; minus signs of the init
 
 from collections.abc import Callable
 
-from demos.problems.beam.elements import Elements
-from demos.problems.beam.tip import RegularisedFriction
-from demos.problems.beam.values import Start
+from demos.beam.elements import Elements
+from demos.beam.tip import RegularisedFriction
+from demos.beam.values import Start
 from vi_contact.core.checks import number
 
 Force = Callable[[float], float]

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from demos.beam.algorithm import BeamRun, BeamStepper, run_beam
+from demos.beam.elements import Elements
+from demos.beam.tip import ExactFriction, RegularisedFriction
+from demos.beam.values import Rod, Start, TimoshenkoBeam
 from demos.problems import published_beam as source
-from demos.problems.beam.algorithm import BeamRun, BeamStepper, run_beam
-from demos.problems.beam.elements import Elements
-from demos.problems.beam.tip import ExactFriction, RegularisedFriction
-from demos.problems.beam.values import Rod, Start, TimoshenkoBeam
 from vi_contact.core.errors import InputError, StepFailure
 
 pytestmark = pytest.mark.serial

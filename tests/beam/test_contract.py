@@ -10,12 +10,12 @@ import pytest
 from energy_checks import rounded
 
 import vi_contact as vc
+from demos.beam.algorithm import BeamRun, BeamStepper, run_beam
+from demos.beam.contract import beam_problem, rod_forces, rod_problem, rubbing_problem
+from demos.beam.elements import Elements
+from demos.beam.tip import ExactFriction, RegularisedFriction
+from demos.beam.values import Rod, Start, TimoshenkoBeam
 from demos.exact.bar import PeriodicBar
-from demos.problems.beam.algorithm import BeamRun, BeamStepper, run_beam
-from demos.problems.beam.elements import Elements
-from demos.problems.beam.tip import ExactFriction, RegularisedFriction
-from demos.problems.beam.values import Rod, Start, TimoshenkoBeam
-from demos.problems.beam_contract import beam_problem, rod_forces, rod_problem, rubbing_problem
 from demos.problems.published_beam import published_mu, published_start
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError

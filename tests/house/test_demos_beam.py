@@ -8,8 +8,8 @@ import pytest
 from demo_runs import demo
 from kept_figures import keep_figures
 
+from demos import beam
 from demos.pictures import beam as plotting_beam
-from demos.problems import beam
 from demos.problems.published_beam import published_start
 
 pytestmark = pytest.mark.serial

@@ -13,6 +13,8 @@ import numpy as np
 from misuses_core import COUNT, FLAG, FUNCTION, NEEDED, NOT_NEGATIVE, NUMBER, POSITIVE, THING, Table, but, calls, rights
 
 import vi_contact as vc
+from demos import beam
+from demos.beam.contract import StepForces, beam_problem, rod_forces, rod_problem, rubbing_problem
 from demos.boundary_layer.bilateral import bilateral_motion
 from demos.boundary_layer.contact_law import ContactLayer, contact_layer
 from demos.boundary_layer.layer import Layer
@@ -21,8 +23,6 @@ from demos.boundary_layer.particle import ParticleImpact, damping_ratio, layer_f
 from demos.boundary_layer.rigid_body import Ellipsoid, RigidBody
 from demos.boundary_layer.scheme import BoundaryLayer
 from demos.boundary_layer.trajectory import layer_motion
-from demos.problems import beam
-from demos.problems.beam_contract import StepForces, beam_problem, rod_forces, rod_problem, rubbing_problem
 from demos.problems.boundary_elements import disk_contact, disk_problem, embedded_problem, square_problem
 from demos.problems.disk import Disk, Push
 from demos.problems.embedded import Embedded

@@ -46,6 +46,7 @@ def _report(options: argparse.Namespace) -> str:
     with suppress(ImportError):  # a report needs no MPI
         import mpi4py.MPI  # noqa: F401  # first: ``world`` finds it
 
+    from ..plots.web_page import MISSING, can_write
     from ..studies.refinement import refine
     from ..studies.report import report
 
@@ -59,7 +60,8 @@ def _report(options: argparse.Namespace) -> str:
     told, written = report(options.folder, out=options.out, title=options.title, columns=columns, failed=failed)
     lines = [*told.sentences, *(f"{row[0]:<48}" + "".join(f"{cell:>13}" for cell in row[1:]) for table in told.tables
                                 for row in (table.header, *table.rows))]
-    return "\n".join([*(lines if options.refine else ()), *map(str, written)])
+    missing = [] if options.out is not None or can_write() else [f"no report.html: {MISSING}"]
+    return "\n".join([*(lines if options.refine else ()), *map(str, written), *missing])
 
 
 def _plot(options: argparse.Namespace) -> str:
