@@ -4,7 +4,7 @@ import hashlib
 
 import numpy as np
 import pytest
-from record_files import AFAD, COUNTS, EVENT, ONE, VALUES, cosmos, csmip, esm, knet, rows
+from record_files import AFAD, COUNTS, VALUES, cosmos, csmip, esm, knet, rows
 
 from vi_contact.core.errors import InputError
 from vi_contact.ground_motion import Record, read_record, write_at2, write_columns, write_path_series
@@ -208,34 +208,6 @@ def test_afad_columns_are_channels(channel, name, samples, tmp_path):
 ], ids=lambda value: value[-1] if isinstance(value, list) else "")
 def test_bad_afad_is_refused_in_one_sentence(text, words, options, tmp_path):
     refused(write(tmp_path, text), *words, **options)
-
-
-# --- SimCenter JSON -------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("channel, name, samples", [(1, "accel_X", [0.0, 0.1, -0.2]), (2, "accel_Y", [0.3, 0.1, 0.0])])
-def test_simcenter_series_are_channels(channel, name, samples, tmp_path):
-    record = read_record(write(tmp_path, EVENT), "g", channel=channel)
-    assert np.allclose(record.acceleration, G * np.array(samples), rtol=1e-14) and record.dt == 0.01
-    assert (record.format, record.title, record.component) == ("SimCenter", "two components", name)
-
-
-def test_simcenter_one_series_without_events(tmp_path):
-    assert read_record(write(tmp_path, ONE), "m/s2").dt == 0.02
-
-
-@pytest.mark.parametrize("text, words, options", [
-    (EVENT, ["1: accel_X, 2: accel_Y", "pass channel="], {}), (EVENT, ["there is no channel 3"], {"channel": 3}),
-    (ONE, ["pass units="], {"units": None}), (ONE.replace('"dT": 0.02, ', ""), ["pass dt="], {}),
-    (EVENT.replace("UniformAcceleration", "UniformVelocity", 1), ["'accel_X'", "'UniformVelocity'"], {"channel": 1}),
-    (ONE.replace('"dT"', '"factor": 9.81, "dT"'), ["factor 9.81"], {}), (ONE.replace("0.02", '"?"'), ["is '?'"], {}),
-    (ONE.replace("0.1", "NaN"), ["no list of two or more numbers"], {}),
-    (ONE.replace("[0.0, 0.1, -0.2]", "3"), ["no list"], {}),
-    (EVENT.replace("0.3, 1e-1", "0.3 1e-1"), ["line 5", "not JSON"], {}), (EVENT[:200], ["line 5", "not JSON"], {}),
-    ('{"Events": [], "timeSeries": 1}', ["no event holds"], {}),
-], ids=lambda value: value[-1] if isinstance(value, list) else "")
-def test_bad_simcenter_is_refused_in_one_sentence(text, words, options, tmp_path):
-    refused(write(tmp_path, text), *words, **({"units": "g"} | options))
 
 
 # --- OpenSees path series -------------------------------------------------------------------------------------------

@@ -6,7 +6,6 @@ the count and the step that a simple pattern finds in the header.
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from record_files import AFAD, EVENT, ONE, VALUES, cosmos, csmip, esm, knet, smc
+from record_files import AFAD, VALUES, cosmos, csmip, esm, knet, smc
 
 from vi_contact.core.errors import InputError
 from vi_contact.ground_motion import UNITS, Record, read_record
@@ -34,8 +33,6 @@ SEEDS: dict[str, tuple[str, dict[str, Any]]] = {
     "knet": (knet(), {}),
     "esm": (esm(), {}),
     "afad": (AFAD, {"channel": 2}),
-    "event": (EVENT, {"units": "gal", "channel": 1}),
-    "one series": (ONE, {"units": "gal"}),
     "columns": ("# a title\n" + TABLE.replace(";", " "), {"units": "gal"}),
     "semicolons": (TABLE, {"units": "gal"}),
     "decimal commas": (TABLE.replace(".", ","), {"units": "gal"}),
@@ -166,13 +163,6 @@ def of_afad(text: str, record: Record, options: dict[str, Any]) -> Opinion:
     return values, count, said(rf"INTERVAL\s+\(SEC\)\s*:\s*({NUMBER})", text)
 
 
-def of_event(text: str, record: Record, options: dict[str, Any]) -> Opinion:
-    event = json.loads(text)
-    event = next(one for one in event.get("Events", [event]) if isinstance(one, dict) and one.get("timeSeries"))
-    chosen = event["timeSeries"][options.get("channel", 1) - 1]
-    return chosen["data"], None, chosen.get("dT", event.get("dT"))
-
-
 def of_columns(text: str, record: Record, options: dict[str, Any]) -> Opinion:
     lines = [line for line in text.split("\n") if line.strip() and not line.lstrip().startswith("#")]
     data = "\n".join(lines)
@@ -185,7 +175,7 @@ def of_columns(text: str, record: Record, options: dict[str, Any]) -> Opinion:
 
 OPINIONS: dict[str, Callable[[str, Record, dict[str, Any]], Opinion]] = {
     "PEER AT2": of_at2, "CSMIP": of_blocks, "COSMOS": of_blocks, "USGS SMC": of_smc, "K-NET": of_knet, "ESM": of_esm,
-    "AFAD": of_afad, "SimCenter": of_event, "columns": of_columns,
+    "AFAD": of_afad, "columns": of_columns,
 }
 
 

@@ -55,7 +55,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "ground_motion/test_readers.py":
         "ground_motion.formats.afad ground_motion.formats.columns "
         "ground_motion.formats.cosmos ground_motion.formats.esm ground_motion.formats.knet "
-        "ground_motion.formats.reader ground_motion.formats.simcenter ground_motion.formats.smc "
+        "ground_motion.formats.reader ground_motion.formats.smc "
         "ground_motion.formats.text",
     "ground_motion/test_spectra.py": "ground_motion.intensity",
     "ground_motion/test_synthetic.py": "ground_motion.ec8 ground_motion.kanai_tajimi",

@@ -21,15 +21,14 @@ from vi_contact.solvers.friction.given_forces import GivenForces
 from vi_contact.solvers.friction.newton import FrictionNewton
 from vi_contact.solvers.friction.nsgs import NSGS
 from vi_contact.solvers.friction.problem import FrictionResult
-from vi_contact.solvers.friction.uzawa import Uzawa, best_step
 from vi_contact.solvers.normal.active_set import ActiveSet
 
 pytestmark = pytest.mark.serial
 METHODS = [
     FrictionNewton(), NSGS(), FixedPoint(), FixedPoint(tresca=NSGS()),
-    FixedPoint(extrapolation=Anderson()), GivenForces(), GivenForces(extrapolation=Anderson()), Uzawa(),
+    FixedPoint(extrapolation=Anderson()), GivenForces(), GivenForces(extrapolation=Anderson()),
 ]
-NAMES = ["newton", "nsgs", "fixed", "fixed nsgs", "anderson", "given", "given anderson", "uzawa"]
+NAMES = ["newton", "nsgs", "fixed", "fixed nsgs", "anderson", "given", "given anderson"]
 
 
 def enumerated(G: Array, q: Array, bilateral: Mask, cohesion: Array, slope: Array) -> list[Array]:
@@ -294,28 +293,6 @@ def test_given_forces_are_the_right_hand_side_of_the_normal_problem() -> None:
         normal = ActiveSet().prepare(G[::d, ::d], bilateral).solve((q.ravel() + G @ given)[::d])
         size = G[::d, ::d].diagonal() ** 0.5
         assert np.abs((normal.r - r[:, 0]) * size).max() <= 1e-9 * np.abs(r[:, 0] * size).max()
-
-
-def test_uzawa_step_size() -> None:
-    """The automatic rho is that of the least contraction factor; beyond 2/lambda_max Tresca's iteration may diverge."""
-    G, q, bilateral = small(7, 8, 2)
-    cohesion = 0.2 * G[1::2, 1::2].diagonal() ** -0.5
-    prepared = Uzawa().prepare(G, bilateral)
-    values = np.linalg.eigvalsh(prepared.delassus.matrix)
-    rho = best_step(prepared.delassus.matrix)
-    assert rho == pytest.approx(2.0 / (values[0] + values[-1]), rel=1e-12)
-    best = prepared.solve(q, cohesion, np.zeros(8))
-    errors = np.array(best.history)
-    factor = (values[-1] - values[0]) / (values[-1] + values[0])
-    assert (errors[-1] / errors[0]) ** (1.0 / (len(errors) - 1)) <= factor
-    slower = Uzawa(rho=0.1 * rho).prepare(G, bilateral).solve(q, cohesion, np.zeros(8))
-    assert slower.iterations > 2 * best.iterations
-    assert energy_norm(slower.r - best.r, G) <= 1e-9 * energy_norm(best.r, G)
-    with pytest.raises(StepFailure, match="Uzawa.*stopped after"):
-        Uzawa(rho=3.0 / values[-1], max_iterations=500).prepare(G, np.ones(8, dtype=bool)).solve(q, cohesion, cohesion)
-    for rho in (0.0, -1.0, np.nan):
-        with pytest.raises(InputError, match="give a finite number above zero"):
-            Uzawa(rho=rho)
 
 
 def test_mirror_image() -> None:

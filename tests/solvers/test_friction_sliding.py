@@ -37,7 +37,7 @@ MIDPOINT = vc.ZienkiewiczWoodTaylor()
 METHODS = [
     solvers.NSGS(), solvers.FixedPoint(),
     solvers.FixedPoint(extrapolation=solvers.Anderson()),
-    solvers.GivenForces(), solvers.GivenForces(extrapolation=solvers.Anderson()), solvers.Uzawa(),
+    solvers.GivenForces(), solvers.GivenForces(extrapolation=solvers.Anderson()),
 ]
 
 

@@ -209,7 +209,7 @@ def rubbed() -> list[Report]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "method", [solvers.FrictionNewton(), solvers.FixedPoint(), solvers.GivenForces(), solvers.Uzawa()], ids=repr
+    "method", [solvers.FrictionNewton(), solvers.FixedPoint(), solvers.GivenForces()], ids=repr
 )
 def test_several_points_with_every_method(method: Any, rubbed: list[Report]) -> None:
     """A block that rubs along a wall with three points: certified with the exact law, the same with all methods; few

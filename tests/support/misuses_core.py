@@ -154,7 +154,6 @@ def values() -> Table:
         (solvers.NSGS, {}, RULE),
         (solvers.FixedPoint, {}, RULE | {"tresca": METHOD, "extrapolation": METHOD}),
         (solvers.GivenForces, {}, RULE | {"tangential": METHOD, "extrapolation": METHOD}),
-        (solvers.Uzawa, {}, RULE | {"rho": but(POSITIVE, "none")}),
         (solvers.RateIteration, {}, RULE | {"extrapolation": METHOD}),
         (solvers.Anderson, {}, {"depth": COUNT, "after": but(COUNT, "zero")}),
         (Volume, {}, {"method": METHOD | {"of the other route": solvers.ActiveSet()}, "tolerance": SHARE,

@@ -116,17 +116,6 @@ DISASTER AND EMERGENCY MANAGEMENT PRESIDENCY
    -1.500000      0.780000     0.400000
     0.520000     -1.000000    -0.260000
 """
-EVENT = """{"Events": [
-    {"name": "two components", "type": "Seismic", "dT": 0.01, "numSteps": 3,
-     "timeSeries": [
-        {"name": "accel_X", "type": "Value", "dT": 0.01, "data": [0.0, 0.1, -0.2]},
-        {"name": "accel_Y", "type": "Value", "dT": 0.01, "data": [0.3, 1e-1, 0]}],
-     "pattern": [
-        {"type": "UniformAcceleration", "timeSeries": "accel_X", "dof": 1},
-        {"type": "UniformAcceleration", "timeSeries": "accel_Y", "dof": 2}]
-    }]}
-"""
-ONE = '{"timeSeries": [{"name": "x", "dT": 0.02, "data": [0.0, 0.1, -0.2]}]}'
 
 
 def smc(kind="2 CORRECTED ACCELEROGRAM", *, rate="  0.2000000E+03", n=11, comments=2, vertical=90, samples=VALUES):

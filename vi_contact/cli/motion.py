@@ -37,7 +37,7 @@ def add_motion_commands(commands: Any) -> None:
     for name, one in parsers.items():
         one.set_defaults(spelling=_SPELLING)
         one.add_argument("file", nargs="+" if name in ("info", "spectrum") else None,
-                         help="AT2, COSMOS/CSMIP V2, SMC, K-NET, ESM, AFAD, SimCenter, columns, path series")
+                         help="AT2, COSMOS/CSMIP V2, SMC, K-NET, ESM, AFAD, columns, path series")
     parsers["convert"].add_argument("out", help="file to write")
     for one in parsers.values():
         _add_reading(one)

@@ -9,7 +9,6 @@ from .friction import GivenForces as GivenForces
 from .friction import NSGS as NSGS
 from .friction import Plain as Plain
 from .friction import RateIteration as RateIteration
-from .friction import Uzawa as Uzawa
 from .iterative import Iterative as Iterative
 from .normal import ActiveSet as ActiveSet
 from .normal import Hildreth as Hildreth
@@ -18,4 +17,4 @@ from .volume import SemismoothNewton as SemismoothNewton
 from .volume import TaoTron as TaoTron
 from .volume import Volume as Volume
 
-__all__: list[str] = ['ActiveSet', 'Anderson', 'Automatic', 'Condensed', 'FixedPoint', 'FrictionNewton', 'GivenForces', 'Hildreth', 'Iterative', 'NSGS', 'Plain', 'RateIteration', 'ReducedNewton', 'SemismoothNewton', 'TaoTron', 'Uzawa', 'Volume']
+__all__: list[str] = ['ActiveSet', 'Anderson', 'Automatic', 'Condensed', 'FixedPoint', 'FrictionNewton', 'GivenForces', 'Hildreth', 'Iterative', 'NSGS', 'Plain', 'RateIteration', 'ReducedNewton', 'SemismoothNewton', 'TaoTron', 'Volume']

@@ -52,7 +52,7 @@ class Condensed:
     """Condense onto the contact unknowns, with a method for the small problem; with or without friction, on any ranks.
 
     ``method`` solves it without friction: ActiveSet or Hildreth. ``friction_method`` solves it with friction:
-    FrictionNewton, NSGS or FixedPoint, GivenForces or Uzawa; ``rates`` is the iteration around it for laws that depend
+    FrictionNewton, NSGS or FixedPoint or GivenForces; ``rates`` is the iteration around it for laws that depend
     on the slip rate. Contact sets too large for a dense G are for ``Iterative``.
     """
 

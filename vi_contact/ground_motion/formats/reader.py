@@ -10,10 +10,10 @@ from ...core.errors import InputError
 from ...core.units import STANDARD_GRAVITY
 from ..processing import resampled
 from ..record import LARGEST_PEAK, Record
-from . import afad, at2, columns, cosmos, esm, knet, simcenter, smc
+from . import afad, at2, columns, cosmos, esm, knet, smc
 from .text import load_text
 
-SEVERAL = (cosmos, afad, simcenter)  # formats whose files may hold several components
+SEVERAL = (cosmos, afad)  # formats whose files may hold several components
 STEPS = 1e-6, 100.0  # shortest and longest time step [s] of a file; that of seismographs is 0.001 to 0.05
 
 
@@ -22,7 +22,7 @@ def read_record(path: str | os.PathLike[str], units: str | None = None, *, dt: f
                 largest: float = LARGEST_PEAK) -> Record:
     """Read one component of ground motion from a file of any format listed in docs/guide/records.md.
 
-    units: a key of UNITS ("m/s2", "cm/s2", "gal", "g", ...); required for column and SimCenter files, elsewhere only
+    units: a key of UNITS ("m/s2", "cm/s2", "gal", "g", ...); required for columns, elsewhere only
     checked against what the file states. dt: time step [s], for files that do not state one. resample_dt: time step [s]
     the record is brought to by `resampled`; it also allows uneven times in a column file. channel: which one, from 1,
     of a file that holds several (SEVERAL). largest: the greatest peak acceleration [m/s²] that is believed; give more

@@ -9,6 +9,5 @@ _CONTENTS = {
     "newton": ("FrictionNewton",),
     "nsgs": ("NSGS",),
     "slip_rate": ("RateIteration",),
-    "uzawa": ("Uzawa",),
 }
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

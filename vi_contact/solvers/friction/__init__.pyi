@@ -7,6 +7,5 @@ from .given_forces import GivenForces as GivenForces
 from .newton import FrictionNewton as FrictionNewton
 from .nsgs import NSGS as NSGS
 from .slip_rate import RateIteration as RateIteration
-from .uzawa import Uzawa as Uzawa
 
-__all__: list[str] = ['Anderson', 'FixedPoint', 'FrictionNewton', 'GivenForces', 'NSGS', 'Plain', 'RateIteration', 'Uzawa']
+__all__: list[str] = ['Anderson', 'FixedPoint', 'FrictionNewton', 'GivenForces', 'NSGS', 'Plain', 'RateIteration']

@@ -53,7 +53,7 @@ class FrictionResult:
 
 
 class FrictionMethod(Protocol):
-    """Solve (1): FrictionNewton, NSGS, FixedPoint, GivenForces or Uzawa."""
+    """Solve (1): FrictionNewton, NSGS, FixedPoint or GivenForces."""
 
     @property
     def carries_friction(self) -> bool:
@@ -77,7 +77,7 @@ class Settings:
 
 def inner_method(owner: str, meaning: str, value: Any) -> None:
     """Raise InputError unless it is a method for the small problem with friction."""
-    remedy = "give FrictionNewton(), NSGS(), FixedPoint(), GivenForces() or Uzawa()"
+    remedy = "give FrictionNewton(), NSGS(), FixedPoint() or GivenForces()"
     provides(owner, meaning, value, ("prepare", "carries_friction"), remedy, lacks=("check",))
 
 
