@@ -125,6 +125,20 @@ def test_finished_runs_are_kept(study: Path) -> None:
     assert (study / "ida.csv").read_bytes() == before
 
 
+def test_a_failed_run_is_a_row_and_a_status(study: Path, tmp_path: Path, capsys: Any) -> None:
+    """The command ends with 1 and says so, with the reason of the first failed run; the others keep their rows."""
+    (tmp_path / "bad.txt").write_text("0 1\n0.1 x\n")
+    asked = ["ida", "wall.toml", "--motions", *MOTIONS, str(tmp_path / "bad.txt"), "--scales", "1,2", "--im", "sa:0.1",
+             "--edp", *DEMANDS, "--fragility", "u_x_top:min=-1e9", "--out", str(study)]
+    assert main(asked) == 1
+    printed = capsys.readouterr()
+    assert "2 of 6 runs have failed, the first because: " in printed.err and f"are in {study}/ida.csv" in printed.err
+    assert "bad.txt, line 2: 'x' is not a number" in printed.err
+    assert "fragility of u_x_top:min=-1e9: 0 of 2 records pass the limit" in printed.out
+    assert [row["status"] for row in table(study)] == ["failed"] * 2 + ["finished"] * 4
+    assert main([*asked[:5], *asked[6:]]) == 1  # the rows of before are in the table
+
+
 def test_other_demands_and_measures_need_no_runs(study: Path) -> None:
     rows, said = again(study, demands=("contact_resultant:max", "u_x_top:last"), intensity="arias")
     assert said[-1].endswith("4 finished before")
@@ -341,7 +355,7 @@ def test_the_picture_of_many_records(tmp_path: Path) -> None:
     curves = {str(k): (np.arange(3.0), k * np.arange(3.0)) for k in range(8)}
     panels = [DemandPanel("a", "m", curves, *fractiles(curves, (0.16, 0.5, 0.84)), (1.5,)),
               DemandPanel("b", "-", {"0": (np.ones(1), np.zeros(1))}, np.zeros(0), np.zeros((0, 3)))]
-    assert plot_ida(panels, tmp_path / "ida.png", intensity="PGA [m/s²]").stat().st_size > 4_000
+    assert plot_ida(panels, tmp_path / "ida.png", intensity="PGA", unit="m/s²").stat().st_size > 4_000
 
 
 def test_paths_are_quoted_for_toml() -> None:

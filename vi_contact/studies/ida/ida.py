@@ -1,8 +1,9 @@
 """Incremental dynamic analysis: one structure under many motions, each at many intensities, in one tidy table.
 
 Vamvatsikos and Cornell, Earthquake Engng Struct. Dyn. 31 (2002). In the folder of a study, beside ``ida.csv``,
-``columns.json`` and ``ida.png``: ``ida.json``, the case and the records, so that no other study is mixed in, and
-``runs/NAME_xSCALE``, the folder of every run, with its row.
+``columns.json`` and ``ida.png``: ``fragility.csv`` and ``fragility.png``, where there are limits; ``ida.json``, the
+case and the records, so that no other study is mixed in, and ``runs/NAME_xSCALE``, the folder of every run, with its
+row.
 """
 
 import hashlib
@@ -12,7 +13,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import timedelta
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
@@ -22,12 +23,14 @@ from ...core.errors import InputError
 from ...core.files import to_json, write_atomically, write_csv
 from ...fem.mesh import alone
 from ...ground_motion.processing import scaled
-from ...plots.studies import DemandPanel, plot_ida
+from ...plots.studies import DemandPanel, plot_fragility, plot_ida
 from ...run.files.folder import LOCK, locked
 from ...run.files.reading import read_run
 from ...run.wall_time import WallTime
-from ..cases.case import Case
+from ..cases.case import Case, read_case
+from ..cases.description import describe
 from ..cases.parsing import nearest
+from .fragility import Limit, fragility_curve, limit
 from .measures import Demand, Intensity, demand, fractiles, intensity
 from .processes import executed, refuse_mpirun
 from .runs import ROW, OneRun, Row, Shaking, read_json, read_row, shakings
@@ -36,6 +39,7 @@ Units = dict[str, tuple[str, str]]
 SECONDS = 30.0  # between two lines about the time left
 SHARES = (0.16, 0.50, 0.84)
 TABLE, COLUMNS, FIGURE, STUDY, RUNS = "ida.csv", "columns.json", "ida.png", "ida.json", "runs"
+FRAGILITY = "fragility.csv"
 
 
 @dataclass(frozen=True)
@@ -44,8 +48,9 @@ class IDA:
 
     case: shaken by GroundMotions alone, whose record files are replaced; motions: a file, or one file per GroundMotion
     of the case, for each record; its name is that of its first file. scales: factors on the motion as the case prepares
-    it; or levels: values of the intensity, in its unit. intensity: "pga", "pgv", "pgd", "sa:T", "arias", "cav",
-    "housner", of the first motion. demands: "COLUMN" or "COLUMN:max", ":min", ":absmax", ":last" of history.csv.
+    it; or levels: values of the intensity, in its unit. intensity: "pga", "pgv", "pgd", "sa:T", "sa:T1" (T1 as
+    ``vi-contact run --check`` tells it), "arias", "cav", "housner", of the first motion. demands: "COLUMN" or
+    "COLUMN:max", ":min", ":absmax", ":last" of history.csv. limits: "COLUMN:WAY=VALUE", each gets a fragility curve.
     Raises InputError for other words, no motions, two of one name, not exactly one of scales and levels.
     """
 
@@ -55,6 +60,7 @@ class IDA:
     scales: Sequence[float] = ()
     levels: Sequence[float] = ()
     intensity: str = "pga"
+    limits: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         if bool(self.scales) == bool(self.levels):
@@ -66,15 +72,25 @@ class IDA:
             raise InputError("no demands: give at least one column of history.csv, such as contact_uplift:max")
         _ = self.measure, self.wanted, self.shakings
 
-    @property
+    @cached_property
     def measure(self) -> Intensity:
         """Return the intensity measure."""
-        return intensity(self.intensity)
+        return intensity(self.intensity, self._first_period)
+
+    def _first_period(self) -> float:
+        settings = (*self.case.settings, *self.shakings[0].settings(self.case))
+        model = describe(read_case(self.case.path, settings, allow=self.case.allowed), alone())
+        return float(next(iter(model.get("periods", ())), 0.0))
 
     @property
     def wanted(self) -> list[Demand]:
-        """Return the demand parameters."""
-        return [demand(text) for text in self.demands]
+        """Return the demand parameters, those of the limits among them."""
+        return list(dict.fromkeys((*map(demand, self.demands), *(one.demand for one in self.passed))))
+
+    @property
+    def passed(self) -> list[Limit]:
+        """Return the limits of demands."""
+        return [limit(text) for text in self.limits]
 
     @property
     def shakings(self) -> list[Shaking]:
@@ -144,7 +160,10 @@ def run_ida(
             scale = "?" if found["scale"] is None or math.isnan(found["scale"]) else f"{found['scale']:g}"
             say(f"[{number}/{len(left)}] {found['record']} x {scale}: {found['status']}"
                 + (f": {found['reason']}" if found["reason"] else ""))
-        return _tell(study, out, draw=True)
+        rows = _tell(study, out, draw=True)
+        if study.limits:
+            _fragilities(study, out, rows, say)
+        return rows
 
 
 def _check_demands(study: IDA) -> None:
@@ -191,7 +210,7 @@ def _tell(study: IDA, out: Path, *, draw: bool = False) -> list[Row]:
     write_atomically(out / COLUMNS, to_json(described).encode())
     if draw and any(row["status"] == "finished" for row in rows):
         panels = [_panel(rows, study.measure.name, one.name, units[one.name]) for one in study.wanted]
-        plot_ida(panels, out / FIGURE, intensity=f"{study.measure.meaning} [{study.measure.unit}]")
+        plot_ida(panels, out / FIGURE, unit=study.measure.unit, intensity=study.measure.meaning)
     return rows
 
 
@@ -234,6 +253,25 @@ def _history(folder: Path, wanted: tuple[str, ...]) -> tuple[dict[str, Array], U
     numbers = {name: values for name, values in run.history.items() if np.ndim(values) == 1}
     kept = {name: numbers[name] for name in wanted if name in numbers}
     return (kept if len(kept) == len(set(wanted)) else numbers), dict(run.columns)
+
+
+def _fragilities(study: IDA, out: Path, rows: Sequence[Row], say: Callable[[str], None]) -> None:
+    """Fits, writes and draws the curves of the limits, and says each; where none can be fitted, why."""
+    found, table, measure = {}, [], study.measure
+    for text, one in zip(study.limits, study.passed, strict=True):
+        try:
+            fit = fragility_curve(one.brackets(rows, measure.name))
+        except InputError as error:
+            say(f"fragility of {text}: {error}")
+            continue
+        found[text] = fit.probability, fit.brackets
+        table.append([text, fit.theta, *fit.intervals[0], fit.beta, *fit.intervals[1], len(fit.brackets)])
+        say("fragility of {}: median {:.4g} ({:.4g} to {:.4g}) {unit}, dispersion {:.3g} ({:.3g} to {:.3g}), {} records"
+            .format(*table[-1], unit=measure.unit))
+    names = ["limit", "theta", "theta_low", "theta_high", "beta", "beta_low", "beta_high", "records"]
+    write_csv(out / FRAGILITY, names, table)
+    if found:
+        plot_fragility(found, (out / FRAGILITY).with_suffix(".png"), unit=measure.unit, intensity=measure.meaning)
 
 
 def _panel(rows: Sequence[Row], level: str, name: str, column: tuple[str, str]) -> DemandPanel:

@@ -48,12 +48,13 @@ _MEASURES = {one.name: one for one in (
 )}
 
 
-def intensity(text: str) -> Intensity:
-    """Return the measure of a word: pga, pgv, pgd, arias, cav, housner, or sa:T (pseudo-acceleration at T s, 5 %)."""
+def intensity(text: str, first_period: Callable[[], float] | None = None) -> Intensity:
+    """Return the measure of a word: pga, pgv, pgd, arias, cav, housner, or sa:T (pseudo-acceleration at T s, 5 %),
+    "sa:T1" at the period that ``first_period`` finds [s]."""
     word, _, period = text.partition(":")
     if word == "sa":
         try:
-            seconds = float(period)
+            seconds = first_period() if period == "T1" and first_period is not None else float(period)
         except ValueError:
             seconds = 0.0
         if not 0.0 < seconds < np.inf:

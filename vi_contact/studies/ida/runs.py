@@ -35,7 +35,7 @@ class Shaking:
         found = []
         for (place, table), path in zip(ground_motions(case), self.files, strict=True):
             record = table.get("record")
-            key = f"{place}.record.path" if isinstance(record, dict) else f"{place}.record"
+            key = f"{place}.record.path" if isinstance(record, dict) and "path" in record else f"{place}.record"
             found += [f"{key}={toml_value(str(path))}", f"{place}.scale={float(table.get('scale', 1.0)) * factor!r}"]
         return tuple(found)
 
@@ -59,13 +59,31 @@ def ground_motions(case: Case) -> list[tuple[str, Mapping[str, Any]]]:
     if not isinstance(tables, dict):
         found = [(f"excitation.{number}", table) for number, table in enumerate(tables, start=1)]
     for place, table in found:
-        record = table.get("record")
-        if table.get("type") != "GroundMotion" or (isinstance(record, dict) and "path" not in record):
+        if table.get("type") != "GroundMotion":
             raise InputError(f"{case.path}: [{place}] is no GroundMotion with a record file, whose place other records "
                              "can take: make it one")
     if not found:
         raise InputError(f"{case.path}: no [[excitation]] whose record other records can replace: give a GroundMotion")
     return found
+
+
+def record_set(word: str) -> list[list[str]]:
+    """Return the files of each record of "H", "H,V", a folder (its AT2 files, if there are any, else all), or "@LIST",
+    a file with one of the first two a line, relative to its folder. InputError for others."""
+    folder, names, path = Path(), [word], Path(word.removeprefix("@"))
+    try:
+        if word.startswith("@"):
+            folder, lines = path.parent, path.read_text(encoding="utf-8").splitlines()
+            names = [one for line in lines if (one := line.partition("#")[0].strip())]
+        elif path.is_dir():
+            every = sorted(str(one) for one in path.iterdir() if one.is_file() and not one.name.startswith("."))
+            names = [one for one in every if one.lower().endswith(".at2")] or every
+    except (OSError, ValueError) as error:
+        raise InputError(f"--motions {word} cannot be read ({error}): give a text file with a record a line") from None
+    found = [[name.strip() for name in one.split(",")] for one in names]
+    if not found or not all(map(all, found)):
+        raise InputError(f"--motions {word}: give FILE, or FILE,FILE, a folder of them, or @LIST with a record a line")
+    return [[str(folder / name) for name in files] for files in found]
 
 
 def shakings(case: Case, motions: Sequence[str | Path | Sequence[str | Path]]) -> list[Shaking]:
