@@ -2,11 +2,15 @@
 """What an incremental dynamic analysis costs with eight runs in a process, and with a process for each.
 
     python3 benchmarks/ida.py [--records 20] [--scales 5] [--duration 4] [--mesh 4 6] [--json FILE]
+    python3 benchmarks/ida.py --case vi_contact/studies/starters/wall.toml --set fields= --scales 10 --step 0.2 \
+        --duration 10 --jobs 2
 
 The wall of demos/cases/wall_record.toml, which begins under its weight and slides with Coulomb friction, under
-synthetic motions. Keys of the row: ``records``, ``scales``, ``runs``, ``unknowns``, ``steps`` of a run;
-``seconds_apart`` and ``seconds_together``: processor time of all processes of a study, from the command to its table
-and figure; ``ratio``: of the two; ``worst_difference``: of the demands of the two studies, over each one's largest.
+synthetic motions; or another case with contact, and a probe called "top". Keys of the row: ``records``, ``scales``,
+``runs``, ``unknowns``, ``steps`` of a run; ``seconds_apart`` and ``seconds_together``: processor time of all processes
+of a study, from the command to its table and figure; ``ratio``: of the two; ``wall_seconds_apart``,
+``wall_seconds_together`` and ``wall_ratio``: by the clock, with so many ``jobs`` at a time; ``worst_difference``: of
+the demands of the two studies, over each one's largest.
 """
 
 from __future__ import annotations
@@ -17,10 +21,12 @@ import os
 import resource
 import sys
 import tempfile
+import time
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
+CASE = ROOT / "demos" / "cases" / "wall_record.toml"
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[name] = "1"
 sys.path.insert(0, str(ROOT))
@@ -53,15 +59,16 @@ def seconds() -> float:
 
 def measured(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """The row."""
-    case = read_case(ROOT / "demos" / "cases" / "wall_record.toml", [f"mesh.divisions={options.mesh}"])
-    scales = tuple(0.5 * k for k in range(1, options.scales + 1))
+    mesh = [f"mesh.divisions={options.mesh}"] if options.case == CASE else []
+    case = read_case(options.case, [*mesh, *options.settings])
+    scales = tuple(options.step * k for k in range(1, options.scales + 1))
     study = IDA(case, motions(folder, options.records, options.duration), DEMANDS, scales=scales)
-    spent, rows = {}, {}
+    spent, passed, rows = {}, {}, {}
     for way, runs in (("together", processes.TOGETHER), ("apart", 1)):
         processes.TOGETHER = runs
-        begin = seconds()
-        rows[way] = run_ida(study, folder / way, say=lambda line: None)
-        spent[way] = seconds() - begin
+        begin, clock = seconds(), time.perf_counter()
+        rows[way] = run_ida(study, folder / way, jobs=options.jobs, say=lambda line: None)
+        spent[way], passed[way] = seconds() - begin, time.perf_counter() - clock
     failed = [row["reason"] for found in rows.values() for row in found if row["status"] != "finished"]
     if failed:
         sys.exit(f"{len(failed)} runs failed, the first because: {failed[0]}")
@@ -71,22 +78,28 @@ def measured(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     return {
         "records": options.records, "scales": options.scales, "runs": len(rows["apart"]),
         "unknowns": about["unknowns"], "steps": about["steps"], "seconds_apart": spent["apart"],
-        "seconds_together": spent["together"], "ratio": spent["together"] / spent["apart"],
+        "seconds_together": spent["together"], "ratio": spent["together"] / spent["apart"], "jobs": options.jobs,
+        "wall_seconds_apart": passed["apart"], "wall_seconds_together": passed["together"],
+        "wall_ratio": passed["together"] / passed["apart"],
         "worst_difference": float(np.max(np.abs(ours - theirs) / np.abs(theirs).max(axis=0))),
     }
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--case", type=lambda text: Path(text).resolve(), default=CASE, help="another case file")
+    parser.add_argument("--set", dest="settings", action="append", default=[], metavar="KEY=VALUE", help="of the case")
     parser.add_argument("--records", type=int, default=20)
-    parser.add_argument("--scales", type=int, default=5)
+    parser.add_argument("--scales", type=int, default=5, help="how many: 1, 2, 3... times --step")
+    parser.add_argument("--step", type=float, default=0.5, help="of the scales: 1 is a peak of 3 m/s²")
+    parser.add_argument("--jobs", type=int, default=1, help="processes at a time")
     parser.add_argument("--duration", type=float, default=4.0, help="of a motion [s]")
-    parser.add_argument("--mesh", type=int, nargs=2, default=[4, 6], help="cells across and up")
+    parser.add_argument("--mesh", type=int, nargs=2, default=[4, 6], help="cells across and up, of the case that it has")
     parser.add_argument("--json", type=Path, help="write the row into this file")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         row = measured(options, Path(folder))
-    print("\n".join(f"{name:<18} {value:.4g}" for name, value in row.items()))
+    print("\n".join(f"{name:<22} {value:.4g}" for name, value in row.items()))
     if options.json:
         options.json.write_text(json.dumps([row], indent=1) + "\n", encoding="utf-8")
 

@@ -109,7 +109,6 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "studies/test_case_checks.py": "studies.cases.checks",
     "studies/test_case_inputs.py": "studies.cases.table_calls",
     "studies/test_description.py": "fem.output.outline plots.sketch",
-    "studies/test_fragility.py": "studies.ida.fragility",
     "studies/test_stages.py": "studies.cases.stage_tables",
     "studies/test_strain_compatible_case.py": "studies.cases.strain_compatible",
     "studies/test_ida.py":

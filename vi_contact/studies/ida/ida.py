@@ -30,7 +30,7 @@ from ...run.wall_time import WallTime
 from ..cases.case import Case, read_case
 from ..cases.description import describe
 from ..cases.parsing import nearest
-from .fragility import Limit, fragility_curve, limit
+from .fragility import fragility_curve, limit
 from .measures import Demand, Intensity, demand, fractiles, intensity
 from .processes import executed, refuse_mpirun
 from .runs import ROW, OneRun, Row, Shaking, read_json, read_row, shakings
@@ -85,12 +85,7 @@ class IDA:
     @property
     def wanted(self) -> list[Demand]:
         """Return the demand parameters, those of the limits among them."""
-        return list(dict.fromkeys((*map(demand, self.demands), *(one.demand for one in self.passed))))
-
-    @property
-    def passed(self) -> list[Limit]:
-        """Return the limits of demands."""
-        return [limit(text) for text in self.limits]
+        return list(dict.fromkeys((*map(demand, self.demands), *(limit(text).demand for text in self.limits))))
 
     @property
     def shakings(self) -> list[Shaking]:
@@ -258,9 +253,9 @@ def _history(folder: Path, wanted: tuple[str, ...]) -> tuple[dict[str, Array], U
 def _fragilities(study: IDA, out: Path, rows: Sequence[Row], say: Callable[[str], None]) -> None:
     """Fits, writes and draws the curves of the limits, and says each; where none can be fitted, why."""
     found, table, measure = {}, [], study.measure
-    for text, one in zip(study.limits, study.passed, strict=True):
+    for text in study.limits:
         try:
-            fit = fragility_curve(one.brackets(rows, measure.name))
+            fit = fragility_curve(limit(text).brackets(rows, measure.name))
         except InputError as error:
             say(f"fragility of {text}: {error}")
             continue
