@@ -87,14 +87,14 @@ def measured(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--case", type=lambda text: Path(text).resolve(), default=CASE, help="another case file")
-    parser.add_argument("--set", dest="settings", action="append", default=[], metavar="KEY=VALUE", help="of the case")
+    parser.add_argument("--case", type=lambda text: Path(text).resolve(), default=CASE, help="a case file")
+    parser.add_argument("--set", dest="settings", action="append", default=[], metavar="KEY=VALUE")
     parser.add_argument("--records", type=int, default=20)
     parser.add_argument("--scales", type=int, default=5, help="how many: 1, 2, 3... times --step")
     parser.add_argument("--step", type=float, default=0.5, help="of the scales: 1 is a peak of 3 m/s²")
     parser.add_argument("--jobs", type=int, default=1, help="processes at a time")
     parser.add_argument("--duration", type=float, default=4.0, help="of a motion [s]")
-    parser.add_argument("--mesh", type=int, nargs=2, default=[4, 6], help="cells across and up, of the case that it has")
+    parser.add_argument("--mesh", type=int, nargs=2, default=[4, 6], help="cells across and up, of its own case")
     parser.add_argument("--json", type=Path, help="write the row into this file")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:

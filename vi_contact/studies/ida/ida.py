@@ -22,7 +22,6 @@ from ...core.algebra import Array, SerialComm
 from ...core.errors import InputError
 from ...core.files import to_json, write_atomically, write_csv
 from ...fem.mesh import alone
-from ...ground_motion.processing import scaled
 from ...plots.studies import DemandPanel, plot_fragility, plot_ida
 from ...run.files.folder import LOCK, locked
 from ...run.files.reading import read_run
@@ -231,7 +230,7 @@ def _tabulated(case: Case, out: Path, measure: Intensity, demands: Sequence[Dema
         shaking = Shaking(row["record"], tuple(map(Path, row["files"])))
         if row["scale"] is not None:
             with suppress(InputError):
-                measured[measure.name] = measure.of(scaled(shaking.record(case), factor=row["scale"]))
+                measured[measure.name] = measure.of(shaking.record(case)) * row["scale"] ** measure.degree
         if row["status"] == "finished":
             history, of_column = _history(folder, tuple(one.column for one in demands))
             for one in demands:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
@@ -60,7 +60,7 @@ def intensity(text: str, first_period: Callable[[], float] | None = None) -> Int
         if not 0.0 < seconds < np.inf:
             raise InputError(f"intensity '{text}': give the period after the colon in seconds, such as sa:0.5")
         meaning = f"pseudo-acceleration at {seconds:g} s, 5 % damping"
-        return Intensity(f"sa_{seconds:g}", "m/s²", meaning, 1, partial(psa, period=seconds))
+        return Intensity(f"sa_{seconds:g}", "m/s²", meaning, 1, cache(partial(psa, period=seconds)))  # asked often
     if period or word not in _MEASURES:
         raise InputError(f"unknown intensity '{text}': choose one of {', '.join(_MEASURES)}, or sa:T with T in seconds")
     return _MEASURES[word]
