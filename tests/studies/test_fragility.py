@@ -19,7 +19,7 @@ from vi_contact.fem.mesh import alone
 from vi_contact.ground_motion import Record, write_at2
 from vi_contact.plots.studies import plot_fragility
 from vi_contact.studies import IDA, fragility_curve, read_case, record_set, run_ida
-from vi_contact.studies.ida.fragility import limit
+from vi_contact.studies.ida.fragility import limit, passing
 from vi_contact.studies.ida.measures import intensity
 from vi_contact.studies.ida.runs import OneRun, Row
 
@@ -110,8 +110,8 @@ def test_where_records_pass() -> None:
     rows = [row("a", 3.0, 1.0), row("a", 1.0, 0.1), row("a", 2.0, 0.5), row("b", 2.0, 0.7), row("c", 1.0, 0.2),
             row("c", 2.0, None, "failed"), row("c", 3.0, 9.0), row("d", None, None, "failed"), row("e", 1.0, math.nan),
             row("f", 1.0, 0.1), row("f", 2.0, 0.6), row("f", 3.0, 0.2), row("g", 1.0, 0.0), row("g", 2.0, 0.0)]
-    assert limit("u:max=0.5").brackets(rows, "pga").tolist() == [[1, 2], [1, INF], [1, 2], [2, INF], [0, 2]]
-    assert limit("u:min=0.1").brackets(rows, "pga").tolist() == [[0, 1], [1, INF], [0, 1], [0, 1], [2, INF]]
+    assert passing(rows, "u:max=0.5", "pga").tolist() == [[1, 2], [1, INF], [1, 2], [2, INF], [0, 2]]
+    assert passing(rows, "u:min=0.1", "pga").tolist() == [[0, 1], [1, INF], [0, 1], [0, 1], [2, INF]]
     for wrong in ("u:max", "u:max=", "u:max=one", "u:max=nan"):
         with pytest.raises(InputError, match=f"limit '{wrong}': give COLUMN:WAY=VALUE with a number"):
             limit(wrong)

@@ -30,34 +30,11 @@ SAME = 1e-9  # of two intensities: they are those of records that were scaled to
 LEAST = 0.01  # of 1/beta, over that of the levels: below it the records do not tell how far capacities lie apart
 
 
-@dataclass(frozen=True)
-class Limit:
-    """Define what counts as passed: a demand at ``value`` or above, for the way "min" at it or below."""
+def limit(text: str) -> tuple[Demand, float]:
+    """Return demand and limit of a text "COLUMN:WAY=VALUE", the value in the unit of the column. InputError for others.
 
-    demand: Demand
-    value: float
-
-    def brackets(self, rows: Sequence[Mapping[str, Any]], level: str) -> Array:
-        """Return (records, 2) values of the column ``level`` between which each record first passes.
-
-        Of a record count the runs below its first failed one; one without any is left out.
-        """
-        found: dict[str, tuple[float, float]] = {}
-        ended = set()
-        for row in sorted((row for row in rows if row[level] is not None), key=lambda row: float(row[level])):
-            record, value = row["record"], row[self.demand.name]
-            if record in ended or row["status"] != "finished" or not math.isfinite(value):
-                ended.add(record)
-            elif value <= self.value if self.demand.way == "min" else value >= self.value:
-                found[record] = found.get(record, (0.0, math.inf))[0], row[level]
-                ended.add(record)
-            else:
-                found[record] = row[level], math.inf
-        return np.array(list(found.values())).reshape(-1, 2)
-
-
-def limit(text: str) -> Limit:
-    """Return the limit of a text "COLUMN:WAY=VALUE", the value in the unit of the column. InputError for others."""
+    It is passed by a demand at the value or above, for the way "min" at it or below.
+    """
     name, _, value = text.partition("=")
     try:
         found = float(value)
@@ -66,7 +43,25 @@ def limit(text: str) -> Limit:
     if not math.isfinite(found):
         raise InputError(f"limit '{text}': give COLUMN:WAY=VALUE with a number in the unit of the column, such as "
                          "contact_max_slip:max=0.05")
-    return Limit(demand(name), found)
+    return demand(name), found
+
+
+def passing(rows: Sequence[Mapping[str, Any]], text: str, level: str) -> Array:
+    """Return (records, 2) values of the column ``level`` between which each record first passes a limit.
+
+    Of a record count the runs below its first failed one; one without any is left out.
+    """
+    (one, most), found, ended = limit(text), dict[str, tuple[float, float]](), set()
+    for row in sorted((row for row in rows if row[level] is not None), key=lambda row: float(row[level])):
+        record, value = row["record"], row[one.name]
+        if record in ended or row["status"] != "finished" or not math.isfinite(value):
+            ended.add(record)
+        elif value <= most if one.way == "min" else value >= most:
+            found[record] = found.get(record, (0.0, math.inf))[0], row[level]
+            ended.add(record)
+        else:
+            found[record] = row[level], math.inf
+    return np.array(list(found.values())).reshape(-1, 2)
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from ...run.wall_time import WallTime
 from ..cases.case import Case, read_case
 from ..cases.description import describe
 from ..cases.parsing import nearest
-from .fragility import fragility_curve, limit
+from .fragility import fragility_curve, limit, passing
 from .measures import Demand, Intensity, demand, fractiles, intensity
 from .processes import executed, refuse_mpirun
 from .runs import ROW, OneRun, Row, Shaking, read_json, read_row, shakings
@@ -84,7 +84,7 @@ class IDA:
     @property
     def wanted(self) -> list[Demand]:
         """Return the demand parameters, those of the limits among them."""
-        return list(dict.fromkeys((*map(demand, self.demands), *(limit(text).demand for text in self.limits))))
+        return list(dict.fromkeys((*map(demand, self.demands), *(limit(text)[0] for text in self.limits))))
 
     @property
     def shakings(self) -> list[Shaking]:
@@ -254,7 +254,7 @@ def _fragilities(study: IDA, out: Path, rows: Sequence[Row], say: Callable[[str]
     found, table, measure = {}, [], study.measure
     for text in study.limits:
         try:
-            fit = fragility_curve(limit(text).brackets(rows, measure.name))
+            fit = fragility_curve(passing(rows, text, measure.name))
         except InputError as error:
             say(f"fragility of {text}: {error}")
             continue
