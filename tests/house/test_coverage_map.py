@@ -85,8 +85,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "solvers/test_nothing_stays.py": "fem.communicators",
     "solvers/test_friction_condensed.py": "solvers.certified solvers.friction.newton",
     "solvers/test_friction_methods.py":
-        "solvers.friction.fixed_point solvers.friction.given_forces solvers.friction.linear "
-        "solvers.friction.uzawa",
+        "solvers.friction.fixed_point solvers.friction.given_forces solvers.friction.linear",
     "solvers/test_friction_on_finite_elements.py": "solvers.friction.problem",
     "solvers/test_iterative.py":
         "solvers.iterative.contact solvers.iterative.failures solvers.iterative.layout "

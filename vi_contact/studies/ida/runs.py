@@ -124,8 +124,9 @@ class OneRun:
 
     @property
     def settings(self) -> tuple[str, ...]:
-        """Return all KEY=VALUE that make the run of the case file."""
-        return (*self.case.settings, *self.shaking.settings(self.case, self.factor))
+        """Return all KEY=VALUE that make the run of the case file; it writes fields only if the study sets them."""
+        asked = "fields" not in self.case.tables or any(one.startswith("fields") for one in self.case.settings)
+        return (*self.case.settings, *self.shaking.settings(self.case, self.factor), *(() if asked else ("fields=",)))
 
     def keep(self, said: str, code: int) -> Row:
         """Write the row of a run that ended with this status, having said this; failed ones leave that in a file."""
