@@ -130,6 +130,18 @@ def test_the_command_tells_and_draws(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 
 @pytest.mark.serial
+def test_the_model_of_a_run_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """model.json is what its history was computed with: a check of the case as it is now leaves it."""
+    path, out = str(written(tmp_path)), tmp_path / "out"
+    assert main(["run", path, "--out", str(out), "--quiet"]) == 0
+    model = (out / "model.json").read_bytes()
+    assert main(["run", path, "--out", str(out), "--quiet", "--check", "--set", "material.upper.rho=1000.0"]) == 0
+    assert f"picture: {out / 'check.png'}\n" in capsys.readouterr().out
+    assert (out / "model.json").read_bytes() == model and not (out / "model.png").exists()
+    assert (out / "check.png").read_bytes()[:4] == b"\x89PNG"
+
+
+@pytest.mark.serial
 def test_the_page_shows_what_the_command_tells(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
                                                capsys: pytest.CaptureFixture[str]) -> None:
     page = (Path(__file__).resolve().parents[2] / "docs" / "guide" / "check.md").read_text(encoding="utf-8")
@@ -186,6 +198,22 @@ def test_check_ends_with_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFix
     assert main(["run", str(path), "--check", "--quiet", "--out", str(tmp_path / "out")]) == 1
     error = capsys.readouterr().err
     assert error.count("\n") == 1 and said in error
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("motion", [RECORD, f'[{{type = "GroundMotion", direction = [0.0, 1.0], record = {RECORD}}}]'],
+                         ids=["record", "excitation"])
+def test_motions_of_a_compliant_base_are_records(tmp_path: Path, motion: str) -> None:
+    """Told once, however many boundaries it comes through, and looked at as those of excitations are."""
+    base = 'facets = "lower_bottom", normal = 0.5, motion = {direction = [0.0, 1.0], motion = ' + motion + "}}, "
+    bases = "".join(f'{{type = "CompliantBase", {one}' for one in (base, base.replace("_bottom", "_left")))
+    text = re.sub(r"\[\[excitation\]\].*?\n(?=\[run\])", "", BLOCKS, flags=re.DOTALL)
+    text = re.sub("clamped = .*\nprescribed = .*\n", "", text).replace("dashpots = [", f"dashpots = [{bases}")
+    model = described(written(tmp_path, text.replace("dt = 0.002", "dt = 0.02")))
+    (record,) = model["records"]
+    assert record["file"] == "synthetic, seed 3" and 1.0 < record["f_95"] < 50.0
+    (said,) = model["defects"]
+    assert "time step of 0.02 s leaves out samples of 'synthetic, seed 3'" in said
 
 
 @pytest.mark.serial

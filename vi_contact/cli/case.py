@@ -103,17 +103,21 @@ def _checked(case: "Case", comm: Any, folder: Path) -> str:
     """Describe and draw the model of a case; InputError for what is wrong with it, once all the rest is told."""
     from ..core.files import on_root
     from ..plots.sketch import sketch  # late: matplotlib
-    from ..run.files.folder import run_folder
+    from ..run.files.folder import ABOUT, HISTORY_CSV, run_folder
     from ..studies.cases.description import describe, in_words, write_model
 
     case.check()
     parts = case.parts(comm)
     model, ranks = describe(case, comm, parts), parts.system.algebra.comm
     case.columns(comm, parts)  # points and groups of the recorders
-    write_model(ranks, model, run_folder(ranks, folder))
-    on_root(ranks, lambda: sketch(model).savefig(folder / "model.png", dpi=130, bbox_inches="tight"))
+    run_folder(ranks, folder)
+    of_run = ranks.bcast(on_root(ranks, lambda: any((folder / name).is_file() for name in (ABOUT, HISTORY_CSV))))
+    picture = folder / ("check.png" if of_run else "model.png")
+    if not of_run:  # else it is the model of that run that model.json tells
+        write_model(ranks, model, folder)
+    on_root(ranks, lambda: sketch(model).savefig(picture, dpi=130, bbox_inches="tight"))
     if comm.rank == 0:
-        print(printable(f"{in_words(model)}\npicture: {folder / 'model.png'}"))
+        print(printable(f"{in_words(model)}\npicture: {picture}"))
     if model["defects"]:
         raise InputError(f"{case.path}: {'; '.join(model['defects'])}")
     return f"{case.path}: {model['title']}: the file is in order" if comm.rank == 0 else ""

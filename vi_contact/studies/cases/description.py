@@ -3,7 +3,7 @@
 import json
 import tomllib
 from collections.abc import Iterator, Mapping
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +18,10 @@ from ...fem.mesh import Cells
 from ...fem.output.outline import cell_volumes, longest_edge, outline
 from ...fem.space import space_of
 from ...ground_motion.excitation import GroundMotion
+from ...ground_motion.record import Record
 from ...laws.free_motions import free_motions
 from ...run.files.folder import MODEL
-from .table_calls import Group, nodes_in
+from .table_calls import Call, Group, build, nodes_in
 from .vocabulary import Parts
 
 ELEMENTS = 8.0  # of first order in a wave length: Kuhlemeyer and Lysmer (1973); the cautious take 10
@@ -59,7 +60,7 @@ def describe(case: Any, comm: Any, parts: Parts | None = None, *, most: int = 50
         "supports": list(_supports(space)), "contact": list(_contact(case, problem)),
         "waves": [{"body": one["name"], "c_s": one["c_s"], "h": one["h"], "f_max": one["c_s"] / (ELEMENTS * one["h"]),
                    "dt_ratio": run["dt"] * one["c_s"] / one["h"]} for one in bodies],
-        "records": [_record(one) for one in case.excitations(system=parts.system) if isinstance(one, GroundMotion)],
+        "records": list(_records(case, parts.system)),
         "run": run, "outline": outline(space, tags, [cells for cells, _ in space.forms.materials]),
     } | (_periods(problem, space.size) if space.unknowns <= most else {})
     model |= {"defects": list(_defects(model)), "warnings": list(_warnings(model))}
@@ -122,6 +123,20 @@ def _contact(case: Any, problem: ContactProblem) -> Iterator[dict[str, Any]]:
     for name, (a, b) in zip(names, pairwise(ends), strict=True):
         yield {"name": name, "points": int(b - a), "size": float(whole.weights[a:b].sum()),
                "friction": repr(problem.friction), "places": whole.points[a:b]}
+
+
+def _records(case: Any, system: Any) -> Iterator[dict[str, Any]]:
+    """Yield the records of the excitations, and of motions that come up through the base alone, each once."""
+    motions, told = [case.excitations(system=system)], []
+    for one in nodes_in(case.nodes["system"]):
+        if isinstance(one, Call) and one.callee.name == "upgoing" and "motion" in one.arguments:
+            made = build(one.arguments["motion"], {"system": system})
+            motions.append(made if isinstance(made, tuple) else (made,))
+    for motion in chain(*motions):
+        motion = GroundMotion(motion) if isinstance(motion, Record) else motion
+        if isinstance(motion, GroundMotion) and (record := _record(motion)) not in told:
+            told.append(record)
+            yield record
 
 
 def _record(motion: GroundMotion) -> dict[str, Any]:
