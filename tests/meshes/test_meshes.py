@@ -183,6 +183,8 @@ def test_a_block_that_cannot_be_is_refused_with_a_sentence(bad, words):
 def test_a_map_that_folds_the_block_over_itself_is_refused():
     with pytest.raises(InputError, match="8 cells of BlockMesh have a neighbour on the same side"):
         arrays_from_script(BlockMesh(divisions=(4, 4), deform=lambda x: (x - [0.4, 0.0]) ** [2, 1]))
+    with pytest.raises(InputError, match=r"makes points \(25, 1\) of points \(25, 2\): give all coordinates"):
+        arrays_from_script(BlockMesh(divisions=(4, 4), deform=lambda x: x[:, :1]))
 
 
 # Files ----------------------------------------------------------------------------------------------------------------

@@ -46,7 +46,11 @@ class BlockMesh:
         if self.corner is not None:
             nodes = nodes + np.asarray(self.corner)
         if self.deform is not None:
-            nodes = np.asarray(self.deform(nodes.reshape(-1, nodes.shape[-1]))).reshape(nodes.shape)
+            straight = nodes.reshape(-1, nodes.shape[-1])
+            moved = np.asarray(self.deform(straight))
+            if moved.shape != straight.shape:
+                raise InputError(f"deform makes points {moved.shape} of points {straight.shape}: give all coordinates")
+            nodes = moved.reshape(nodes.shape)
         if self.angle:
             x, y, c, s = nodes[..., 0], nodes[..., 1], math.cos(self.angle), math.sin(self.angle)
             nodes = np.concatenate([np.stack([c * x - s * y, s * x + c * y], axis=-1), nodes[..., 2:]], axis=-1)
