@@ -190,7 +190,9 @@ SECOND = '\n[[excitation]]\ntype = "GroundMotion"\ndirection = [1.0, 0.0]\nrecor
     ("dt = 0.002", "dt = 0.02", "time step of 0.02 s leaves out samples of 'synthetic, seed 3'"),
     (RECORD, '"none.at2"', "none.at2: there is no such file"),
     ("steps = 3", 'steps = 3\n[[record]]\ntype = "Probe"\npoints = {far = [9.0, 9.0]}', "m away from the nearest node"),
-], ids=range(7))
+    ("dashpots", 'loads = [{type = "Pressure", facets = "upper_top", value = "9810*(35 - z)"}]\ndashpots',
+     "[system] '9810*(35 - z)' has z, and a model of dimension 2 has only x, y"),
+], ids=range(8))
 def test_check_ends_with_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str,
                                        said: str) -> None:
     assert BLOCKS.count(old) == 1

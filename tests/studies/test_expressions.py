@@ -34,7 +34,7 @@ BAD = {
     "of another": ("open(1)", "'open' in it"), "no values": ("max()", "'max' in it"), "one value": ("max(1)", "'max'"),
     "too many": ("sqrt(1, 2)", "'sqrt' in it"), "a function alone": ("sin", "'sin' in it"),
     "keyword": ("x if x else y", "in it is no number"), "logic": ("not x", "in it is no number"),
-    "walrus": ("(x := 2)", "':' in it"), "truth": ("True", "'True' in it"), "none": ("None", "'None' in it"),
+    "walrus": ("(x := 2)", "':' in it"), "truth": ("True", "'True' in it"), "falsehood": ("False", "'False' in it"), "none": ("None", "'None' in it"),
     "lambda": ("lambda: 1", "':' in it"), "stars": ("max(*x, 2)", "in it is no number"),
     "a pair": ("(1, 2)", "in it is no number"), "hex": ("0x10", "make no"), "octal": ("010", "make no"),
     "complex": ("1j", "make no"), "text": ("'a'", "is no part of arithmetic"), "unicode": ("２", "'２' in"),
@@ -73,7 +73,9 @@ def test_functions_of_places_and_time() -> None:
     water = Places(Expression("9810*max(0, 35 - y)*t", "xyzt"))
     assert np.array_equal(water(points, 2.0), [9810.0 * 33.0 * 2.0, 0.0])
     both = Places((Expression("x*y", "xyzt"), Expression("1 + z", "xyzt")))
-    assert np.array_equal(both(points), [[2.0, 1.0], [150.0, 1.0]])
+    assert np.array_equal(both(np.column_stack([points, [0.0, 7.0]])), [[2.0, 1.0], [150.0, 8.0]])
+    with pytest.raises(InputError, match=r"expression '1 \+ z' has z, and a model of dimension 2 has only x, y"):
+        both(points)
     assert Places(Expression("7", "xyz"))(points).tolist() == [7.0, 7.0]
     assert Expression("t^2", "t")(3.0) == 9.0
     assert water == Places(Expression("9810*max(0, 35 - y)*t", "xyzt")) and water != both

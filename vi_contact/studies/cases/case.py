@@ -38,6 +38,7 @@ from ...run.method import with_defaults
 from ...run.recorders import Contact, Energy, Steps
 from ...run.simulate import Solution, simulate
 from ...run.time_steps import StepPlan, step_plan
+from .expressions import check_axes
 from .library import base_folder, check_format, keep_copy, refuse_retired, refuse_retired_model
 from .own_classes import packages
 from .parsing import Words, arguments, nearest, read
@@ -234,7 +235,8 @@ class Case:
         script = self._made("mesh")
         mesh, tags = read_mesh(script.path, comm) if isinstance(script, MeshFile) else build_mesh(script, comm)
         for case in [stage.case for stage in self.stages] or [self]:
-            for one in (one for node in case.nodes.values() for one in nodes_in(node)):
+            for table, one in ((table, one) for table, node in case.nodes.items() for one in nodes_in(node)):
+                check_axes(one, mesh.geometry.dim, f"{self.path}: [{table}]")
                 if isinstance(one, Group):
                     one.build({"tags": tags})
         return mesh, tags

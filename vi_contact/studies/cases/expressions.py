@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array
+from ...core.checks import shown
 from ...core.errors import InputError
 
 LENGTH, DEPTH, POWER = 500, 20, 100
@@ -64,7 +65,7 @@ class Expression:
         if depth > DEPTH:
             raise InputError(f"brackets, signs or powers in it are nested more than {DEPTH} deep")
         name = getattr(getattr(node, "func", node), "id", "")
-        if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and node.value is not True:
+        if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool):
             yield float(str(node.value))  # of a whole number with too many digits: infinite
         elif isinstance(node, ast.Name) and name == "pi":
             yield np.pi
@@ -99,16 +100,27 @@ class Expression:
 class Places:
     """Give expressions of x, y, z and t as the function of the Python interface that a key takes.
 
-    Called with points (k, d) [m], and the time [s], it returns values (k,) of one, (k, n) of a tuple of n.
+    Called with points (k, d) [m], and the time [s], it returns values (k,) of one, (k, n) of a tuple of n. InputError
+    for coordinates that the points do not have.
     """
 
     of: Expression | tuple[Expression, ...]
 
     def __call__(self, points: Array, t: float = 0.0) -> Array:
-        places = {name: points[:, axis] if axis < points.shape[1] else 0.0 for axis, name in enumerate("xyz")}
+        check_axes(self, points.shape[1], "the expression")
+        places = dict(zip("xyz", points.T, strict=False))
         if isinstance(self.of, tuple):
             return np.column_stack([np.broadcast_to(one(t, **places), len(points)) for one in self.of])
         return np.array(np.broadcast_to(self.of(t, **places), len(points)))
+
+
+def check_axes(node: Any, d: int, source: str) -> None:
+    """Raise InputError where what a case holds is an expression, or some, of a coordinate beyond d dimensions."""
+    of = node.of if isinstance(node, Places) else node
+    for one in of if isinstance(of, tuple) else (of,):
+        if isinstance(one, Expression) and (beyond := one.used & {*"xyz"[d:]}):
+            raise InputError(f"{source} {shown(one.text)} has {min(beyond)}, and a model of dimension {d} has only "
+                             f"{', '.join('xyz'[:d])}: write it of these")
 
 
 def _run(program: Any, values: Mapping[str, Any]) -> Any:
