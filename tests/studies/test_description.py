@@ -136,9 +136,9 @@ def test_the_model_of_a_run_is_kept(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert main(["run", path, "--out", str(out), "--quiet"]) == 0
     model = (out / "model.json").read_bytes()
     assert main(["run", path, "--out", str(out), "--quiet", "--check", "--set", "material.upper.rho=1000.0"]) == 0
-    assert f"picture: {out / 'check.png'}\n" in capsys.readouterr().out
+    assert f"picture: {out / 'check' / 'model.png'}\n" in capsys.readouterr().out
     assert (out / "model.json").read_bytes() == model and not (out / "model.png").exists()
-    assert (out / "check.png").read_bytes()[:4] == b"\x89PNG"
+    assert (out / "check" / "model.png").read_bytes()[:4] == b"\x89PNG"
 
 
 @pytest.mark.serial

@@ -110,14 +110,12 @@ def _checked(case: "Case", comm: Any, folder: Path) -> str:
     parts = case.parts(comm)
     model, ranks = describe(case, comm, parts), parts.system.algebra.comm
     case.columns(comm, parts)  # points and groups of the recorders
-    run_folder(ranks, folder)
-    of_run = ranks.bcast(on_root(ranks, lambda: any((folder / name).is_file() for name in (ABOUT, HISTORY_CSV))))
-    picture = folder / ("check.png" if of_run else "model.png")
-    if not of_run:  # else it is the model of that run that model.json tells
-        write_model(ranks, model, folder)
-    on_root(ranks, lambda: sketch(model).savefig(picture, dpi=130, bbox_inches="tight"))
+    if any((folder / name).exists() for name in (ABOUT, HISTORY_CSV)):  # of a run, of which model.json there tells
+        folder = folder / "check"
+    write_model(ranks, model, run_folder(ranks, folder))
+    on_root(ranks, lambda: sketch(model).savefig(folder / "model.png", dpi=130, bbox_inches="tight"))
     if comm.rank == 0:
-        print(printable(f"{in_words(model)}\npicture: {picture}"))
+        print(printable(f"{in_words(model)}\npicture: {folder / 'model.png'}"))
     if model["defects"]:
         raise InputError(f"{case.path}: {'; '.join(model['defects'])}")
     return f"{case.path}: {model['title']}: the file is in order" if comm.rank == 0 else ""

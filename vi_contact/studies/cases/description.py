@@ -60,7 +60,7 @@ def describe(case: Any, comm: Any, parts: Parts | None = None, *, most: int = 50
         "supports": list(_supports(space)), "contact": list(_contact(case, problem)),
         "waves": [{"body": one["name"], "c_s": one["c_s"], "h": one["h"], "f_max": one["c_s"] / (ELEMENTS * one["h"]),
                    "dt_ratio": run["dt"] * one["c_s"] / one["h"]} for one in bodies],
-        "records": list(_records(case, parts.system)),
+        "records": _records(case, parts.system),
         "run": run, "outline": outline(space, tags, [cells for cells, _ in space.forms.materials]),
     } | (_periods(problem, space.size) if space.unknowns <= most else {})
     model |= {"defects": list(_defects(model)), "warnings": list(_warnings(model))}
@@ -125,18 +125,14 @@ def _contact(case: Any, problem: ContactProblem) -> Iterator[dict[str, Any]]:
                "friction": repr(problem.friction), "places": whole.points[a:b]}
 
 
-def _records(case: Any, system: Any) -> Iterator[dict[str, Any]]:
-    """Yield the records of the excitations, and of motions that come up through the base alone, each once."""
-    motions, told = [case.excitations(system=system)], []
-    for one in nodes_in(case.nodes["system"]):
-        if isinstance(one, Call) and one.callee.name == "upgoing" and "motion" in one.arguments:
-            made = build(one.arguments["motion"], {"system": system})
-            motions.append(made if isinstance(made, tuple) else (made,))
-    for motion in chain(*motions):
-        motion = GroundMotion(motion) if isinstance(motion, Record) else motion
-        if isinstance(motion, GroundMotion) and (record := _record(motion)) not in told:
-            told.append(record)
-            yield record
+def _records(case: Any, system: Any) -> list[dict[str, Any]]:
+    """Return the records of the excitations, and of motions that come up through the base alone, each once."""
+    calls = (one for one in nodes_in(case.nodes["system"]) if isinstance(one, Call) and one.callee.name == "upgoing")
+    rising = (build(one.arguments.get("motion", ()), {"system": system}) for one in calls)
+    motions = chain(case.excitations(system=system), *(one if isinstance(one, tuple) else (one,) for one in rising))
+    shaking = (GroundMotion(one) if isinstance(one, Record) else one for one in motions)
+    told = [_record(one) for one in shaking if isinstance(one, GroundMotion)]
+    return [one for number, one in enumerate(told) if one not in told[:number]]
 
 
 def _record(motion: GroundMotion) -> dict[str, Any]:

@@ -100,8 +100,7 @@ class Expression:
 class Places:
     """Give expressions of x, y, z and t as the function of the Python interface that a key takes.
 
-    Called with points (k, d) [m], and the time [s], it returns values (k,) of one, (k, n) of a tuple of n. InputError
-    for coordinates that the points do not have.
+    Called with points (k, d) [m] and the time [s], it returns (k,) of one, (k, n) of n; InputError for axes beyond d.
     """
 
     of: Expression | tuple[Expression, ...]
