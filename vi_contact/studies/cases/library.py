@@ -1,7 +1,9 @@
 """Find the case files that ship with the package, and keep in a run folder the copy of the case that made it."""
 
 import re
+import tomllib
 from collections.abc import Iterable, Mapping, Sequence
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -18,20 +20,7 @@ COPY = "case.toml"
 FORMAT = 1  # of case files
 _SET = "# set "  # before a setting, in the copy
 _FROM = "# its paths are relative to "  # before a folder, in the copy
-_RETIRED = {"beam": "timoshenko_beam", "layer": "particle_layer"}  # cases of before -> demos that draw the same
-_SUPPORTS = "clamped, prescribed, tied and dashpots in [system]"
-_OF_MODELS: Mapping[str, Mapping[str, str]] = {  # case -> keys of its [model] of before -> where they are in its file
-    "channel": {
-        "type": "the tables", "shape": "[mesh]", "soil": "material.soil", "concrete": "material.channel",
-        "damping": "system.damping", "held": "held in each [[contact]]", "weighing": "gravity.cells",
-        "sides": _SUPPORTS, "base": _SUPPORTS, "rock": _SUPPORTS,
-    },
-    "wall": {
-        "type": "the tables", "material": "[material]", "damping": "system.damping", "weight": "gravity={}",
-        "thickness": "system.section.thickness", "base_inertia": "system.base_inertia",
-        "case": "contact.points, contact.held or contact, as the first lines tell,",
-    },
-}
+_RETIRED = tomllib.loads(files(__package__).joinpath("retired.toml").read_text(encoding="utf-8"))
 
 
 def builtin_cases() -> dict[str, str]:
@@ -49,17 +38,17 @@ def copy_starter(name: str, folder: Path) -> list[Path]:
     that nobody knows, and for files that are there: they may have been changed."""
     if name not in starters():
         raise InputError(f"there is no case {shown(name)} to begin with: {nearest(name, starters())}")
-    files = {folder / one.name: one.read_bytes() for one in sorted(STARTERS.glob(f"{name}.*"), reverse=True)}
-    for path in (path for path in files if path.exists()):
+    copies = {folder / one.name: one.read_bytes() for one in sorted(STARTERS.glob(f"{name}.*"), reverse=True)}
+    for path in (path for path in copies if path.exists()):
         raise InputError(f"'{path}' is there already: give another folder, or move it away")
 
     def copy() -> None:
         folder.mkdir(parents=True, exist_ok=True)
-        for path, data in files.items():
+        for path, data in copies.items():
             write_atomically(path, data)
 
     on_root(SerialComm(), copy)
-    return list(files)
+    return list(copies)
 
 
 def located(case: str) -> Path:
@@ -76,18 +65,19 @@ def located(case: str) -> Path:
 def refuse_retired(names: Iterable[str]) -> None:
     """Raise InputError, which names the demo in its place, for a name of a case or table that is retired."""
     for name in names:
-        if name in _RETIRED:
-            raise InputError(f"the case '{name}' is retired: bash demos/run.sh {_RETIRED[name]} computes and draws "
-                             f"the same, with its parameters on top of demos/{_RETIRED[name]}.py")
+        if demo := _RETIRED["demos"].get(name):
+            raise InputError(f"the case '{name}' is retired: bash demos/run.sh {demo} computes and draws the same, "
+                             f"with its parameters on top of demos/{demo}.py")
 
 
 def refuse_retired_model(path: Path, model: Any) -> None:
     """Raise InputError, which names what is in its place, for a table [model] and its settings; None: no such table."""
     given = model if isinstance(model, dict) else {"type": model}
     name = "channel" if given.get("type") == "Channel" or path == FOLDER / "channel.toml" else "wall"
+    places = _RETIRED["model"][name]
     for key in () if model is None else sorted(given, key=lambda one: one == "type") or ["type"]:  # which says least
         raise InputError(f"{path}: [model] {key} was of the model {name.capitalize()}, which is retired: give "
-                         f"{_OF_MODELS[name].get(key, f'mesh.{key}')} of the case '{name}', {FOLDER / name}.toml")
+                         f"{places.get(key, f'mesh.{key}')} of the case '{name}', {FOLDER / name}.toml")
 
 
 def check_format(path: Path, tables: Mapping[str, Any]) -> None:
