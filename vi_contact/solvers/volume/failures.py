@@ -4,29 +4,14 @@ PETSc 3.25 has other names for some reasons and other words for some errors; bot
 """
 
 import re
+import tomllib
+from pathlib import Path
 from typing import Any
 
 from ...core.errors import StepFailure
 
 NOT_A_NUMBER = -4  # SNES_DIVERGED_FNORM_NAN, in PETSc 3.25 SNES_DIVERGED_FUNCTION_NANORINF: the number stayed
-WORDS = {
-    "DIVERGED_FUNCTION_DOMAIN": "the residual could not be evaluated",
-    "DIVERGED_FUNCTION_COUNT": "too many residual evaluations",
-    "DIVERGED_LINEAR_SOLVE": "a linear system could not be solved",
-    "DIVERGED_FNORM_NAN": "the residual is not a number",
-    "DIVERGED_FUNCTION_NANORINF": "the residual is not a number",
-    "DIVERGED_OBJECTIVE_NANORINF": "the objective is not a number",
-    "DIVERGED_MAX_IT": "the iteration limit was reached",
-    "DIVERGED_LINE_SEARCH": "the line search found no descent",
-    "DIVERGED_INNER": "the inner solve failed",
-    "DIVERGED_LOCAL_MIN": "the merit function has a minimum that is no solution",
-    "DIVERGED_DTOL": "the residual grew without limit",
-    "DIVERGED_MAXITS": "the iteration limit was reached",
-    "DIVERGED_NAN": "the objective is not a number",
-    "DIVERGED_MAXFCN": "too many evaluations of the objective",
-    "DIVERGED_LS_FAILURE": "the line search found no descent",
-    "DIVERGED_TR_REDUCTION": "the trust region shrank to nothing",
-}
+WORDS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 CHECK_NUMBERS = "check the load, the guess and the bound of this step for NaN"
 ADVICE = {
     "DIVERGED_LINEAR_SOLVE": "check that the body is held or that mass enters A, and that A is positive definite",
