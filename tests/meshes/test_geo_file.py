@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +19,7 @@ from vi_contact.core.errors import InputError
 from vi_contact.meshes import GeoFile
 from vi_contact.meshes.extract import arrays_of
 from vi_contact.meshes.geo_file import allowed
+from vi_contact.meshes.gmsh_session import session
 
 pytestmark = pytest.mark.serial
 WALL = """// an L-shaped wall /* no comment begins here
@@ -195,3 +201,82 @@ def test_other_mistakes_are_told(tmp_path: Path) -> None:
         arrays_of(GeoFile(path=broken))
     with pytest.raises(InputError, match="no cells"):
         arrays_of(GeoFile(path=written(tmp_path, "Point(1) = {0, 0, 0};")))
+
+
+def curved_area(arrays: Any) -> float:
+    """Sum ∮ x dy of triangles with mid-points, exact by Simpson's rule."""
+    total = 0.0
+    for i, j, k in ((0, 1, 3), (1, 2, 4), (2, 0, 5)):
+        a, b, m = (arrays.points[arrays.cells[:, one]] for one in (i, j, k))
+        slopes = 4 * m - 3 * a - b, 4 * (b - a), a - 4 * m + 3 * b
+        total += sum(float(x[:, 0] @ slope[:, 1]) for x, slope in zip((a, m, b), slopes, strict=True)) / 6.0
+    return total
+
+
+def test_divided_cells_of_second_order_stay_curved(tmp_path: Path) -> None:
+    """A disk of radius 1 m: the area is wrong by O(h⁴), a 16th after a division; 8 leaves room for the first mesh."""
+    disk = """SetFactory("OpenCASCADE"); Disk(1) = {0, 0, 0, 1}; Mesh.MeshSizeMax = 0.8; Mesh.MeshSizeMin = 0.8;
+    Mesh.ElementOrder = 2; Physical Surface("disk") = {1};"""
+    path = written(tmp_path, disk)
+    coarse, fine = (arrays_of(GeoFile(path=path, refine=n)) for n in (0, 1))
+    assert coarse.cells.shape[1] == fine.cells.shape[1] == 6 and len(fine.cells) == 4 * len(coarse.cells)
+    wrong = [abs(curved_area(one) - np.pi) for one in (coarse, fine)]
+    assert wrong[1] < wrong[0] / 8.0 < 1e-2
+
+
+def test_what_is_no_script_is_refused_at_once(tmp_path: Path) -> None:
+    """Comments that nothing closes, however many, and what is no file: a pipe would be waited for."""
+    path = written(tmp_path, "/* " * 100_000)
+    start = time.perf_counter()
+    with pytest.raises(InputError, match="line 1 has '/"):
+        allowed(path)
+    assert time.perf_counter() - start < 1.0
+    os.mkfifo(tmp_path / "pipe.geo")
+    with pytest.raises(InputError, match="cannot be read .it is no file"):
+        allowed(tmp_path / "pipe.geo")
+
+
+def test_gmsh_ends_with_the_process_that_began_it(tmp_path: Path) -> None:
+    path = written(tmp_path, "For i In {1:1000000000}\nFor j In {1:1000000000}\nx = j;\nEndFor\nEndFor\n")
+    code = f"from vi_contact.meshes import GeoFile; GeoFile(path={str(path)!r}, time_limit=60.0).build(None)"
+    parent = subprocess.Popen([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": ":".join(sys.path)})
+    try:
+        children = Path(f"/proc/{parent.pid}/task/{parent.pid}/children")
+        waited(lambda: bool(children.read_text().split()))
+        child = Path("/proc", children.read_text().split()[0])
+        waited(lambda: "libgmsh" in (child / "maps").read_text())
+    finally:
+        parent.terminate()
+        parent.wait()
+    waited(lambda: not child.exists() or ") Z " in (child / "stat").read_text())
+
+
+def waited(true: Callable[[], bool]) -> None:
+    """Wait until it is true, for at most 20 s."""
+    end = time.monotonic() + 20.0
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+LOOPS = {  # the points that they make
+    "For i In {1:3} Point(i) = {i, 0, 0}; EndFor": 3,
+    "For i In {1:3}\n Point(i) = {i, 0, 0}; EndFor Point(9) = {9, 0, 0};": 4,
+    "For i In {0:1} For j In {1:2} Point(10*i + j) = {i, j, 0}; EndFor EndFor Point(9) = {9, 0, 0};": 5,
+    "n[] = {1, 3}; For i In {n[0]:n[1]} /* a\n b */ Point(i) = {i, 0, 0}; EndFor // x": 3,
+    "For (1:3) If (1 > 0) Point(newp) = {0, 0, 0}; EndIf EndFor If (0) Point(8) = {1, 0, 0}; EndIf": 3,
+    "// lines of old\rFor i In {1:3}\r Point(i) = {i, 0, 0};\rEndFor\r": 3,
+    "// and of others\r\nFor i In {1:3}\r\n Point(i) = {i, 0, 0};\r\nEndFor\r\n": 3,
+    "\ufeffFor i In {1:3}\n Point(i) = {i, 0, 0};\nEndFor": 3,
+}
+
+
+@pytest.mark.parametrize("text", LOOPS, ids=range(len(LOOPS)))
+def test_loops_go_round_however_lines_end(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "loop.geo"
+    path.write_bytes(text.encode())
+    made = written(tmp_path, allowed(path))
+    with session() as gmsh:
+        gmsh.merge(str(made))
+        gmsh.model.geo.synchronize()
+        assert len(gmsh.model.getEntities(0)) == LOOPS[text]

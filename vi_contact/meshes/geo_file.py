@@ -6,9 +6,11 @@ command, and texts stand only where groups are named. A process of its own meshe
 the machine's memory.
 """
 
+import ctypes
 import os
 import re
 import resource
+import signal
 import subprocess
 import sys
 import tomllib
@@ -16,6 +18,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
+from stat import S_ISREG
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -25,10 +28,12 @@ from vi_contact.meshes.gmsh_session import session
 from vi_contact.meshes.mesh_file import safe_copy
 
 LARGEST, MOST = 2_000_000, 8  # bytes of a script; how often it may be refined
+PR_SET_PDEATHSIG = 1  # of sys/prctl.h
 _LISTS = tomllib.loads(files(__package__).joinpath("geo_words.toml").read_text(encoding="utf-8"))
 _WORDS, _OPTIONS, _OF_FIELDS = (frozenset(_LISTS[name].split()) for name in ("words", "options", "fields"))
 _TOKEN = re.compile(
-    r"(?P<blank>[ \t\r]+|//[^\n]*|/\*.*?\*/|\n)|(?P<text>\"[^\"\\\x00-\x1f]*\")|(?P<name>[A-Za-z_]\w*)|"
+    r"(?P<blank>[ \t]+|//[^\n]*|/\*.*?\*/|\n)|(?P<open>/\*[^\n]*)|"
+    r"(?P<text>\"[^\"\\\x00-\x1f]*\")|(?P<name>[A-Za-z_]\w*)|"
     r"(?P<sign>(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?|[-+*/<>=!]=|&&|\|\||\+\+|--|[-+*/%^<>!?:=,;.#(){}\[\]])",
     re.ASCII | re.DOTALL)
 _SET = re.compile(r"(?<![\w.])([A-Za-z_]\w*)\s*(?:=(?!=)|\[\s*\]\s*=|\(\s*\)\s*=|In\b)", re.ASCII)  # names that are set
@@ -55,9 +60,10 @@ class GeoFile:
         """Mesh the script beside this process and read the mesh into Gmsh's current model."""
         with TemporaryDirectory(prefix="vi_contact-") as folder:
             Path(folder, "script.geo").write_text(allowed(self.path), encoding="utf-8")
-            code = ("import sys; sys.path = sys.argv[2:]; from vi_contact.meshes.geo_file import mesh_here; "
-                    "mesh_here(int(sys.argv[1]))")
-            command = [sys.executable, "-c", code, str(self.refine), *map(os.path.abspath, sys.path)]
+            code = ("import sys; sys.path = sys.argv[3:]; from vi_contact.meshes.geo_file import mesh_here; "
+                    "mesh_here(int(sys.argv[1]), float(sys.argv[2]))")
+            numbers = str(self.refine), str(self.time_limit)
+            command = [sys.executable, "-c", code, *numbers, *map(os.path.abspath, sys.path)]
             try:
                 done = subprocess.run(command, cwd=folder, text=True, errors="replace", stdin=subprocess.DEVNULL,
                                       capture_output=True, timeout=self.time_limit)
@@ -70,10 +76,13 @@ class GeoFile:
             gmsh.merge(str(safe_copy(Path(folder, "made.msh"), Path(folder))))
 
 
-def mesh_here(refine: int) -> None:
-    """Mesh script.geo of the current folder as made.msh: for a process of its own."""
+def mesh_here(refine: int, time_limit: float) -> None:
+    """Mesh script.geo of this folder as made.msh: for a process of its own, which ends with its parent or its time."""
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    signal.setitimer(signal.ITIMER_REAL, time_limit + 1.0)
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
-    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    for limit in (resource.RLIMIT_AS, resource.RLIMIT_FSIZE):
+        resource.setrlimit(limit, (memory, memory))
     with session() as gmsh:
         gmsh.logger.start()
         try:
@@ -81,6 +90,8 @@ def mesh_here(refine: int) -> None:
             gmsh.model.mesh.generate(max((d for d, _ in gmsh.model.getPhysicalGroups()), default=-1))
             for _ in range(refine):
                 gmsh.model.mesh.refine()
+            if refine:  # which leaves cells of first order
+                gmsh.model.mesh.setOrder(int(gmsh.option.getNumber("Mesh.ElementOrder")))
             gmsh.write("made.msh")
         finally:
             if wrong := [line for line in gmsh.logger.get() if line.startswith("Error")]:
@@ -90,18 +101,22 @@ def mesh_here(refine: int) -> None:
 def allowed(path: Path) -> str:
     """Return the script in listed words alone, each in its line. InputError like ``GeoFile``."""
     try:
+        if not S_ISREG(os.stat(path).st_mode):
+            raise OSError("it is no file")
         with open(path, "rb") as file:
-            text = file.read(LARGEST + 1).decode("utf-8")
+            data = file.read(LARGEST + 1)
+        text = re.sub("\r\n?", "\n", data.decode("utf-8-sig"))
     except (OSError, ValueError) as error:
         raise InputError(f"Gmsh script {shown(str(path))} cannot be read ({error}): check the path") from None
-    if len(text) > LARGEST:
-        raise InputError(f"{path}: the script has more than {LARGEST} characters: mesh it yourself")
+    if len(data) > LARGEST:
+        raise InputError(f"{path}: the script has more than {LARGEST} bytes: mesh it yourself")
     return "".join(_written(path, text, set(_SET.findall(text)) - _WORDS)) + "\n"
 
 
 def _written(path: Path, text: str, own: set[str]) -> Iterator[str]:
     """Yield the words that Gmsh gets; ``own``: names of the script."""
-    words, place, line = ["", "", ""], 0, 1
+    words, place, line, level = ["", "", ""], 0, 1, 0  # level: brackets that are open since the last For
+    begins = ends = False  # Gmsh repeats whole lines, from the one below For {…} to that of EndFor: they end there
     while place < len(text):
         found = _TOKEN.match(text, place)
         kind, word = (str(found.lastgroup), found[0]) if found else ("", text[place])
@@ -109,6 +124,7 @@ def _written(path: Path, text: str, own: set[str]) -> Iterator[str]:
         line += word.count("\n")
         attributes = _OPTIONS if words[-2] == "Mesh" else _OF_FIELDS if words[-2] == "]" else ()
         if kind == "blank":
+            ends = ends and "\n" not in word
             yield "\n" * word.count("\n")
             continue
         if kind == "text":
@@ -121,5 +137,10 @@ def _written(path: Path, text: str, own: set[str]) -> Iterator[str]:
         if not fits:
             raise InputError(f"{path}: line {line} has {shown(word)}, and only words of geometry, sizes, groups and "
                              "arithmetic are meshed here: leave it out, or mesh the script yourself and give the .msh")
+        yield "\n" * ends
         yield f" {'own_' if word in own and words[-1] != '.' else ''}{word}"
         words.append(word)
+        begins = word == "For" or begins
+        level = 0 if word == "For" else level + (word in "([{") - (word in ")]}")
+        ends = word == "EndFor" or (begins and level == 0 and word in ")]}")
+        begins = begins and not ends
