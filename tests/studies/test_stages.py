@@ -197,6 +197,33 @@ def test_a_run_stopped_within_a_stage_goes_on_to_the_last_bit(
 
 
 @pytest.mark.serial
+def test_a_stage_follows_from_the_end_of_the_one_before(tmp_path: Path) -> None:
+    """A restart keeps the aftershock while the shock before it stays what it was, and makes it anew after a longer one;
+    a stage of another name is refused, and replaced by a new run."""
+    settings = ["run.t_end=0.04", "excitation.1.frequency=20", "excitation.1.amplitude=20", "friction.mu=0.1",
+                "stage.3.run.t_end=0.02"]
+    longer = [*settings, "run.t_end=0.08"]
+    folder, facts = tmp_path / "run", tmp_path / "run" / "summary.json"
+
+    def run(text: str, settings: list[str], **options: Any) -> Any:
+        return case(tmp_path, text + " ", *settings).run(MPI.COMM_SELF, progress=False, **options).history
+
+    first = run(HOUSE, settings, out=folder)
+    assert np.array_equal(run(HOUSE, settings, out=folder, restart=True)["u_x_roof"], first["u_x_roof"])
+    assert json.loads(facts.read_text("utf-8"))["restarted_from_step"] == 10
+    whole, found = run(HOUSE, longer), run(HOUSE, longer, out=folder, restart=True)
+    assert json.loads(facts.read_text("utf-8"))["restarted_from_step"] is None
+    assert np.abs(whole["u_x_roof"] - first["u_x_roof"]).max() > 1e-3 * np.abs(first["u_x_roof"]).max()
+    for name, values in whole.items():
+        assert np.array_equal(values, found[name], equal_nan=True), name
+    renamed = HOUSE.replace('"shock"', '"event"')
+    with pytest.raises(InputError, match=r"2_shock' is of no stage of the case: give .* new run, which removes it"):
+        run(renamed, longer, out=folder, restart=True)
+    run(renamed, settings, out=folder)
+    assert sorted(one.name for one in (folder / "stages").iterdir()) == ["1_gravity", "2_event"]
+
+
+@pytest.mark.serial
 def test_many_records_share_the_static_stages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What ida starts finds what single runs find, and solves one static stage for all: on a compliant base, which is
     assembled for each, and in the frame of the ground, where all share one body."""

@@ -92,6 +92,11 @@ def checksum(arrays: Mapping[str, Any]) -> str:
     return found.hexdigest()
 
 
+def state_checksum(folder: Path) -> str:
+    """Return the checksum of the state that the checkpoint in a folder holds."""
+    return checksum(_unpacked(folder / CHECKPOINT)[1])
+
+
 def _split(problem: ContactProblem, state: State) -> tuple[Arrays, Arrays]:
     """(arrays of owned unknowns, arrays that are the same on every rank, or on rank 0 only)."""
     comm = problem.system.algebra.comm

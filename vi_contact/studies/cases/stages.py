@@ -3,9 +3,11 @@
 A static stage finds the equilibrium under its loads with contact, a dynamic one marches. What passes on: displacements
 and with them stresses, velocities after a dynamic stage, contact forces and the points where friction has brought the
 body, and the reactions of released supports as forces. Every stage begins at t = 0 with its own excitations. Each has a
-run folder, DIR/stages/1_NAME, the last one DIR itself; a static stage a folder of one row.
+run folder, DIR/stages/1_NAME, the last one DIR itself; a static stage a folder of one row. FOLLOWS in it has the
+checksums of what the stages before it left, so that a restart finds out which stages still follow from one another.
 """
 
+import shutil
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -15,16 +17,19 @@ import numpy as np
 
 from ...core.algebra import Array
 from ...core.errors import InputError
-from ...core.files import on_root
+from ...core.files import on_root, write_atomically
 from ...core.problem import ContactProblem
 from ...core.state_checks import initial_state
 from ...core.step import State
 from ...fem.communicators import MpiComm
 from ...fem.released_supports import release, removed_support, same_supports, started
+from ...run.files.checkpoint import state_checksum
 from ...run.files.folder import CHECKPOINT, clear, locked, run_folder
 from ...run.simulate import Solution, simulate
 from .stage_tables import Stage
 from .vocabulary import Parts
+
+FOLLOWS = "follows.txt"
 
 
 @dataclass(frozen=True)
@@ -58,16 +63,47 @@ def run_stages(
     """Run those stages of a case that are not reached yet; the solution of the last one. Collective."""
     ranks, stages, reached = MpiComm(comm), case.stages, reached or Reached(0, case.meshed(comm))
     inner = [Path("stages") / f"{number}_{one.name}" for number, one in enumerate(stages[:-1], start=1)] + [Path()]
-    source = out if restart is True else Path(restart) if restart else None
+    source, before = out if restart is True else Path(restart) if restart else None, ""
     with locked(ranks, None if out is None else run_folder(ranks, out)):
-        for folder in inner if source is None and out is not None else ():
-            on_root(ranks, partial(clear, out / folder))  # type: ignore[operator]
+        if (place := source or out) is not None:
+            on_root(ranks, partial(_tidy, place, inner, keep=source is not None))
         for stage, folder in list(zip(stages, inner, strict=True))[reached.number :]:
             again = None if source is None else source / folder
-            found = again is not None and ranks.bcast(on_root(ranks, (again / CHECKPOINT).is_file))
-            more = {"restart": again if again is not None and (found or stage is stages[0]) else False}
+            found = ranks.bcast(on_root(ranks, partial(_follows, again, before)))
+            if before and out is not None and not found:
+                on_root(ranks, partial(_begin, out / folder, before))
+            more = {"restart": again if found or stage is stages[0] and again else False}
             reached, solution = _made(stage, reached, comm, None if out is None else out / folder, options | more)
+            place = out or (source if found else None)
+            left = None if place is None else on_root(ranks, partial(state_checksum, place / folder))
+            before += f"{left} {solution.state.k}\n"
     return solution
+
+
+def _tidy(out: Path, stages: list[Path], *, keep: bool) -> None:
+    """Clear the folders of a new run, and remove those of stages that are none any more; to ``keep``, refuse these."""
+    old = [one for one in sorted((out / "stages").glob("[0-9]*_*")) if one.relative_to(out) not in stages]
+    if keep and old:
+        raise InputError(f"'{old[0]}' is of no stage of the case: give stages their old names and order, or start a "
+                         "new run, which removes it")
+    for folder in () if keep else old:
+        shutil.rmtree(folder)
+    for folder in () if keep else stages:
+        clear(out / folder)
+
+
+def _follows(folder: Path | None, before: str) -> bool:
+    """Return whether there is a checkpoint to continue from, of a stage that began where those before it now end."""
+    if folder is None or not (folder / CHECKPOINT).is_file():
+        return False
+    return not before or (folder / FOLLOWS).is_file() and (folder / FOLLOWS).read_text("utf-8") == before
+
+
+def _begin(folder: Path, before: str) -> None:
+    """Note what a stage that is made anew follows from, in its empty folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    clear(folder)
+    write_atomically(folder / FOLLOWS, before.encode())
 
 
 def _made(
