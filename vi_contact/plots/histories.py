@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import Array
+from ..run.files.table import WORDS
 
 History = Mapping[str, Array]
 _UNITS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
@@ -84,16 +85,7 @@ def save(figure: Any, path: str | Path, title: str | None = None) -> Path:
     return Path(path)
 
 
-LEDGER = (
-    ("work_input", "input work", "black", "-"),
-    ("energy_kinetic", "kinetic", "tab:blue", "-"),
-    ("energy_strain", "strain", "tab:orange", "-"),
-    ("loss_damping", "damping", "tab:purple", "-"),
-    ("loss_contact", "contact work", "tab:red", "-"),
-    ("loss_friction", "friction", "tab:cyan", "-"),
-    ("loss_impact", "impact loss", "tab:green", "-"),
-    ("loss_algorithmic", "algorithmic", "tab:brown", ":"),
-)
+LEDGER = tuple((name, *look) for name, look in WORDS["curves"].items())  # column, label, colour, line
 
 
 def cell_edges(centres: Array) -> Array:

@@ -17,6 +17,7 @@ from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
 from ..core.step import AXES, Columns, Report, Row, State
 from ..core.verify import Energies, energies, energy_balance
+from .files.table import WORDS
 
 
 def refuse_overflow(row: Row) -> None:
@@ -70,17 +71,7 @@ class Energy:
     to the largest energy or work is in ``summary.json``. Three products a step; damping and impacts take one each.
     """
 
-    _COLUMNS: ClassVar[Columns] = {
-        "energy_kinetic": ("J", "kinetic energy after the impact law, ½ vᵀMv"),
-        "energy_strain": ("J", "strain energy ½ uᵀKu"),
-        "work_input": ("J", "work of loads, ground motion and prescribed motions since the start"),
-        "loss_damping": ("J", "work of viscous damping since the start"),
-        "loss_contact": ("J", "work done on the support by the contact reactions since the start"),
-        "loss_friction": ("J", "work of friction since the start"),
-        "loss_impact": ("J", "kinetic energy taken by the impact law since the start, signed"),
-        "loss_algorithmic": ("J", "numerical dissipation of the time scheme since the start"),
-        "energy_defect": ("J", "what the ledger cannot explain since the start"),
-    }
+    _COLUMNS: ClassVar[Columns] = {name: ("J", meaning) for name, meaning in WORDS["columns"].items()}
     _SUMS = tuple(_COLUMNS)[2:]
 
     def columns(self) -> Columns:

@@ -2,6 +2,7 @@
 
 import copy
 import os
+import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -19,17 +20,8 @@ BYTES = 16 * 2**20
 KEPT = 64 * 2**20  # bytes of histories that stay in memory of a run with a folder, on each rank
 SHARED = 10_000  # rows of an array (contact points) up to which every rank gets it at the end
 
-LEDGER = (
-    ("work_input", "input work"),
-    ("energy_kinetic", "kinetic energy"),
-    ("energy_strain", "strain energy"),
-    ("loss_damping", "damping"),
-    ("loss_contact", "contact work"),
-    ("loss_friction", "friction work"),
-    ("loss_impact", "impact loss"),
-    ("loss_algorithmic", "algorithmic loss"),
-    ("energy_defect", "defect"),
-)
+WORDS = tomllib.loads(Path(__file__).with_name("ledger.toml").read_text(encoding="utf-8"))  # of the energy ledger
+LEDGER = tuple(WORDS["titles"].items())
 
 Block = dict[str, Array]  # column -> values of some rows: (rows,) float64, or (rows, *shape) of the arrays
 
