@@ -3,6 +3,7 @@
 import ctypes
 import inspect
 import os
+import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,19 +12,7 @@ from typing import Any, Protocol
 from vi_contact.core.errors import InputError
 
 M_PERTURB = -6  # of malloc.h
-_OPTIONS: dict[str, float] = {
-    "General.Terminal": 0,
-    "General.NumThreads": 1,  # with the seed: the same mesh every time
-    "Mesh.RandomSeed": 1,
-    "Mesh.ElementOrder": 1,  # from here on: undo what a user's own session may have chosen
-    "Mesh.RecombineAll": 0,
-    "Mesh.RecombinationAlgorithm": 3,  # where a script recombines, no triangle is left behind
-    "Mesh.SubdivisionAlgorithm": 0,
-    "Mesh.MeshSizeFactor": 1,
-    "Mesh.MshFileVersion": 4.1,
-    "Mesh.Binary": 0,
-    "Mesh.SaveAll": 0,
-}
+_OPTIONS = tomllib.loads(Path(__file__).with_name("gmsh_options.toml").read_text(encoding="utf-8"))
 
 
 class MeshScript(Protocol):
