@@ -199,6 +199,11 @@ def test_other_mistakes_are_told(tmp_path: Path) -> None:
     broken = written(tmp_path, WALL.replace("{B, 0, 0, h}", "{B, 0, 0, h"))
     with pytest.raises(InputError, match=r"wall.geo: Gmsh cannot mesh it: .*line 4"):
         arrays_of(GeoFile(path=broken))
+    for wrong in ('Field[1] = MathEval; Field[1].F = "nofun(x)"; Background Field = 1;', "Mesh.MeshSizeMax = -1;"):
+        with pytest.raises(InputError, match="Gmsh cannot mesh it: it stopped at a formula or size: look at Field"):
+            arrays_of(GeoFile(path=written(tmp_path, SQUARE.replace("EXTRA", wrong))))
+    with pytest.raises(InputError, match="no cells in a group: name the body by a Physical Surface"):
+        arrays_of(GeoFile(path=written(tmp_path, SQUARE[: SQUARE.index("EXTRA")])))
     with pytest.raises(InputError, match="no cells"):
         arrays_of(GeoFile(path=written(tmp_path, "Point(1) = {0, 0, 0};")))
 

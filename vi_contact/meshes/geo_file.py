@@ -72,6 +72,8 @@ class GeoFile:
                                  "or give more time_limit") from None
             if done.returncode:
                 said = (done.stderr.strip().splitlines() or ["it ended, as where memory is over"])[-1]
+                if said.startswith("terminate called"):  # for a text that Gmsh throws
+                    said = "it stopped at a formula or size: look at Field[…].F, and at Mesh.MeshSize…, above zero"
                 raise InputError(f"{self.path}: Gmsh cannot mesh it: {said.replace('own_', '')}")
             gmsh.merge(str(safe_copy(Path(folder, "made.msh"), Path(folder))))
 
@@ -87,7 +89,10 @@ def mesh_here(refine: int, time_limit: float) -> None:
         gmsh.logger.start()
         try:
             gmsh.merge("script.geo")
-            gmsh.model.mesh.generate(max((d for d, _ in gmsh.model.getPhysicalGroups()), default=-1))
+            groups = gmsh.model.getPhysicalGroups()
+            if not groups:
+                sys.exit("it has no cells in a group: name the body by a Physical Surface, in space a Physical Volume")
+            gmsh.model.mesh.generate(max(d for d, _ in groups))
             for _ in range(refine):
                 gmsh.model.mesh.refine()
             if refine:  # which leaves cells of first order
