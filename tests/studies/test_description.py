@@ -101,7 +101,18 @@ def test_numbers_of_two_blocks(shared_tmp: Path) -> None:
     gap = described(path, COMM, f"system.prescribed=[{held}]", "mesh.gap=0.1")
     assert gap["rigid_motions"] == 1
     assert gap["periods"][0] == pytest.approx(axial(1, HEIGHT / 2, CELLS // 2), rel=1e-8)
+    across = described(path, COMM, f"system.prescribed=[{held}]", "mesh.gap=0.1", "contact.1.held=true")
+    assert across["periods"] == pytest.approx(closed["periods"], rel=1e-8) and across["rigid_motions"] == 0
     assert "periods" not in describe(read_case(path), COMM, most=51)
+
+
+@pytest.mark.parametrize(("axes", "G"), [("0.3", 5e8), ("[[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]", 2e8)])
+def test_shear_in_the_plane_is_that_of_the_axes_there(shared_tmp: Path, axes: str, G: float) -> None:
+    """The other two moduli carry no wave in the plane, however soft."""
+    timber = ('{type = "Orthotropic", E1 = 1e10, E2 = 1e9, E3 = 1e9, nu12 = 0.0, nu13 = 0.0, nu23 = 0.0, G12 = 5e8, '
+              f"G13 = 1e8, G23 = 2e8, rho = 500.0, axes = {axes}}}")
+    model = described(written(shared_tmp), COMM, "system.dashpots=", f"material.upper={timber}")
+    assert {one["body"]: one["c_s"] for one in model["waves"]}["upper"] == pytest.approx(np.sqrt(G / 500.0), rel=1e-9)
 
 
 def test_any_number_of_ranks_describes_alike(shared_tmp: Path) -> None:
@@ -130,13 +141,16 @@ def test_the_command_tells_and_draws(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 
 @pytest.mark.serial
+@pytest.mark.filterwarnings("ignore:Glyph 27")
 def test_the_model_of_a_run_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """model.json is what its history was computed with: a check of the case as it is now leaves it."""
-    path, out = str(written(tmp_path)), tmp_path / "out"
+    text = BLOCKS.replace("Two blocks that carry", "Two \\u001b[2J blocks that carry")
+    path, out = str(written(tmp_path, text)), tmp_path / "out"
     assert main(["run", path, "--out", str(out), "--quiet"]) == 0
     model = (out / "model.json").read_bytes()
     assert main(["run", path, "--out", str(out), "--quiet", "--check", "--set", "material.upper.rho=1000.0"]) == 0
-    assert f"picture: {out / 'check' / 'model.png'}\n" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert f"picture: {out / 'check' / 'model.png'}\n" in told and "\x1b" not in told and "Two \\x1b[2J blocks" in told
     assert (out / "model.json").read_bytes() == model and not (out / "model.png").exists()
     assert (out / "check" / "model.png").read_bytes()[:4] == b"\x89PNG"
 

@@ -45,6 +45,7 @@ def test_values_are_those_of_si(text: str, unit: str) -> None:
 
 
 WRONG = {
+    ("٣ m", "m"): "'٣' in it is no part of arithmetic",
     ("2400 kg/m3", "Pa"): "'kg/m3' is no unit of it: give it in Pa", ("30 MPa", "1"): "give it in % or as a plain",
     ("5 %", "Pa"): "'%' is no unit of it", ("12 Hz", "rad/s"): "'Hz' is no unit of it: give it in rad/s",
     ("1.8 g/cm3", "kg/m3"): "'g/cm3' is no unit of it: give it in kg/m3", ("3 mPaa", "Pa"): "'mPaa' is no unit here",

@@ -2,6 +2,7 @@
 
 import argparse
 import errno
+import re
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -66,7 +67,9 @@ def told(run: Callable[[], Any], spelling: Mapping[str, str]) -> Any:
 
 
 def printable(text: str) -> str:
-    """Return the text without what standard output cannot write, such as names of files that are no UTF-8."""
+    """Return the text without what standard output cannot write, such as names of files that are no UTF-8, and without
+    characters that steer a terminal."""
+    text = re.sub("[\\x00-\\x08\\x0b-\\x1f\\x7f-\\x9f]", lambda found: ascii(found[0])[1:-1], text)
     encoding = sys.stdout.encoding or "utf-8"
     return text.encode(encoding, "backslashreplace").decode(encoding)
 

@@ -94,7 +94,9 @@ def _body(space: Any, tags: Mapping[str, Any], cells: Any, material: Any) -> dic
     own = cells[cells < len(volumes)]
     density, shear = (space.forms.cellwise(field)[own] for field in ("rho", "shear"))
     if hasattr(material, "G12"):
-        shear = density / material.rho * min(material.G12, material.G13, material.G23)
+        G = material.G23, material.G13, material.G12  # in the planes across axes 1, 2, 3
+        z = int(np.argmax(np.abs(np.asarray(material.axes)[2]))) if np.ndim(material.axes) else 2
+        shear = density / material.rho * (G[z] if space.dimension == 2 else min(G))
     numbers = {key: one for key, one in vars(material).items() if isinstance(one, int | float)}
     return {"name": (names or ["body"])[0], "cells": round(total(space.comm, len(own))),
             "mass": total(space.comm, volumes[own] @ density), "material": {"type": type(material).__name__} | numbers,
@@ -146,9 +148,9 @@ def _record(motion: GroundMotion) -> dict[str, Any]:
 
 
 def _periods(problem: ContactProblem, size: float) -> dict[str, Any]:
-    """Undamped natural periods [s] with the contact closed where there is no gap, and sticking where it rubs."""
+    """Undamped natural periods [s] with the contact closed where it is held or has no gap, sticking where it rubs."""
     system, surface = problem.static_load, problem.surface
-    closed, held, springs = surface.gap0 <= TOUCHING * size, *np.zeros((2, system.rows))
+    closed, held, springs = (surface.gap0 <= TOUCHING * size) | surface.bilateral, *np.zeros((2, system.rows))
     rigid = closed & surface.rigid
     held[surface.owned[rigid]] = 1.0
     held[surface.tangents[(surface.tangents >= 0) & closed[:, None] & problem.frictional]] = 1.0

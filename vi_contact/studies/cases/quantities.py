@@ -20,9 +20,9 @@ from .table_calls import Spot
 FIELD, AT_START, HISTORY = Callable[[Array, float], Array], Callable[[Array], Array], Callable[[float], float]
 """Functions of points and time, of points, of the time, for which expressions may stand."""
 Dimension = tuple[int, ...]  # exponents of metre, kilogram, second, radian
-_NUMBER, _NAME = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", "[A-Za-zµμ°%]+"
+_NUMBER, _NAME = r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?", "[A-Za-zµμ°%]+"
 _VALUE = re.compile(rf"(?<![\w.\s])\s*((?>{_NUMBER}))\s*((?:1\s*/\s*)?{_NAME}[^()+]*)")
-_FACTOR = re.compile(rf"([*·/]?)(?:(?<!\s)\s+)?(1(?=\s*/|$)|{_NAME})(?:\^?(-?\d)|([²³]))?\s*")
+_FACTOR = re.compile(rf"([*·/]?)(?:(?<!\s)\s+)?(1(?=\s*/|$)|{_NAME})(?:\^?(-?[0-9])|([²³]))?\s*")
 _TABLES = tomllib.loads(files(__package__).joinpath("units.toml").read_text(encoding="utf-8"))
 _UNITS = _TABLES["alone"] | {start + name: [factor * unit[0], *unit[1:]]
                              for start, factor in _TABLES["prefixes"].items()
