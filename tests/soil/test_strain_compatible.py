@@ -161,6 +161,22 @@ def test_on_any_number_of_ranks(comm):
     assert np.allclose(together.changes, alone.changes, rtol=1e-7)
 
 
+def test_cells_without_curves_keep_their_damping(comm):
+    """Soil under a structure with xi = 0.05: this stays in every run, and that of the soil is the curves'."""
+    mesh, _ = strip(comm, 2.0, DEPTH, (1, 12))
+    lower = fem.Cells.where("lower", mesh, lambda x: x[1] < 0.5 * DEPTH + 1e-9)
+    body, found = fem.Heterogeneous(E=1e8, nu=0.3, rho=2000.0, xi=0.05), []
+
+    def run(material: Any, strain: Any) -> None:
+        found.append(from_top(material.xi))
+        strain.values = np.full(len(compat.cell_blocks(material.xi.function_space)), 2e-4)
+
+    soil.strain_compatible(mesh, body, [(lower, CURVES)], run)
+    for values in found:
+        assert np.allclose(values[:6], 0.05, rtol=1e-14) and np.ptp(values[6:]) == 0.0
+    assert len(found) > 1 and found[-1][-1] == pytest.approx(CURVES.at(np.array([0.65 * 2e-4]))[1][0])
+
+
 def test_strains_beyond_the_curves_are_refused(comm):
     short = soil.SoilCurves([1e-6, 1e-4], [1.0, 0.7], [0.01, 0.05], "short")
     mesh, tags = strip(comm, 2.0, DEPTH, (1, 6))

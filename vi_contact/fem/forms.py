@@ -157,12 +157,12 @@ class ElasticForms:
 
 
 def cell_constants(space: Any, material: Materials) -> Array:
-    """Return E, nu and rho of the local cells, (3, cells), NaN where it is Orthotropic; space: DG0. Collective."""
+    """Return E, nu, rho and xi of the local cells, (4, cells), NaN where Orthotropic has none; DG0. Collective."""
     place = compat.cell_blocks(space)[:, 0]
-    found = np.empty((3, len(place)))
+    found = np.empty((4, len(place)))
     for where, one in cell_materials(space.mesh, material):
         known = _constants(space, where, one)
-        for row, value in zip(found, (known.E, known.nu, known.rho), strict=True):
+        for row, value in zip(found, (known.E, known.nu, known.rho, known.xi), strict=True):
             row[where] = value[place[where]] if np.ndim(value) else value
     return found
 

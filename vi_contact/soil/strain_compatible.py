@@ -42,7 +42,7 @@ def strain_compatible(
 
     Args:
         material: as for ``assemble``, of small strains; of Heterogeneous ones cells take the middle.
-        curves: (cells, curves) pairs; other cells keep their stiffness, and are not damped.
+        curves: (cells, curves) pairs; other cells keep the stiffness and the xi of their material.
         run: run(material, strain): assemble the body of this material with ``damping=DampingRatio(…)``, march with
             ``strain`` among the recorders, and return anything. All else is yours: contact, gravity first, free fields.
         ratio: of the effective to the largest strain. tolerance: of the largest relative change of G or xi in a cell.
@@ -59,7 +59,7 @@ def strain_compatible(
     named = np.concatenate([np.zeros(0, dtype=int), *(cells for cells, _ in pairs)])
     refuse([f"{OWNER}: some cells have two curves: name each once" if len(np.unique(named)) < len(named) else ""], comm)
     space = compat.cell_space(mesh)
-    place, (E, nu, rho) = compat.cell_blocks(space)[:, 0], cell_constants(space, material)
+    place, (E, nu, rho, xi) = compat.cell_blocks(space)[:, 0], cell_constants(space, material)
     refuse([f"{OWNER}: Orthotropic has no G to reduce: model these cells alike" if np.isnan(E).any() else ""], comm)
 
     def field(values: Array) -> Any:
@@ -69,7 +69,7 @@ def strain_compatible(
         return found
 
     def softened(strain: Array) -> Array:
-        values = np.tile([[1.0], [0.0]], len(strain))
+        values = np.stack([np.ones_like(xi), xi])
         for cells, one in pairs:
             values[:, cells] = one.at(strain[cells])
         return values
