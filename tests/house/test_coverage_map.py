@@ -29,7 +29,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "core/test_identity.py": "run.method",
     "core/test_step.py": "core.errors core.problem",
     "core/test_surfaces.py": "core.obstacles",
-    "engineering/test_checks.py": "engineering.checks.comparison engineering.checks.earth_pressure_static",
+    "engineering/test_engineering_checks.py": "engineering.checks.comparison engineering.checks.earth_pressure_static",
     "engineering/test_seismic_checks.py":
         "engineering.checks.earth_pressure_seismic engineering.checks.housner engineering.checks.newmark_block "
         "engineering.checks.racking_ratio",
@@ -108,7 +108,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "studies/test_case_checks.py": "studies.cases.checks",
     "studies/test_case_inputs.py": "studies.cases.table_calls",
     "studies/test_description.py": "fem.output.outline plots.sketch",
-    "studies/test_stages.py": "studies.cases.stage_tables",
+    "studies/test_case_stages.py": "studies.cases.stage_tables studies.cases.stages",
     "studies/test_strain_compatible_case.py": "studies.cases.strain_compatible",
     "studies/test_ida.py":
         "cli.batch cli.ida plots.studies studies.ida.measures studies.ida.processes studies.ida.runs",

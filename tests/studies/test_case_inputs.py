@@ -177,7 +177,7 @@ def test_no_run_that_finished_is_a_failure(folder: Path, tmp_path: Path, monkeyp
     monkeypatch.setattr("signal.signal", lambda *_: None)
     given = ["ida", case(folder), "--motions", str(folder / "motion.at2"), "--edp", "u_x_top", "--scales", "1",
              "--out", str(tmp_path / "ida")]
-    assert "none of 2 runs finished, the first because: no luck" in said(capsys, given)
+    assert "2 of 2 runs have failed, the first because: no luck" in said(capsys, given)
     assert "--launch" in said(capsys, [*given, "--launch", "'"])
 
 

@@ -143,7 +143,8 @@ def test_classes_of_allowed_packages(folder: Path, monkeypatch: pytest.MonkeyPat
             made = case.nodes["friction"].build({})
             assert type(made).__name__ == name.partition(":")[2] and (made.mu, made.plain) == (0.3, [1, "a"])
     assert case.allowed == ("other", "pack.laws", "pack")
-    command = ["run", str(folder / "case.toml"), "--check", *(f"--set={one}" for one in law("pack:Law"))]
+    command = ["run", str(folder / "case.toml"), "--check", "--out", str(folder / "checked"),
+               *(f"--set={one}" for one in law("pack:Law"))]
     assert main([*command, "--allow", "other", "--allow", "pack"]) == 0 and "in order" in capsys.readouterr().out
     made = read_case(folder / "case.toml", ["excitation.type=pack.laws:Still", "excitation.direction=[1, 0]"],
                      allow="pack")

@@ -50,7 +50,8 @@ def test_starter_is_written_and_checked(name: str, tmp_path: Path, capsys: pytes
     """``new`` copies case and script into any folder, and --check reads them there."""
     assert main(["new", name, str(tmp_path / "mine")]) == 0
     assert sorted(one.name for one in (tmp_path / "mine").iterdir()) == [f"{name}.geo", f"{name}.toml"]
-    assert main(["run", str(tmp_path / "mine" / f"{name}.toml"), "--check", "--set", LARGE]) == 0
+    case = str(tmp_path / "mine" / f"{name}.toml")
+    assert main(["run", case, "--check", "--set", LARGE, "--out", str(tmp_path / "checked")]) == 0
     assert "contact" in capsys.readouterr().out
 
 

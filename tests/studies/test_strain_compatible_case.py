@@ -160,13 +160,13 @@ def test_no_restart_no_static_end_and_no_study(tmp_path):
     case = read_case(written(tmp_path))
     with pytest.raises(InputError, match="cannot be continued: run it from the start"):
         case.run(COMM, out=tmp_path / "out", restart=True)
-    with pytest.raises(InputError, match="take it out for a study of many"), case.call(case.parts(COMM), None):
+    with pytest.raises(InputError, match="take it out for stages and studies"), case.call(case.parts(COMM), None):
         pass
     with pytest.raises(InputError, match="the last stage, which is static"):
         read_case(written(tmp_path, CASE + STAGES.replace("dynamic", "static"))).run(COMM)
 
 
 def test_the_command_runs_it(tmp_path, capsys):
-    assert main(["run", str(written(tmp_path)), "--check"]) == 0
+    assert main(["run", str(written(tmp_path)), "--check", "--out", str(tmp_path / "checked")]) == 0
     assert main(["run", str(written(tmp_path)), "--out", str(tmp_path / "out"), "--quiet", "--steps", "30"]) == 0
     assert (tmp_path / "out" / "iterations" / "1" / "summary.json").is_file()

@@ -180,7 +180,7 @@ def draw_chart(axis: Any, chart: Chart) -> None:
         axis.set_xscale("log")
         plain_numbers(axis.xaxis)
         axis.set_ylim(bottom=0.0)
-    if chart.log_y:
+    if chart.log_y and any(np.any(line.y > 0.0) for line in chart.lines):
         axis.set_yscale("log")
         axis.yaxis.set_major_formatter("{x:.0e}")  # powers of ten are formulas, which the page does not read
     if chart.bound is not None:
