@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -121,10 +122,15 @@ def test_wood_of_slow_motions_only() -> None:
     assert refused.applies == "the motion has 2 Hz, above 0.3 of the layer's 3.75 Hz" and math.isnan(refused.expected)
     opened = Wood(**LAYER).compare(slow | {"uplift_wall": 0.1 * (slow["a_g_x"] > 1.9)})
     assert opened.applies == "up to 10% of the wall leaves the soil"
+    for check in (Wood, VeletsosYounan):  # open at rest already: no smooth wall that holds the soil
+        agape = check(**LAYER).compare(slow | {"uplift_wall": 0.43 + 0.0 * T})
+        assert agape.applies == "up to 43% of the wall leaves the soil" and math.isnan(agape.expected)
     for history in (run(0.0 * T), run(-np.abs(slow["a_g_x"]))):
         assert "never presses the soil on the wall" in Wood(**LAYER).compare(history).applies
     mirrored = slow | {"a_g_x": -slow["a_g_x"]}
-    assert Wood(**LAYER, on_left=True).compare(mirrored) == found
+    told = Wood(**LAYER, on_left=True).compare(mirrored)
+    assert told.name == "Wood, on left" and told.inputs == found.inputs | {"on_left": (1.0, "-")}
+    assert replace(told, name="Wood", inputs=found.inputs) == found
 
 
 def test_veletsos_and_younan() -> None:
@@ -146,14 +152,15 @@ def test_veletsos_and_younan() -> None:
 
 
 def block(acceleration: Any, **fields: Any) -> float:
-    history = {"t": T, "a_g_x": np.asarray(acceleration, float), "a_g_y": 0.0 * T, "slip_base": 0.0 * T}
+    history = {"t": T, "a_g_x": np.asarray(acceleration, float), "a_g_y": 0.0 * T, "sliding_base": 0.0 * T}
     return NewmarkBlock(**fields).compare(history).expected
 
 
 def test_newmark_of_a_pulse_and_of_a_record() -> None:
     """The printed 0.4905 m of 0.4 g for 0.5 s, mu = 0.2 (g = 9.81); a noise as solved exactly in pieces."""
     t = np.array([0.0, 0.5, 0.5, 2.0])
-    history = {"t": t, "a_g_x": 0.4 * 9.81 * (t < 0.6) * np.array([1, 1, 0, 0]), "a_g_y": 0 * t, "slip_base": 3.0 + t}
+    a = 0.4 * 9.81 * (t < 0.6) * np.array([1, 1, 0, 0])
+    history = {"t": t, "a_g_x": a, "a_g_y": 0 * t, "sliding_base": 3.0 + t}
     pulse = NewmarkBlock(mu=0.2, gravity=9.81).compare(history)
     assert pulse.expected == pytest.approx(0.4905, rel=1e-3) and pulse.found == 2.0  # parts of 16 and 47 ms
     noise = 8.0 * np.convolve(np.random.default_rng(1).standard_normal(2001), np.ones(20) / 20.0, "same")
@@ -178,20 +185,42 @@ def test_newmark_on_a_slope() -> None:
     first, then = G * s + a * c - mu * (G * c - a * s), mu * G * c - G * s
     slid = 0.5 * first * (1.0 + first / then)
     assert block(pulse, mu=mu, slope=slope) == pytest.approx(slid, rel=0.02)
-    assert block(0.0 * T, mu=mu, slope=slope) == 0.0
-    falling = {"t": T, "a_g_x": 0.0 * T, "a_g_y": -12.0 * np.sin(T), "slip_base": 0.0 * T}
+    assert block(1e-3 * pulse, mu=mu, slope=slope) == 0.0
+    falling = {"t": T, "a_g_x": 0.0 * T, "a_g_y": -12.0 * np.sin(T), "sliding_base": 0.0 * T}
     assert "falls away" in NewmarkBlock(mu=0.5).compare(falling).applies
     assert "slides under its weight" in NewmarkBlock(mu=0.2, slope=0.3).compare(falling).applies
 
 
-def rocking(check: Housner, a: Any, theta: float, end: float) -> tuple[float, float]:
+def test_newmark_slides_to_the_side_that_is_named() -> None:
+    """Mirrored motions, planes and sides slide alike; the pulse of 0.4 g to +x takes a wall whose fill is on its right
+    0.4905 m to -x, and one on a plane that falls by nothing to +x, not at all; a plane that falls to either side."""
+    noise = 8.0 * np.convolve(np.random.default_rng(1).standard_normal(2001), np.ones(20) / 20.0, "same")
+    for slope, towards in ((0.0, -1.0), (0.02, -1.0), (0.02, 1.0), (-0.02, 0.0)):
+        fields = {"mu": 0.15, "one_sided": True}
+        slid = block(noise, slope=slope, towards=towards, **fields)
+        assert slid == pytest.approx(block(-noise, slope=-slope, towards=-towards, **fields), rel=1e-12) and slid > 0.01
+    pulse = np.where(T < 0.5, 0.4 * 9.81, 0.0)
+    away = {"mu": 0.2, "gravity": 9.81, "one_sided": True, "towards": -1.0}
+    assert block(pulse, **away) == pytest.approx(0.4905, rel=0.02)  # the pulse ends within a step of 5 ms
+    assert block(pulse, **(away | {"towards": 1.0})) == block(pulse, **(away | {"towards": 0.0})) == 0.0
+    downhill = block(-pulse, mu=0.4, slope=0.2, one_sided=True)
+    assert downhill == pytest.approx(block(pulse, mu=0.4, slope=-0.2, one_sided=True), rel=1e-12) and downhill > 0.1
+    history = run(pulse, sliding_base=-0.002 + 1e-3 * T)
+    assert "slides under its weight" in NewmarkBlock(mu=0.2, slope=-0.5).compare(history).applies
+    assert NewmarkBlock(**away).compare(history).name == "NewmarkBlock, one sided"
+    assert NewmarkBlock(**away).compare(history).found == pytest.approx(0.01, rel=1e-12)  # through zero
+    silent = NewmarkBlock(mu=0.2).compare(run(0.0 * T, sliding_base=0.0 * T))
+    assert silent.applies.startswith("the column a_g_x is zero: name acceleration=") and math.isnan(silent.expected)
+
+
+def rocking(check: Housner, a: Any, theta: float, end: float, up: float = 0.0) -> tuple[float, float]:
     """(the largest angle, the time of the first impact) by an integrator that finds the landings itself."""
     alpha, p2 = math.atan(check.width / check.height), 1.5 * G / math.hypot(check.width, check.height)
     side = math.copysign(1.0, theta)
 
     def rate(t: float, y: Any) -> tuple[float, float]:
         left = alpha - side * y[0]
-        return y[1], p2 * (a(t) / G * math.cos(left) - side * math.sin(left))
+        return y[1], p2 * (a(t) / G * math.cos(left) - side * (1.0 + up / G) * math.sin(left))
 
     def landed(t: float, y: Any) -> float:
         return side * y[0]
@@ -215,7 +244,8 @@ def test_housner_free_and_shaken() -> None:
         motion = amplitude * np.sin(3.0 * T)
         largest, first = rocking(Housner(**check), lambda t, A=amplitude: A * math.sin(3.0 * t), theta, 6.0)
         kept = T <= 6.0
-        history = {"t": T[kept], "a_g_x": motion[kept], "theta_base": np.where(T[kept] < 1.0, theta, -0.02)}
+        history = {"t": T, "a_g_x": motion, "a_g_y": 0.0 * T, "theta_base": np.where(T < 1.0, theta, -0.02)}
+        history = {name: column[kept] for name, column in history.items()}
         angle = Housner(**check).compare(history)
         assert angle.expected == pytest.approx(largest, rel=3e-3) and angle.found == theta and angle.unit == "rad"
         landing = Housner(**check, of="impact").compare(history)
@@ -225,13 +255,27 @@ def test_housner_free_and_shaken() -> None:
     assert first == pytest.approx(slender.impact_times(0.1, 1)[0], rel=3e-3)
 
 
+def test_housner_on_ground_that_rises_or_falls() -> None:
+    """A released block under a steady vertical acceleration, as an integrator with events has it."""
+    check = {"width": 1.0, "height": 5.0}
+    history = {"t": T, "a_g_x": 0.8 * np.sin(3.0 * T), "theta_base": np.where(T < 1.0, 0.05, -0.02)}
+    for up in (-2.0, 2.0):
+        largest, first = rocking(Housner(**check), lambda t: 0.8 * math.sin(3.0 * t), 0.05, 6.0, up)
+        kept = {name: column[T <= 6.0] for name, column in (history | {"a_g_y": 0.0 * T + up}).items()}
+        assert Housner(**check).compare(kept).expected == pytest.approx(largest, rel=3e-3)
+        assert Housner(**check, of="impact").compare(kept).expected == pytest.approx(first, rel=1e-3)
+    assert "falls away below" in Housner(**check).compare(history | {"a_g_y": -12.0 * np.sin(T)}).applies
+    still = {"t": T, "a_g_x": 0.0 * T, "a_g_y": 0.0 * T, "theta_base": 8e-17 + 0.0 * T}
+    assert "does not rock" in Housner(width=3.0, height=4.0).compare(still).applies
+
+
 def test_housner_where_it_does_not_apply() -> None:
     """Onset at g b/h; a pulse a little longer than the closed form overturns the block, a shorter one does not."""
     check = {"width": 0.4, "height": 4.0}
     slender = HousnerBlock(0.4, 4.0, G)
 
     def shaken(pulse: Any, **fields: Any) -> str:
-        history = {"t": T, "a_g_x": np.asarray(pulse, float), "theta_base": 0.0 * T}
+        history = {"t": T, "a_g_x": np.asarray(pulse, float), "a_g_y": 0.0 * T, "theta_base": 0.0 * T}
         return Housner(**(check | fields)).compare(history).applies
 
     onset = slender.onset_acceleration

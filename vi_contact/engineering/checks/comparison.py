@@ -82,6 +82,8 @@ class Check(ABC):
         lacking = [name for one in self.said["reads"] if (name := one.format(**vars(self))) not in history]
         lack: Numbers = math.nan, math.nan, f"the run has no column {', '.join(lacking[:1])}: record it", {}
         expected, found, why, more = lack if lacking else self.numbers(history)
-        texts = {name: self.said[name] for name in ("formula", "source", "range")}
-        return Comparison(type(self).__name__, inputs={**self.given(), **more}, expected=math.nan if why else expected,
-                          found=found, unit=self.said["answers"][self.of], applies=why, **texts)
+        chosen = [name for name, value in vars(self).items() if value is True]
+        return Comparison(", ".join([type(self).__name__, *(one.replace("_", " ") for one in chosen)]),
+                          **{name: self.said[name] for name in ("formula", "source", "range")}, found=found,
+                          inputs={**self.given(), **dict.fromkeys(chosen, (1.0, "-")), **more}, applies=why,
+                          expected=math.nan if why else expected, unit=self.said["answers"][self.of])

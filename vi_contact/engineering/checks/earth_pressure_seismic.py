@@ -71,9 +71,10 @@ class _Layer(EarthPressure):
         thrust, height, opened = (history[f"{name}_{self.part}"] for name in ("N", "height", "uplift"))
         push = history[self.acceleration] * (-1.0 if self.on_left else 1.0)
         row, moment, peak = int(np.argmax(thrust)), thrust * np.nan_to_num(height), float(push.max())
-        more, left = float(thrust[row] - thrust[0]), float(opened.max() - opened[0])
+        more, left = float(thrust[row] - thrust[0]), float(opened.max())
         if len(push) < 3 or peak <= 0.0 or more <= 0.0:
-            return math.nan, more, f"{self.acceleration} never presses the soil on the wall: is it on that side?", {}
+            side = "is it the ground's acceleration=, and the soil on that side, on_left?"
+            return math.nan, more, f"{self.acceleration} never presses the soil on the wall: {side}", {}
         most, arm, why = self.added(history["t"], push)
         why = why or (f"up to {left:.0%} of the wall leaves the soil" if left > LIFTED else "")
         if self.of == "height":

@@ -32,16 +32,18 @@ def sliding(t: Array, drive: Array, resist: Array, *, one_sided: bool = False) -
 class NewmarkBlock(Check):
     """Expect the displacement that is left after a motion, on a plane that falls by ``slope`` [rad] towards +x.
 
-    mu: friction, or in its place the yield acceleration over g of a level plane; one_sided: it slides down only, as a
-    wall before its fill does; slip, acceleration, vertical: columns of the displacement on the plane, and of the
-    ground's accelerations. It applies while the block stays on the plane, and where it stands without motion.
+    mu: friction, or in its place the yield acceleration over g of a level plane; one_sided: it slides to one side only,
+    as a wall before its fill does: to that of the sign of ``towards`` along x; 0: down the plane, +x if it is level;
+    slip, acceleration, vertical: columns of the displacement on the plane, signed, and of the ground's accelerations.
+    It applies while the block stays on the plane, and where it stands without motion.
     """
 
     mu: float
     slope: float = 0.0
     one_sided: bool = False
+    towards: float = 0.0
     gravity: float = STANDARD_GRAVITY
-    slip: str = "slip_base"
+    slip: str = "sliding_base"
     acceleration: str = "a_g_x"
     vertical: str = "a_g_y"
 
@@ -50,7 +52,9 @@ class NewmarkBlock(Check):
         sine, cosine = math.sin(self.slope), math.cos(self.slope)
         normal, drive = up * cosine + along * sine, up * sine - along * cosine
         found = float(abs(history[self.slip][-1] - history[self.slip][0]))
-        why = "the ground falls away below the block" if normal.min() < 0.0 else ""
-        why = "the block slides under its weight: slope is above atan(mu)" if math.tan(self.slope) > self.mu else why
-        moved = sliding(history["t"], drive, self.mu * np.maximum(normal, 0.0), one_sided=self.one_sided)
+        side = math.copysign(1.0, self.towards or self.slope or 1.0)
+        why = "" if along.any() else f"the column {self.acceleration} is zero: name acceleration= that of the ground"
+        why = "the ground falls away below the block" if normal.min() < 0.0 else why
+        why = "the block slides under its weight: |slope| is above atan(mu)" if abs(sine) > self.mu * cosine else why
+        moved = sliding(history["t"], side * drive, self.mu * np.maximum(normal, 0.0), one_sided=self.one_sided)
         return abs(float(moved[-1])), found, why, {"a": (float(np.abs(along).max()), "m/s²")}
