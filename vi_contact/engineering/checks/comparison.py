@@ -14,8 +14,7 @@ from ...core.checks import between, check_word, number
 History = Mapping[str, Array]  # column -> values (rows,)
 Inputs = Mapping[str, tuple[float, str]]  # name -> (value, unit)
 Numbers = tuple[float, float, str, Inputs]  # expected, found, why it does not apply, inputs taken from the run
-_FILE = files(__package__).joinpath("checks.toml")
-_SAID: Mapping[str, Mapping[str, Any]] = tomllib.loads(_FILE.read_text(encoding="utf-8"))
+_SAID: Mapping[str, Mapping[str, Any]] = tomllib.loads(files(__package__).joinpath("checks.toml").read_text("utf-8"))
 
 
 @dataclass(frozen=True)

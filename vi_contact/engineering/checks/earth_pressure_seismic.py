@@ -73,8 +73,7 @@ class _Layer(EarthPressure):
         row, moment, peak = int(np.argmax(thrust)), thrust * np.nan_to_num(height), float(push.max())
         more, left = float(thrust[row] - thrust[0]), float(opened.max())
         if len(push) < 3 or peak <= 0.0 or more <= 0.0:
-            side = "is it the ground's acceleration=, and the soil on that side, on_left?"
-            return math.nan, more, f"{self.acceleration} never presses the soil on the wall: {side}", {}
+            return math.nan, more, f"{self.acceleration} never presses the soil on the wall: is it on that side?", {}
         most, arm, why = self.added(history["t"], push)
         why = why or (f"up to {left:.0%} of the wall leaves the soil" if left > LIFTED else "")
         if self.of == "height":
@@ -113,8 +112,7 @@ class VeletsosYounan(_Layer):
     def added(self, t: Array, push: Array) -> tuple[float, float, str]:
         steps, lowest = len(t) - 1, 0.5 * math.pi * self.c_s / self.height
         dt = float(t[-1] - t[0]) / steps
-        silence = 8.0 / (self.damping * lowest * dt)  # steps until all has died out; a hundred runs must do
-        count = 2 * steps + math.ceil(min(silence, 100.0 * steps))
+        count = 2 * steps + math.ceil(min(8.0 / (self.damping * lowest * dt), 100.0 * steps))  # until all has died out
         motion = np.fft.rfft(np.interp(t[0] + dt * np.arange(steps + 1), t, push), count)
         w, thrust, moment = 2.0 * math.pi * np.fft.rfftfreq(count, dt) / lowest, 0.0 * motion, 0.0 * motion
         for n, sign in zip(range(1, 80, 2), 20 * (1.0, -1.0), strict=True):
