@@ -6,8 +6,8 @@ from .earth_pressure_static import Rankine as Rankine
 from .earth_pressure_seismic import MononobeOkabe as MononobeOkabe
 from .earth_pressure_seismic import VeletsosYounan as VeletsosYounan
 from .earth_pressure_seismic import Wood as Wood
-from .housner import Housner as Housner
-from .newmark_block import NewmarkBlock as NewmarkBlock
 from .racking_ratio import RackingRatio as RackingRatio
+from .shaken_block import Housner as Housner
+from .shaken_block import NewmarkBlock as NewmarkBlock
 
 __all__: list[str] = ['AtRest', 'Coulomb', 'Housner', 'MononobeOkabe', 'NewmarkBlock', 'RackingRatio', 'Rankine', 'VeletsosYounan', 'Wood']
