@@ -1,6 +1,8 @@
 """Measure how strong a record is: peaks, Arias intensity, durations, what spectra say; and tell what it holds."""
 
 import math
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -114,31 +116,13 @@ def mean_period(record: Record) -> float:
 
 def record_info(record: Record) -> str:
     """Return the table of a record: where it comes from, peaks, intensities, what is left at its end, notes."""
-    peak = pga(record)
-    velocity, displacement = integrated(record)
-    rows = [
-        ("file", record.source),
-        ("format", record.format),
-        ("title", record.title or "(none)"),
-        ("station", record.station or "(not stated)"),
-        ("component", record.component or "(not stated)"),
-        ("units", f"{record.units} (1 {record.units} = {UNITS[record.units]:g} m/s2)"),
-        ("samples", f"{record.acceleration.size}"),
-        ("dt", f"{record.dt:g} s"),
-        ("duration", f"{record.duration:g} s"),
-        ("PGA", f"{peak:.4g} m/s2 = {peak / STANDARD_GRAVITY:.4g} g at t = {pga_time(record):g} s"),
-        ("PGV", f"{pgv(record):.4g} m/s"),
-        ("PGD", f"{pgd(record):.4g} m"),
-        ("Arias intensity", f"{arias(record):.4g} m/s"),
-        ("D5-95", f"{d5_95(record):.4g} s"),
-        ("CAV", f"{cav(record):.4g} m/s"),
-        ("RMS", f"{rms(record):.4g} m/s2"),
-        ("Housner intensity", f"{housner_intensity(record):.4g} m, 5 % damping, 0.1 to 2.5 s"),
-        ("predominant period", f"{predominant_period(record):.3g} s" if peak > 0.0 else "(all zero)"),
-        ("mean period", f"{mean_period(record):.3g} s" if peak > 0.0 else "(all zero)"),
-        ("final velocity", f"{velocity[-1]:.4g} m/s"),
-        ("final displacement", f"{displacement[-1]:.4g} m"),
-        ("sha256", record.sha256),
-    ]
-    rows += [("note", note) for note in record.notes]
-    return "\n".join(f"{name:<20}{value}" for name, value in rows)
+    measures = (pga, pga_time, pgv, pgd, arias, d5_95, cav, rms, housner_intensity)
+    found: dict[str, Any] = {one.__name__: one(record) for one in measures}
+    for one in (predominant_period, mean_period):
+        found[one.__name__] = f"{one(record):.3g} s" if found["pga"] > 0.0 else "(all zero)"
+    velocity, displacement = (values[-1] for values in integrated(record))
+    text = Path(__file__).with_name("record_info.txt").read_text(encoding="utf-8").format(
+        **found, record=record, title=record.title or "(none)", station=record.station or "(not stated)",
+        component=record.component or "(not stated)", unit=UNITS[record.units], velocity=velocity,
+        displacement=displacement, in_g=found["pga"] / STANDARD_GRAVITY)
+    return "\n".join([text, *(f"{'note':<20}{note}" for note in record.notes)])
