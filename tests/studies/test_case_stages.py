@@ -274,6 +274,12 @@ MISTAKES = {  # what is replaced in the guide's case, by what, what the sentence
     "release": ("release = true", 'release = "yes"', ": [[stage]] 2: release is 'yes'; give True or False"),
     "no list": (HOUSE[HOUSE.index("[[stage]]"):], "[stage]\nname = 1", ": [stage] is no list of tables: write"),
     "out": ("run = {dt = 0.002", 'run = {out = "x", dt = 0.002', ": [[stage]] 3: run has the key 'out', which all"),
+    "moved while static": (STAGE, STAGE + "excitation = []\n", ": [[stage]] 1 is static and has no use for exci"),
+    "steps while static": (STAGE, STAGE + "run = {dtt = 0.5}\n", ": [[stage]] 1 is static and has no use for run.dtt"),
+    "unit while static": (STAGE, STAGE + 'run = {dt = "3 m"}\n', ": [[stage]] 1 is static and has no use for run.dt: "),
+    "released first": (STAGE, STAGE + "release = true\n", ": [[stage]] 1 'gravity' has release = true, and is "),
+    "friction": ('name = "shock"', 'name = "shock"\nfriction = {type = "Coulomb", mu = 0.01}',
+                 ": [[stage]] 2 'shock' has another [friction] than the stage before it"),
     "within": ('{clamped = "lower_bottom"}', "{clampt = 1}",
                ": [[stage]] 1 'gravity': [system] has the unknown key 'clampt' for assemble: did you mean clamped"),
     "group": ('{clamped = "lower_bottom"}', '{clamped = "botom"}',
@@ -290,6 +296,20 @@ def test_mistakes_are_one_sentence(tmp_path: Path, name: str) -> None:
     with pytest.raises(InputError) as told:
         case(tmp_path, HOUSE.replace(old, new)).meshed(MPI.COMM_SELF)
     assert f"{told.value}".startswith(f"{tmp_path / 'house.toml'}{said}"), f"{told.value}"
+
+
+def test_another_friction_comes_with_a_static_stage(shared_tmp: Path) -> None:
+    """As the refusal of another one in a motion says: under the new law the house slips to rest, and stays there."""
+    law = 'system = {clamped = "lower_bottom"}\nfriction = {type = "Coulomb", mu = 0.01}\n'
+    text = (HOUSE.split('[[stage]]\nname = "shock"')[0] + f'[[stage]]\nname = "wet"\ntype = "static"\n{law}'
+            f'[[stage]]\nname = "still"\ntype = "dynamic"\n{law}excitation = []\nrun = {{dt = 0.001, t_end = 0.02}}\n')
+    found = case(shared_tmp, text).run(COMM, out=shared_tmp / "run", progress=False).history
+    dry = vc.read_run(shared_tmp / "run" / "stages" / "1_gravity").history
+    wet = vc.read_run(shared_tmp / "run" / "stages" / "2_wet").history
+    assert wet["contact_max_slip"][0] > 1e-3 * np.abs(wet["u_y_roof"][0]) > 0.0
+    assert dry["contact_max_slip"][0] < 0.3 * wet["contact_max_slip"][0]
+    assert np.ptp(found["contact_max_slip"]) < 1e-9 * wet["contact_max_slip"][0]
+    assert found["energy_kinetic"].max() < 1e-15 * found["energy_strain"][0]
 
 
 def test_what_stages_cannot_do(shared_tmp: Path) -> None:

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ BY_KEY = ("system", "run")
 WHOLE = ("gravity", "contact", "friction", "impact", "mass", "excitation", "scheme", "solver", "escalation", "record",
          "fields")
 KEYS = ("name", "type", "release", *BY_KEY, *WHOLE)
+OF_MOTION = ("excitation", "scheme", "impact", "mass", "escalation")  # what a static stage has no use for
 AT_REST = {"dt": 1.0, "steps": 0}  # [run] of a static stage: a row at t = 0
 _NAME = re.compile(r"\w{1,40}", re.ASCII)
 
@@ -40,7 +42,15 @@ def split(path: Path, tables: Mapping[str, Any]) -> list[Stage]:
     given = tables["stage"]
     if not isinstance(given, list) or not given or not all(isinstance(one, dict) for one in given):
         raise InputError(f"{path}: [stage] is no list of tables: write [[stage]] above the keys of each stage")
-    return [_stage(f"{path}: [[stage]] {number}", one, tables) for number, one in enumerate(given, start=1)]
+    stages = [_stage(f"{path}: [[stage]] {number}", one, tables) for number, one in enumerate(given, start=1)]
+    if stages[0].release:
+        raise InputError(f"{stages[0].label} has release = true, and is the first stage: leave it out")
+    for before, one in pairwise(stages):
+        for key in ("contact", "friction"):
+            if not one.static and one.tables.get(key) != before.tables.get(key):
+                raise InputError(f"{one.label} has another [{key}] than the stage before it, and would jump at t = 0: "
+                                 "give both the same, or put a static stage with this one between them")
+    return stages
 
 
 def _stage(where: str, given: Mapping[str, Any], tables: Mapping[str, Any]) -> Stage:
@@ -62,8 +72,11 @@ def _stage(where: str, given: Mapping[str, Any], tables: Mapping[str, Any]) -> S
     if "out" in given.get("run", {}):
         raise InputError(f"{where}: run has the key 'out', which all stages share: give it in [run]")
     if kind == "static":
-        run = dict(whole.get("run", {}))
-        whole["run"] = {key: run[key] for key in ("tolerance", "out") if key in run} | AT_REST
+        vain = [key for key in OF_MOTION if key in given] + [f"run.{key}" for key in given.get("run", {})
+                                                             if key != "tolerance"]
+        if vain:
+            raise InputError(f"{where} is static and has no use for {vain[0]}: leave it out, or give it a dynamic one")
+        whole["run"] = {key: one for key, one in whole.get("run", {}).items() if key in ("tolerance", "out")} | AT_REST
     whole |= {key: given[key] for key in WHOLE if key in given}
     return Stage(f"{where} '{name}'", name, kind == "static", release, whole)
 
