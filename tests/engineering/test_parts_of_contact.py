@@ -56,6 +56,17 @@ def test_thrust_of_soil_at_rest(comm: Any) -> None:
     assert upper == above and 0.2 * thrust < upper["N_upper"] < 0.3 * thrust
 
 
+def test_parts_that_meet_at_a_node_both_have_it(comm: Any) -> None:
+    """Boxes add up to the whole where their faces lie between nodes; one more node of thrust K0 rho g h y otherwise."""
+    problem, rest, tags = box_of_soil(comm)
+    h, whole = H / N, row(problem, rest, "wall", part=tags["right"])["N_wall"]
+    for shift, twice in ((0.25 * h, 0.0), (0.0, K0 * RHO * G * h * 0.5 * H)):
+        boxes = ((0.0, 0.1 * h), (9.0, 0.5 * H + shift)), ((0.0, 0.5 * H + shift), (9.0, 9.0))
+        low, high = (row(problem, rest, "a", part=box, normal=(1.0, 0.0))["N_a"] for box in boxes)
+        end = row(problem, rest, "a", part=((B, 0.0), (9.0, 0.1 * h)), normal=(1.0, 0.0))["N_a"]
+        assert low + high + end == pytest.approx(whole + twice, rel=1e-9)
+
+
 MU, WIDTH, TALL, SPRINGS = 0.6, 6.0, 2.0, 1e6
 DOWN, ACROSS = 1e4, 2e4  # tractions on the right side and the left one [Pa]
 
@@ -173,6 +184,7 @@ def test_bad_parts_are_refused() -> None:
     problem, rest, tags = box_of_soil(MPI.COMM_SELF)
     for given, said in (
         ({"name": "a", "part": ((9.0, 9.0), (10.0, 10.0))}, "part 'a' has no contact points"),
+        ({"name": "a", "part": tags["top"]}, "part 'a': no facet of its group is in contact"),
         ({"name": "a", "part": (1.0, 2.0)}, "part 'a': part, a box, has shape"),
         ({"name": "a", "part": tags["right"], "where": lambda x, n: n[:, 0] > 0}, "has both part and where"),
         ({}, "part name ''"),

@@ -32,7 +32,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 
-from ..core.algebra import Array, Indices, Mask, from_each
+from ..core.algebra import Array, Indices, Mask, from_each, largest
 from ..core.checks import array, column_name, function, instance, mask, optional, provides
 from ..core.corners import tangent_vectors
 from ..core.errors import InputError
@@ -176,7 +176,8 @@ class Resultants:
         name: names the columns; that of the group ``part`` when left out. centre: (d,) the point of reference, of a
             footing the middle of its base, of a wall a point at the level from which ``height`` counts [m]; the middle
             of the part at the level of its lowest point when None.
-        part: a boundary group, fem.Facets, or two opposite corners of a box, which has its faces too;
+        part: a boundary group, fem.Facets, or two opposite corners of a box, which has its faces too: a node belongs
+            wholly, with all its force and weight, to each part that it is in;
             where: points (m, d), normals (m, d) -> boolean mask (m,). The whole surface when both are None.
         normal: direction of N towards the support; the part's mean contact direction when None.
     Reactions are those of the step (mean or end value, as the scheme says), on a unilateral and on a held support.
@@ -222,6 +223,11 @@ class Resultants:
             provides(f"part '{self.name}'", "the system's space", space, ("facet_blocks",), "use one of fem.assemble")
             own = space.nodes[space.facet_blocks(self.part.indices)]
             found = np.isin(whole.nodes, np.concatenate(from_each(self._surface.comm, own)))  # type: ignore[arg-type]
+            clamped = from_each(self._surface.comm, space.nodes[space.held.all(axis=1)])
+            touching = np.isin(space.corners_of_facets(self.part.indices), np.concatenate([whole.nodes, *clamped]))
+            if not largest(self._surface.comm, touching.all(axis=1).any()):
+                raise InputError(f"part '{self.name}': no facet of its group is in contact, single nodes at most: give "
+                                 "a group of the contact, or a box")
             alone = found.copy()
             for rows in whole.corners:
                 alone[rows] = False
