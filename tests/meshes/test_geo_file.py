@@ -285,3 +285,30 @@ def test_loops_go_round_however_lines_end(tmp_path: Path, text: str) -> None:
         gmsh.merge(str(made))
         gmsh.model.geo.synchronize()
         assert len(gmsh.model.getEntities(0)) == LOOPS[text]
+
+
+@pytest.mark.parametrize(("groups", "said"), [
+    ('Physical Curve("base") = {1, 88};', "Unknown .* 88 in the group base"),
+    ('Physical Curve("50 % (left)") =\n {-1, 7:9};', "Unknown .* 7 in the group 50"),
+    ('n[] = {2}; Physical Curve("base") = {1};\nPhysical Curve("base") += {n[], 5};', "Unknown .* 5 in the group base"),
+    ('n[] = {}; Physical Curve("none") = n[];', "it is empty, the group none"),
+], ids=range(4))
+def test_groups_that_gmsh_would_cut_are_refused(tmp_path: Path, groups: str, said: str) -> None:
+    """It leaves out what is not there, and whole groups."""
+    path = written(tmp_path, SQUARE.replace("EXTRA", "").replace('Physical Curve("base") = {1};', groups))
+    with pytest.raises(InputError, match=said):
+        arrays_of(GeoFile(path=path))
+
+
+def test_groups_are_what_their_lists_say(tmp_path: Path) -> None:
+    """All kinds of lists; groups of branches that are not taken are none; in loops they grow."""
+    groups = """Physical Curve("all") = Curve{:}; Physical Curve("around") = Boundary{ Surface{1}; };
+    Physical Curve("turned") = {-1, 2}; If (0) Physical Curve("no") = {99}; EndIf
+    Physical Curve("two") = {1}; For i In {2:2} Physical Curve("two") += {i}; EndFor Physical Curve("low", 70) =
+    1; Physical Curve(9) = {3};"""
+    path = written(tmp_path, SQUARE.replace("EXTRA", "").replace('Physical Curve("base") = {1};', groups))
+    found = arrays_of(GeoFile(path=path)).facet_groups
+    n = {1: 2, 2: 1, 3: 2, 4: 1}  # facets of the curves
+    counts = {"all": (1, 2, 3, 4), "around": (1, 2, 3, 4), "turned": (1, 2), "two": (1, 2), "low": (1,), "9": (3,)}
+    assert {name: len(rows) for name, rows in found.items()} == {
+        name: sum(n[curve] for curve in curves) for name, curves in counts.items()}

@@ -17,6 +17,7 @@ import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.resources import files
+from itertools import pairwise
 from pathlib import Path
 from stat import S_ISREG
 from tempfile import TemporaryDirectory
@@ -37,6 +38,10 @@ _TOKEN = re.compile(
     r"(?P<sign>(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?|[-+*/<>=!]=|&&|\|\||\+\+|--|[-+*/%^<>!?:=,;.#(){}\[\]])",
     re.ASCII | re.DOTALL)
 _SET = re.compile(r"(?<![\w.])([A-Za-z_]\w*)\s*(?:=(?!=)|\[\s*\]\s*=|\(\s*\)\s*=|In\b)", re.ASCII)  # names that are set
+_GROUP = re.compile(r'( Physical\s+(Line|Curve|Surface|Volume)\s+\(\s*(?:"([^"%]*)[^"]*")?[^"()]*\)\s+\+?=)'
+                    r"(?!\s*\{\s*:)((?:[^;{}]|\{(?:[^{}]|\{(?:[^{}]|\{[^{}]*+\})*+\})*+\})*+);")
+_CHECKED = (r' told [ ] =\4; If (#told[] == 0) Error("it is empty, the group \3"); EndIf Printf("in the group \3");'
+            r" told_[] = Boundary{ \2{ told[] }; };\1 told [ ] ;")  # Gmsh leaves out of groups what is not there
 _ARITHMETIC = re.compile(r'"[\w\s.,+*/^()-]*"', re.ASCII)
 
 
@@ -99,8 +104,9 @@ def mesh_here(refine: int, time_limit: float) -> None:
                 gmsh.model.mesh.setOrder(int(gmsh.option.getNumber("Mesh.ElementOrder")))
             gmsh.write("made.msh")
         finally:
-            if wrong := [line for line in gmsh.logger.get() if line.startswith("Error")]:
-                sys.exit(wrong[0])
+            for before, line in pairwise(["", *gmsh.logger.get()]):
+                if line.startswith("Error"):
+                    sys.exit(f"{line} {'in' * (': in the group' in before)}{before.partition(': in')[2]}".rstrip())
 
 
 def allowed(path: Path) -> str:
@@ -115,7 +121,7 @@ def allowed(path: Path) -> str:
         raise InputError(f"Gmsh script {shown(str(path))} cannot be read ({error}): check the path") from None
     if len(data) > LARGEST:
         raise InputError(f"{path}: the script has more than {LARGEST} bytes: mesh it yourself")
-    return "".join(_written(path, text, set(_SET.findall(text)) - _WORDS)) + "\n"
+    return _GROUP.sub(_CHECKED, "".join(_written(path, text, set(_SET.findall(text)) - _WORDS))) + "\n"
 
 
 def _written(path: Path, text: str, own: set[str]) -> Iterator[str]:
