@@ -29,7 +29,6 @@ from vi_contact.meshes.gmsh_session import session
 from vi_contact.meshes.mesh_file import safe_copy
 
 LARGEST, MOST = 2_000_000, 8  # bytes of a script; how often it may be refined
-PR_SET_PDEATHSIG = 1  # of sys/prctl.h
 _LISTS = tomllib.loads(files(__package__).joinpath("geo_words.toml").read_text(encoding="utf-8"))
 _WORDS, _OPTIONS, _OF_FIELDS = (frozenset(_LISTS[name].split()) for name in ("words", "options", "fields"))
 _TOKEN = re.compile(
@@ -65,10 +64,9 @@ class GeoFile:
         """Mesh the script beside this process and read the mesh into Gmsh's current model."""
         with TemporaryDirectory(prefix="vi_contact-") as folder:
             Path(folder, "script.geo").write_text(allowed(self.path), encoding="utf-8")
-            code = ("import sys; sys.path = sys.argv[3:]; from vi_contact.meshes.geo_file import mesh_here; "
-                    "mesh_here(int(sys.argv[1]), float(sys.argv[2]))")
-            numbers = str(self.refine), str(self.time_limit)
-            command = [sys.executable, "-c", code, *numbers, *map(os.path.abspath, sys.path)]
+            code = ("import sys; sys.path = sys.argv[1:]; from vi_contact.meshes.geo_file import mesh_here; "
+                    f"mesh_here({self.refine}, {self.time_limit})")
+            command = [sys.executable, "-c", code, *map(os.path.abspath, sys.path)]
             try:
                 done = subprocess.run(command, cwd=folder, text=True, errors="replace", stdin=subprocess.DEVNULL,
                                       capture_output=True, timeout=self.time_limit)
@@ -85,7 +83,7 @@ class GeoFile:
 
 def mesh_here(refine: int, time_limit: float) -> None:
     """Mesh script.geo of this folder as made.msh: for a process of its own, which ends with its parent or its time."""
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
     signal.setitimer(signal.ITIMER_REAL, time_limit + 1.0)
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
     for limit in (resource.RLIMIT_AS, resource.RLIMIT_FSIZE):
@@ -151,7 +149,6 @@ def _written(path: Path, text: str, own: set[str]) -> Iterator[str]:
         yield "\n" * ends
         yield f" {'own_' if word in own and words[-1] != '.' else ''}{word}"
         words.append(word)
-        begins = word == "For" or begins
         level = 0 if word == "For" else level + (word in "([{") - (word in ")]}")
         ends = word == "EndFor" or (begins and level == 0 and word in ")]}")
-        begins = begins and not ends
+        begins = (begins or word == "For") and not ends
