@@ -17,11 +17,13 @@ WALL = {"height": 5.0, "rho": 2000.0, "gravity": 10.0}  # rho g H²/2 = 250 kN/m
 RUN = {"N_wall": np.array([9e4, 2e5, 1e5]), "height_wall": np.array([1.6, 2.0, 1.7])}
 
 
-def worst_wedge(phi: float, delta: float, slope: float, batter: float, psi: float) -> float:
+def worst_wedge(phi: float, delta: float, slope: float, batter: float, psi: float, load: float = 0.0) -> float:
     """The largest thrust of a triangle of soil on wall, ground and a plane at any angle, over rho g H²/2: equilibrium
-    of weight (turned by psi, divided by its cosine), reaction of the plane at phi, and thrust at delta."""
+    of weight (turned by psi, divided by its cosine), reaction of the plane at phi, and thrust at delta. load: on a
+    horizontal metre, over rho g H/2; the triangle's ground is as wide as the law of sines has it."""
     angles = np.linspace(slope + 1e-4, 0.5 * np.pi + batter - 1e-4, 400001)
     area = np.cos(batter - slope) * np.cos(angles - batter) / (np.cos(batter) ** 2 * np.sin(angles - slope))
+    area += load * np.cos(slope) * np.cos(angles - batter) / (np.cos(batter) * np.sin(angles - slope))
     thrust = np.sin(angles - phi + psi) / np.cos(angles - phi - delta - batter) / np.cos(psi) * area
     return float(thrust[(angles > phi - psi) & (np.cos(angles - phi - delta - batter) > 0.0)].max())
 
@@ -65,6 +67,29 @@ def test_rest_and_surcharge() -> None:
     assert loaded.compare(RUN).expected == pytest.approx(350e3 * 3.0 / 7.0, rel=1e-14)
     high = AtRest(**WALL, nu=0.3, surcharge=2e4, of="height").compare(RUN)
     assert (high.expected, high.found, high.unit) == (pytest.approx(5.0 * (250 / 3 + 50) / 350, rel=1e-14), 1.6, "m")
+
+
+def test_surcharge_on_a_slope_behind_a_batter() -> None:
+    """q on a horizontal metre: the thrust is that of the search over all planes with weight and load; 253 925 N of
+    another search for phi 35, delta 15, slope 20, batter 20 degrees, H = 5 m, 50 kPa."""
+    soil = {"height": 5.0, "rho": 1900.0, "surcharge": 5e4}
+    own = 0.5 * 1900.0 * 9.80665 * 25.0
+    for phi, delta, slope, batter in ((35.0, 15.0, 20.0, 20.0), (33.0, 11.0, 5.0, -8.0), (35.0, 0.0, 20.0, -20.0)):
+        angles = [DEGREE * one for one in (phi, delta, slope, batter)]
+        found = Coulomb(**soil, **dict(zip(("phi", "delta", "slope", "batter"), angles, strict=True))).compare(RUN)
+        searched = own * worst_wedge(*angles, 0.0, 5e4 / (0.5 * 1900.0 * 9.80665 * 5.0)) * math.cos(angles[1])
+        assert found.expected == pytest.approx(searched, rel=1e-8)
+        assert delta != 15.0 or found.expected == pytest.approx(253925.0, rel=1e-5)
+
+
+def test_passive_is_told() -> None:
+    """In name and inputs, and where its ground does not stand or its wedge is not at rest."""
+    told = {one: Coulomb(**WALL, phi=0.5, passive=one).compare(RUN) for one in (False, True)}
+    assert [told[one].name for one in (False, True)] == ["Coulomb", "Coulomb, passive"]
+    assert told[True].inputs == told[False].inputs | {"passive": (1.0, "-")}
+    for slope, words in ((0.6, "the ground is steeper than phi"), (-0.6, "phi + slope - psi is below zero, psi = 0")):
+        steep = Coulomb(**WALL, phi=0.5, slope=slope, passive=True).compare(RUN)
+        assert words in steep.applies and math.isnan(steep.expected)
 
 
 def test_outside_its_range_no_number_is_claimed() -> None:

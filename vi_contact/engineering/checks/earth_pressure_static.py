@@ -36,7 +36,7 @@ class EarthPressure(Check):
 
     part: of the contact, whose ``Resultants`` with their centre at the foot of the wall record N_<part>, height_<part>,
     uplift_<part>; of: "thrust", N [N/m] per metre of wall, or "height", of its line of action above the foot [m];
-    surcharge: q [Pa]; width: of the model across its plane [m].
+    surcharge: q [Pa], on a horizontal metre of ground; width: of the model across its plane, of a slice its thickness.
     """
 
     height: float
@@ -52,9 +52,11 @@ class EarthPressure(Check):
         raise NotImplementedError
 
     def numbers(self, history: History) -> Numbers:
-        """Compare N, or its height: that of rho g H²/2 at H/3 and of q H at H/2."""
+        """Compare N, or its height: that of rho g H²/2 at H/3 and of q H, times ``laden``, at H/2."""
         factor, why = self.coefficient()
-        own, extra = 0.5 * self.rho * self.gravity * self.height**2, self.surcharge * self.height
+        slope, batter = (getattr(self, angle, 0.0) for angle in ("slope", "batter"))
+        laden = math.cos(batter) * math.cos(slope) / math.cos(slope - batter)  # the ground of a wedge, by its size
+        own, extra = 0.5 * self.rho * self.gravity * self.height**2, laden * self.surcharge * self.height
         thrust, height = history[f"N_{self.part}"], history[f"height_{self.part}"]
         row = int(np.argmax(thrust)) if "largest" in self.said else 0  # the first is that of rest
         if self.of == "height":
@@ -97,7 +99,7 @@ class Coulomb(EarthPressure):
     """Expect the thrust of a plane wedge of soil that slides on the wall and on the ground below it: ``wedge``.
 
     phi, delta, slope, batter [rad]; N = P cos(delta). It applies for delta <= phi, passive: delta <= phi/2 (beyond it
-    surfaces that are curved slide at less), and phi - slope - psi >= 0.
+    surfaces that are curved slide at less), ground up to phi, and phi -+ slope - psi >= 0.
     """
 
     phi: float
@@ -107,8 +109,9 @@ class Coulomb(EarthPressure):
     passive: bool = False
 
     def coefficient(self, psi: float = 0.0) -> tuple[float, str]:
-        most = 0.5 * self.phi if self.passive else self.phi
-        found = wedge(self.phi, self.delta, self.slope, self.batter, psi=psi, passive=self.passive)
-        why = f"phi - slope - psi is below zero, psi = {psi:.4g}: no wedge is at rest" if math.isnan(found) else ""
+        most, sign = (0.5 * self.phi, "+") if self.passive else (self.phi, "-")
+        k = wedge(self.phi, self.delta, self.slope, self.batter, psi=psi, passive=self.passive)
+        why = "the ground is steeper than phi" if abs(self.slope) > self.phi else ""
+        why = f"phi {sign} slope - psi is below zero, psi = {psi:.4g}: no wedge is at rest" if math.isnan(k) else why
         why = f"delta is above {most:.4g}: no plane wedge is the worst" if self.delta > most else why
-        return found * math.cos(self.delta), why
+        return k * math.cos(self.delta), why

@@ -64,8 +64,7 @@ def describe(case: Any, comm: Any, parts: Parts | None = None, *, most: int = 50
         "run": run, "outline": outline(space, tags, [cells for cells, _ in space.forms.materials]),
     } | (_periods(problem, space.size) if space.unknowns <= most else {})
     model |= {"defects": list(_defects(model)), "warnings": list(_warnings(model))}
-    found: dict[str, Any] = json.loads(to_json(model), parse_float=lambda text: float(f"{float(text):.{DIGITS}g}"))
-    return found
+    return dict(json.loads(to_json(model), parse_float=lambda text: float(f"{float(text):.{DIGITS}g}")))
 
 
 def in_words(model: Mapping[str, Any]) -> str:
