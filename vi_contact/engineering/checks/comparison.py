@@ -73,8 +73,7 @@ class Check(ABC):
 
     def given(self) -> Inputs:
         """Return the fields that the formula takes."""
-        every = {name: (getattr(self, name), unit) for name, unit in self.said["fields"].items()}
-        return {name: one for name, one in every.items() if one[0] is not None}
+        return {key: (it, unit) for key, unit in self.said["fields"].items() if (it := getattr(self, key)) is not None}
 
     def compare(self, history: History) -> Comparison:
         """Return the comparison for the history of a run: column -> values (rows,), as of a solution or run folder."""

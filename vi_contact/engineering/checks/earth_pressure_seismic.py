@@ -96,7 +96,7 @@ class Wood(_Layer):
         speed, lowest = 0.5 * float(np.ptp(cumulative_trapezoid(push, t, initial=0.0))), 0.25 * self.c_s / self.height
         own = float(np.abs(push).max()) / (2.0 * math.pi * speed)
         why = f"the motion has {own:.3g} Hz, above {SLOW:g} of the layer's {lowest:.3g} Hz"
-        return factor * self.rho * float(push.max()) * self.height**2, arm * self.height, why if own > SLOW * lowest else ""
+        return factor * self.rho * push.max() * self.height**2, arm * self.height, why if own > SLOW * lowest else ""
 
 
 @dataclass(frozen=True, kw_only=True)
