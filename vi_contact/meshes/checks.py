@@ -17,11 +17,9 @@ _CORNERS: dict[str, list[tuple[int, ...]]] = {  # a vertex and its d neighbours,
     "triangle": [(0, 1, 2)],
     "quadrilateral": [(0, 1, 3), (1, 2, 0), (2, 3, 1), (3, 0, 2)],
     "tetrahedron": [(0, 1, 2, 3)],
-    "hexahedron": [
-        (0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7),
-        (4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3),
-    ],
-}  # fmt: skip
+    "hexahedron": [(0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7),
+                   (4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3)],
+}
 
 
 def check_cells(points: Array, cells: Rows, cell: str, source: str) -> None:

@@ -3,7 +3,6 @@
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ COPY = "case.toml"
 FORMAT = 1  # of case files
 _SET = "# set "  # before a setting, in the copy
 _FROM = "# its paths are relative to "  # before a folder, in the copy
-_RETIRED = tomllib.loads(files(__package__).joinpath("retired.toml").read_text(encoding="utf-8"))
+_RETIRED = tomllib.loads(Path(__file__).with_name("retired.toml").read_text(encoding="utf-8"))
 
 
 def builtin_cases() -> dict[str, str]:
