@@ -293,6 +293,7 @@ MISTAKES = {  # what is replaced in demos/cases/wall.toml, by what, what the sen
     "type": ('"Condensed"', '"Condensd"', ": [solver] has the unknown type 'Condensd': did you mean Condensed?"),
     "no type": ('type = "Inelastic"', "", ": [impact] has no type: give type = one of Inelastic, Newton, "
                 "Elastic"),
+    "nameless": ("[material.concrete]", "[material]", ": [material] has the keys of one material and no name: "),
     "missing": ("rho = 2400.0", "", ": [material.concrete] lacks 'rho', which LinearElastic needs"),
     "text": ("amplitude = 3.0", 'amplitude = "big"', ": [excitation[1]] amplitude is 'big': give a number"),
     "truth": ("amplitude = 3.0", "amplitude = true", ": [excitation[1]] amplitude is true: give a number"),

@@ -156,6 +156,19 @@ def test_what_is_refused(tmp_path, old, new, words):
         read_case(written(tmp_path, CASE.replace(old, new, 1))).run(COMM, progress=False)
 
 
+@pytest.mark.parametrize(("old", "new"), [
+    ("amplitude = 3.0", "amplitude = 300.0"), ("[strain_compatible]\n", "[strain_compatible]\nmost = 2\n")])
+def test_a_folder_without_compatible_soil_looks_unfinished(tmp_path, old, new):
+    """The last run stands with the others, and the folder holds no summary; a later run is not disturbed."""
+    out = tmp_path / "out"
+    with pytest.raises(ViContactError):
+        read_case(written(tmp_path, CASE.replace(old, new, 1))).run(COMM, out=out, progress=False)
+    assert [one.name for one in out.iterdir()] == ["iterations"]
+    folders = [out / "iterations" / f"{number}" for number in range(1, 1 + len(list((out / "iterations").iterdir())))]
+    assert len(folders) > 1
+    assert all(json.loads((one / "summary.json").read_text())["status"] == "finished" for one in folders)
+
+
 def test_no_restart_no_static_end_and_no_study(tmp_path):
     case = read_case(written(tmp_path))
     with pytest.raises(InputError, match="cannot be continued: run it from the start"):

@@ -164,17 +164,15 @@ class Case:
             return run_stages(self, comm, folder, restart=restart, reached=reached, progress=progress,
                               changed=changed, wall_time=wall_time)
         parts = self.parts(comm)
-        with self.call(parts, folder, changed=changed) as call:
+        with self.call(parts, folder) as call:
             if folder is not None:
                 from .description import FEW, describe, write_model  # late: it reads cases
 
                 write_model(parts.system.algebra.comm, describe(self, comm, parts, most=FEW), folder)
-            return simulate(**call, restart=restart, progress=progress, wall_time=wall_time)
+            return simulate(**call, restart=restart, progress=progress, changed=changed, wall_time=wall_time)
 
     @contextmanager
-    def call(
-        self, parts: Parts, folder: Path | None, state: State | None = None, *, changed: bool = False
-    ) -> Iterator[dict[str, Any]]:
+    def call(self, parts: Parts, folder: Path | None, state: State | None = None) -> Iterator[dict[str, Any]]:
         """Hold the run folder, with a copy of the case, and what the run gives to ``simulate``; collective.
 
         parts: as of ``parts``, of this case or of one with the same body; state: at rest, when it is known.
@@ -183,7 +181,6 @@ class Case:
             raise InputError(f"{self.path}: [strain_compatible] is for single runs: take it out for stages and studies")
         problem = self._problem(parts)
         own = {name: value for name, value in self._made("run", system=parts.system).items() if name != "out"}
-        own |= {"changed": True} if changed else {}
         if "steps" not in own and "t_end" not in own:
             own["t_end"] = self._duration(parts)
         solver = self._made("solver")
@@ -294,6 +291,8 @@ def _node(name: str, tables: Mapping[str, Any], spot: Spot, known: Words) -> Nod
         if materials:  # those that [system] does not name: one for the whole body, or each for its cell group
             value = {"material": materials[0] if len(materials) == 1 else [[one, one] for one in materials]} | value
         return arguments(value, asked, spot, known)
+    if name == "material" and isinstance(value, dict) and not all(isinstance(one, dict) for one in value.values()):
+        raise spot.inside("has the keys of one material and no name: write [material.NAME], with a name of your own")
     node = read(value, asked, spot, known)
     if name == "contact":
         given = (one.arguments for one in nodes_in(node) if isinstance(one, Call) and "name" in one.arguments)

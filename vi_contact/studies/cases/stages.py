@@ -110,16 +110,15 @@ def _made(
     stage: Stage, reached: Reached, comm: Any, folder: Path | None, options: dict[str, Any]
 ) -> tuple[Reached, Solution]:
     """Run a stage, or go on with it."""
-    again, changed = bool(options.get("restart")), options.get("changed", False)
     reached, parts, state = _entered(stage, reached, comm)
-    if stage.static and again:  # it has been solved
+    if stage.static and options.get("restart"):  # it has been solved
         state = initial_state(stage.case.problem(comm, parts))
-    with stage.case.call(parts, folder, state, changed=changed) as call:
+    with stage.case.call(parts, folder, state) as call:
         if folder is not None:
             from .description import FEW, describe, write_model  # late: it reads cases
 
             write_model(MpiComm(comm), describe(stage.case, comm, parts, most=FEW), folder)
-        solution = simulate(**call | options | ({"state": None} if again else {}))
+        solution = simulate(**call | options | ({"state": None} if options.get("restart") else {}))
     earlier = reached.earlier if reached.problem is None else (*reached.earlier, reached.problem)
     return replace(reached, number=reached.number + 1, problem=call["problem"], state=solution.state,
                    static=stage.static, earlier=earlier), solution

@@ -3,8 +3,8 @@
     [strain_compatible]
     curves = [["sand", {type = "SoilCurves.vucetic_dobry", plasticity = 15}]]
 
-Every run is a whole one, in DIR, all stages with the same soil; those before the last one are kept in
-DIR/iterations/1, 2, …, and DIR/strain_compatible.json has the largest relative change of G or xi after each.
+Every run is a whole one, in DIR, all stages with the same soil; those before the last one, or all where none ends it,
+are in DIR/iterations/1, 2, …, and DIR/strain_compatible.json has the largest relative change of G or xi after each.
 """
 
 import shutil
@@ -14,7 +14,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from ...core.errors import InputError
+from ...core.errors import InputError, ViContactError
 from ...core.files import on_root, to_json, write_atomically
 from ...fem.communicators import MpiComm
 from ...run.files.folder import LOCK, locked, run_folder
@@ -52,10 +52,15 @@ def iterate(case: Any, comm: Any, folder: Path | None, *, restart: bool | str | 
                        for stage in case.stages)
         return replace(softened(case, material, strain), stages=stages).run(comm, out=folder, **options)
 
-    each = given.arguments.get("material", ()), case.nodes["strain_compatible"]
-    material, asked = (build(one, {"tags": tags}) for one in each)
+    material = build(given.arguments.get("material", ()), {"tags": tags})
+    asked = build(case.nodes["strain_compatible"], {"tags": tags})
     with locked(ranks, None if folder is None else run_folder(ranks, folder)):
-        found = strain_compatible(mesh, material, run=run, **asked)
+        try:
+            found = strain_compatible(mesh, material, run=run, **asked)
+        except ViContactError:  # DIR shall not look like the run that was asked for
+            if folder is not None and (number := next(numbers)):
+                on_root(ranks, partial(_set_aside, folder / "iterations", number))
+            raise
         if folder is not None:
             told = to_json({"changes": found.changes}).encode()
             on_root(ranks, partial(write_atomically, folder / "strain_compatible.json", told))
