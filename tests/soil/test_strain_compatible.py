@@ -74,6 +74,7 @@ def beside_column(comm: Any, base: str, n: int, dt: float) -> tuple[Any, Any, li
     return found, column, [float(np.abs(ours / exact - 1.0).max()) for ours, exact in pairs]
 
 
+@pytest.mark.serial  # several ranks have a shorter test below
 @pytest.mark.parametrize(("base", "bounds"), [("rigid", (0.021, 0.016, 0.048, 0.033)),
                                               ("rock", (0.010, 0.007, 0.021, 0.010))])
 def test_a_strip_is_the_column_of_waves(comm, base, bounds):
