@@ -75,7 +75,7 @@ class GeoFile:
                                  "or give more time_limit") from None
             if done.returncode:
                 said = (done.stderr.strip().splitlines() or ["it ended, as where memory is over"])[-1]
-                if said.startswith("terminate called"):  # for a text that Gmsh throws
+                if said.strip().startswith(("terminate called", "what()")):  # for a text that Gmsh throws
                     said = "it stopped at a formula or size: look at Field[…].F, and at Mesh.MeshSize…, above zero"
                 raise InputError(f"{self.path}: Gmsh cannot mesh it: {said.replace('own_', '')}")
             gmsh.merge(str(safe_copy(Path(folder, "made.msh"), Path(folder))))
