@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.algebra import Comm, largest, total
+from ...core.algebra import Array, Comm, largest, total
 from ...core.files import on_root, to_json, write_atomically
 from ...core.problem import ContactProblem
 from ...core.step import AXES
@@ -50,7 +50,8 @@ def describe(case: Any, comm: Any, parts: Parts | None = None, *, most: int = 50
     parts = parts or case.parts(comm)
     problem, plan, tags = case.problem(comm, parts), case.plan(parts), parts.tags or {}
     space = space_of("describe", problem.system)
-    bodies = [_body(space, tags, *one) for one in space.forms.materials]
+    volumes = cell_volumes(space.mesh)
+    bodies = [_body(space, tags, volumes, *one) for one in space.forms.materials]
     run = {"dt": plan.dt(0), "t_end": plan.length, "steps": plan.steps}
     model = {
         "title": case.tables.get("title") or case.path.stem, "dimension": space.dimension, "unknowns": space.unknowns,
@@ -85,11 +86,10 @@ def _word(value: Any) -> Any:
         value, list) else value
 
 
-def _body(space: Any, tags: Mapping[str, Any], cells: Any, material: Any) -> dict[str, Any]:
+def _body(space: Any, tags: Mapping[str, Any], volumes: Array, cells: Any, material: Any) -> dict[str, Any]:
     """What is made of one material, by the name of its cell group, with its slowest waves and longest edge."""
     names = [name for name, one in tags.items() if isinstance(one, Cells)
              and not largest(space.comm, not np.array_equal(one.indices, cells))]
-    volumes = cell_volumes(space.mesh)
     own = cells[cells < len(volumes)]
     density, shear = (space.forms.cellwise(field)[own] for field in ("rho", "shear"))
     if hasattr(material, "G12"):
