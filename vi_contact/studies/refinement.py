@@ -9,6 +9,7 @@ import numpy as np
 from ..core.errors import InputError, ViContactError
 from ..engineering.peak_values import GROWS, peaks
 from ..plots.sections import SAY, Section, Table, number
+from ..run.files.folder import CHECKPOINT, HISTORY_CSV
 from ..run.files.reading import RunFolder, read_run
 from .cases.library import COPY, copied_settings, read_copy
 from .cases.toml_file import toml_value, with_settings
@@ -38,7 +39,7 @@ def refine(folder: str | Path, comm: Any, *, allow: Sequence[str] = (), progress
             same, settings = _same(run, name), [*copied_settings(run.folder), *_halved(run, name)]
             if not (same and _status(out) == "finished"):
                 case = read_case(run.folder / COPY, settings, allow=allow)
-                case.run(comm, out=out, restart=same and (out / "checkpoint.npz").is_file(), progress=progress)
+                case.run(comm, out=out, restart=same and (out / CHECKPOINT).is_file(), progress=progress)
         except (ViContactError, TypeError) as error:  # a number written as a text has no half
             failed[name] = str(error)
     return failed
@@ -73,7 +74,7 @@ def _halved(folder: RunFolder, name: str) -> Iterator[str]:
 
 
 def _status(folder: Path) -> str:
-    return str(read_run(folder).facts.get("status")) if (folder / "history.csv").is_file() else ""
+    return str(read_run(folder).facts.get("status")) if (folder / HISTORY_CSV).is_file() else ""
 
 
 def refinement(run: RunFolder, failed: Mapping[str, str]) -> Section:
