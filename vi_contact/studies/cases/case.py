@@ -125,10 +125,14 @@ class Case:
         return self._problem(parts or self.parts(comm))
 
     def plan(self, parts: Parts) -> StepPlan:
-        """Return the base steps of the run; without ``steps`` and ``t_end`` it lasts as long as the excitation."""
-        own = self._made("run", system=parts.system)
-        endless = "steps" not in own and "t_end" not in own
-        return step_plan(own["dt"], own.get("steps"), self._duration(parts) if endless else own.get("t_end"))
+        """Return the base steps of the run."""
+        own = self._timed(parts)
+        return step_plan(own["dt"], own.get("steps"), own.get("t_end"))
+
+    def _timed(self, parts: Parts) -> dict[str, Any]:
+        """Return what [run] gives; without ``steps`` and ``t_end`` it lasts as long as the excitation."""
+        own: dict[str, Any] = self._made("run", system=parts.system)
+        return own if "steps" in own or "t_end" in own else own | {"t_end": self._duration(parts)}
 
     def columns(self, comm: Any, parts: Parts | None = None) -> frozenset[str]:
         """Return the columns that a run writes into history.csv; computes no step. ``parts`` as above. Collective."""
@@ -165,11 +169,15 @@ class Case:
                               changed=changed, wall_time=wall_time)
         parts = self.parts(comm)
         with self.call(parts, folder) as call:
-            if folder is not None:
-                from .description import FEW, describe, write_model  # late: it reads cases
-
-                write_model(parts.system.algebra.comm, describe(self, comm, parts, most=FEW), folder)
+            self.keep_model(comm, parts, folder)
             return simulate(**call, restart=restart, progress=progress, changed=changed, wall_time=wall_time)
+
+    def keep_model(self, comm: Any, parts: Parts, folder: Path | None) -> None:
+        """Write into the folder of a run, if it has one, what its model is. Collective."""
+        if folder is not None:
+            from .description import FEW, describe, write_model  # late: it reads cases
+
+            write_model(parts.system.algebra.comm, describe(self, comm, parts, most=FEW), folder)
 
     @contextmanager
     def call(self, parts: Parts, folder: Path | None, state: State | None = None) -> Iterator[dict[str, Any]]:
@@ -180,9 +188,7 @@ class Case:
         if "strain_compatible" in self.nodes:
             raise InputError(f"{self.path}: [strain_compatible] is for single runs: take it out for stages and studies")
         problem = self._problem(parts)
-        own = {name: value for name, value in self._made("run", system=parts.system).items() if name != "out"}
-        if "steps" not in own and "t_end" not in own:
-            own["t_end"] = self._duration(parts)
+        own = {name: value for name, value in self._timed(parts).items() if name != "out"}
         solver = self._made("solver")
         if state is None and parts.weighted:
             from ...run.static import static_equilibrium  # late: other runs need none of it

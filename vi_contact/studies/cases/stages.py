@@ -114,10 +114,7 @@ def _made(
     if stage.static and options.get("restart"):  # it has been solved
         state = initial_state(stage.case.problem(comm, parts))
     with stage.case.call(parts, folder, state) as call:
-        if folder is not None:
-            from .description import FEW, describe, write_model  # late: it reads cases
-
-            write_model(MpiComm(comm), describe(stage.case, comm, parts, most=FEW), folder)
+        stage.case.keep_model(comm, parts, folder)
         solution = simulate(**call | options | ({"state": None} if options.get("restart") else {}))
     earlier = reached.earlier if reached.problem is None else (*reached.earlier, reached.problem)
     return replace(reached, number=reached.number + 1, problem=call["problem"], state=solution.state,
