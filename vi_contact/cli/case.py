@@ -14,49 +14,20 @@ from ..studies.cases.library import FOLDER, builtin_cases, copy_starter, located
 from ..studies.cases.short_settings import ShortOptions
 from ..studies.cases.toml_file import read_toml
 from .errors import printable, world
-from .options import WALL_TIME, add_settings
+from .options import add_command
 
 if TYPE_CHECKING:
     from ..studies.cases.case import Case
 
 
 def add_case_commands(commands: Any) -> None:
-    """Add ``run`` and ``cases`` to the commands of the top parser."""
-    run = commands.add_parser(
-        "run", help="run a case: one that ships with the package, or a TOML file",
-        description="Run a case. The short options and --set change what it says; 'vi-contact cases' lists those that "
-        "ship with the package, 'vi-contact report DIR' draws what the run found.",
-    )
-    run.add_argument("case", help="name of a case that ships (wall, channel), or a .toml file")
-    short = run.add_argument_group("short options", "an option that the case has no use for is refused")
-    short.add_argument("--motion", metavar="FILE[,FILE]", help="shake by records, a horizontal and a vertical one")
-    short.add_argument("--scale", type=float, metavar="F", help="factor on what shakes")
-    short.add_argument("--dt", type=float, metavar="S", help="time step [s]")
-    short.add_argument("--steps", type=int, metavar="N", help="number of steps")
-    short.add_argument("--solver", metavar="NAME", help="Condensed, Iterative, Volume or a method, as Hildreth")
-    short.add_argument("--scheme", metavar="NAME", help=", ".join(schemes.__all__))
-    short.add_argument("--cross-check", action="store_true", help="solve every step by the other route too and compare")
-    run.add_argument("--out", metavar="DIR", help="output folder (default: out of [run], or results/NAME of the case)")
-    run.add_argument("--restart", action="store_true", help="continue the run in the output folder from its checkpoint")
-    run.add_argument("--restart-changed", action="store_true", dest="changed",
-                     help="the same, also when the problem is another one than that of the checkpoint")
-    run.add_argument("--wall-time", metavar="TIME", help=WALL_TIME)
-    add_settings(run)
-    run.add_argument("--check", action="store_true", help="tell what the model is, draw it as DIR/model.png, "
-                     "and stop: mesh and records are read, and no step is computed")
-    run.add_argument("--quiet", action="store_true", help="no progress line")
-    run.set_defaults(run=_run, spelling={"units": "units (--set excitation.1.record.units=UNIT)"})
-    cases = commands.add_parser("cases", help="list the cases that ship with the package",
-                                description="List the cases that ship with the package, and their folder.")
-    cases.set_defaults(run=_cases)
-    schema = commands.add_parser("schema", help="print the JSON schema of case files, for editors",
-                                 description="Print the JSON schema of case files: vi-contact schema > case.json.")
-    schema.set_defaults(run=lambda options: FOLDER.with_name("case.schema.json").read_text("utf-8").rstrip())
-    new = commands.add_parser("new", help="write a case to begin with, and the script of its mesh",
-                              description="Write a commented case file and the Gmsh script of its mesh, to be changed.")
-    new.add_argument("name", metavar="NAME", help=", ".join(starters()))
-    new.add_argument("folder", metavar="DIR", nargs="?", help="default: NAME")
-    new.set_defaults(run=_new)
+    """Add ``run``, ``cases``, ``schema`` and ``new`` to the commands of the top parser."""
+    words = {"schemes": ", ".join(schemes.__all__), "starters": ", ".join(starters())}
+    run = add_command(commands, "run", _run, "run", "short", "output", "settings", "check", words=words)
+    run.set_defaults(spelling={"units": "units (--set excitation.1.record.units=UNIT)"})
+    add_command(commands, "cases", _cases)
+    add_command(commands, "schema", lambda options: FOLDER.with_name("case.schema.json").read_text("utf-8").rstrip())
+    add_command(commands, "new", _new, "new", words=words)
 
 
 def _cases(options: argparse.Namespace) -> str:

@@ -8,34 +8,12 @@ from typing import Any
 from ..core.checks import shown
 from ..core.errors import InputError, OutOfTime, ViContactError
 from ..studies.cases.library import located
-from .options import WALL_TIME, add_settings
+from .options import add_command
 
 
 def add_ida_commands(commands: Any) -> None:
     """Add ``ida`` to the commands of the top parser."""
-    sentence = "incremental dynamic analysis: a case file under many records, each at many intensities"
-    one = commands.add_parser("ida", help=sentence, description=sentence[0].upper() + sentence[1:] + ".")
-    one.add_argument("case", help="case file shaken by GroundMotions (docs/guide/studies.md)")
-    one.add_argument("--motions", nargs="+", required=True, metavar="FILE",
-                     help="record files, H.at2,V.at2 where the case has two ground motions; a folder of them; @LIST, a "
-                     "file with a record a line")
-    values = one.add_mutually_exclusive_group(required=True)
-    values.add_argument("--scales", type=_numbers, metavar="F,F,...", help="factors on the motions")
-    values.add_argument("--levels", type=_numbers, metavar="I,I,...", help="values of the intensity measure, SI units")
-    one.add_argument("--im", default="pga", metavar="IM",
-                     help="intensity of the first motion: pga (default), pgv, pgd, sa:T (5 %% damping, T in s), sa:T1 "
-                     "(at the first period of the model), arias, cav, housner")
-    one.add_argument("--edp", nargs="+", required=True, metavar="COLUMN[:WAY]",
-                     help="columns of history.csv; WAY: absmax (default), max, min, last")
-    one.add_argument("--fragility", nargs="+", default=(), metavar="COLUMN:WAY=LIMIT",
-                     help="fit the probability that a demand passes this limit, in the unit of its column")
-    one.add_argument("--out", required=True, metavar="DIR", help="folder of the study; the same again to go on")
-    one.add_argument("--jobs", type=int, default=1, metavar="N", help="processes, of up to 8 runs each (default 1)")
-    one.add_argument("--part", type=_part, default=(1, 1), metavar="I/N", help="only every N-th run, for job arrays")
-    one.add_argument("--launch", default="", metavar="WORDS", help="in front of every run, such as 'mpirun -n 4'")
-    one.add_argument("--wall-time", metavar="TIME", help=f"{WALL_TIME}; every run gets what is left")
-    add_settings(one)
-    one.set_defaults(run=_ida)
+    add_command(commands, "ida", _ida, "ida", "ida options", "settings", words={"numbers": _numbers, "part": _part})
 
 
 def _numbers(text: str) -> tuple[float, ...]:

@@ -18,7 +18,7 @@ from ..ground_motion.intensity import pga, record_info
 from ..ground_motion.record import LARGEST_PEAK, UNITS, Record, canonical_units
 from ..ground_motion.spectra import response_spectrum
 from ..plots.records import plot_motion, plot_spectra
-from .options import add_actions, output_file, spaced
+from .options import add_actions, add_command, output_file, spaced
 
 _FORMATS = {".at2": "at2", ".th": "path", ".g3": "path", ".acc": "path"}
 _QUANTITY = re.compile(r"([-+]?[\d.]++(?:[eE][-+]?\d++)?)(.*+)")
@@ -28,75 +28,13 @@ _SPELLING = {"units": "--units", "dt": "--dt", "channel": "--channel", "largest"
 
 def add_motion_commands(commands: Any) -> None:
     """Add ``motion`` with its actions to the commands of the top parser."""
-    parsers = add_actions(commands, "motion", "ground motion files", {
-        "info": (_info, "what a record file holds: units, peaks, intensities, duration, drift"),
-        "convert": (_convert, "process a record and write it as columns, PEER AT2 or OpenSees path series"),
-        "plot": (_plot, "picture of acceleration, velocity, displacement and Husid's curve"),
-        "spectrum": (_spectrum, "response spectra as CSV and picture, with the spectrum of Eurocode 8"),
-    })
-    for name, one in parsers.items():
-        one.set_defaults(spelling=_SPELLING)
-        one.add_argument("file", nargs="+" if name in ("info", "spectrum") else None,
-                         help="AT2, COSMOS/CSMIP V2, SMC, K-NET, ESM, AFAD, columns, path series")
-    parsers["convert"].add_argument("out", help="file to write")
-    for one in parsers.values():
-        _add_reading(one)
-        _add_processing(one)
-    convert = parsers["convert"].add_argument_group("output")
-    convert.add_argument("--to", choices=("columns", "at2", "path"),
-                         help="format (default by the name: .at2, .th .g3 .acc: path series, else columns)")
-    convert.add_argument("--out-units", metavar="UNITS", help="default g in AT2, else m/s2")
-    plot = parsers["plot"].add_argument_group("output")
-    plot.add_argument("--out", metavar="PNG", help="picture (default: name of the record file with .png, here)")
-    plot.add_argument("--out-units", default="m/s2", metavar="UNITS", help="of the accelerations drawn (default m/s2)")
-    _add_spectrum(parsers["spectrum"])
-
-
-def _add_reading(one: argparse.ArgumentParser) -> None:
-    group = one.add_argument_group("reading")
-    group.add_argument("--units", help="m/s2, cm/s2, gal, g, ...: required where the file does not say")
-    group.add_argument("--dt", type=float, help="time step [s], where the file does not say")
-    group.add_argument("--channel", type=int, metavar="K", help="which one of a file that holds several, from 1")
-    group.add_argument("--largest", type=acceleration, default=LARGEST_PEAK, metavar="A",
-                       help="accept peaks up to this (default 10g: beyond it the units are doubted)")
-    group.add_argument("--even", type=float, metavar="DT", help="bring uneven times of a column file to this step [s]")
-
-
-def _add_processing(one: argparse.ArgumentParser) -> None:
-    group = one.add_argument_group("processing, in this order", "accelerations as 3.0 (m/s2) or with units, as 0.3g")
-    group.add_argument("--trim", type=float, nargs=2, metavar=("START", "END"), help="keep this part [s]")
-    group.add_argument("--pad", type=float, nargs=2, metavar=("BEFORE", "AFTER"), help="add zeros [s]")
-    group.add_argument("--remove-mean", action="store_true", dest="mean", help="remove the mean")
-    group.add_argument("--taper", type=float, nargs="?", const=0.05, metavar="PART",
-                       help="cosine taper over this part of the duration at each end (0.05 if no number follows)")
-    group.add_argument("--low", type=float, metavar="HZ", help="Butterworth high-pass corner")
-    group.add_argument("--high", type=float, metavar="HZ", help="Butterworth low-pass corner")
-    group.add_argument("--order", type=int, default=4, help="order of the filter (default 4)")
-    group.add_argument("--causal", action="store_true", help="filter forward only instead of with zero phase")
-    group.add_argument("--resample", type=float, metavar="DT", help="resample to this step [s], band-limited")
-    group.add_argument("--baseline", type=int, nargs="?", const=2, metavar="DEGREE",
-                       help="remove a polynomial so that the ground ends at rest where it began (degree 2)")
-    scale = group.add_mutually_exclusive_group()
-    scale.add_argument("--scale", type=float, metavar="F", help="multiply by F")
-    scale.add_argument("--pga", type=acceleration, metavar="A", help="scale to this peak acceleration")
-    scale.add_argument("--arias", type=float, metavar="I", help="scale to this Arias intensity [m/s]")
-    scale.add_argument("--psa", nargs=2, metavar=("A", "T"),
-                       help="scale to this pseudo-acceleration (5 %% damping) at period T [s]")
-
-
-def _add_spectrum(one: argparse.ArgumentParser) -> None:
-    group = one.add_argument_group("spectrum")
-    group.add_argument("--damping", type=float, nargs="+", default=[0.05], metavar="Z", help="ratios (default 0.05)")
-    group.add_argument("--periods", type=float, nargs=3, default=(0.02, 10.0, 200), metavar=("FROM", "TO", "N"),
-                       help="logarithmically spaced [s] (default 0.02 10 200)")
-    target = one.add_argument_group("target")
-    target.add_argument("--ec8", metavar="GROUND", help="ground type A, B, C, D or E; needs --ag")
-    target.add_argument("--ag", type=acceleration, metavar="A", help="design ground acceleration on ground A")
-    target.add_argument("--ec8-type", type=int, choices=(1, 2), default=1, help="spectrum type (default 1)")
-    output = one.add_argument_group("output")
-    output.add_argument("--csv", metavar="FILE", help="default: name of the first record file with _spectrum.csv, here")
-    output.add_argument("--png", metavar="FILE", help="picture, default the same with .png")
-    output.add_argument("--out-units", default="g", metavar="UNITS", help="of the picture and the table (default g)")
+    actions = add_actions(commands, "motion")
+    for action, run, more in (("info", _info, ()), ("convert", _convert, ("convert output",)),
+                              ("plot", _plot, ("plot output",)),
+                              ("spectrum", _spectrum, ("spectrum", "target", "spectrum output"))):
+        one = add_command(actions, f"motion {action}", run, f"motion {action}", "reading", "processing", *more,
+                          words={"acceleration": acceleration})
+        one.set_defaults(spelling=_SPELLING, largest=LARGEST_PEAK)
 
 
 def acceleration(text: str) -> float:

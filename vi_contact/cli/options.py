@@ -2,8 +2,10 @@
 
 import argparse
 import math
+import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,30 +16,50 @@ from ..core.errors import InputError
 
 MOST_SPACED = 100_000  # periods or frequencies of a spectrum
 PICTURES = (".png", ".pdf", ".svg")
-WALL_TIME = ("end with a checkpoint, and status 75, before so much time since the start is over: hours:minutes:seconds "
-             "or what else Slurm reads as --time")
+_NONE: Mapping[str, Any] = {}
 
 
-def add_settings(command: argparse.ArgumentParser) -> None:
-    """Add the options that change what a case says, and what it may name."""
-    command.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
-                         help="replace a value of the case, such as friction.mu=0.5 or excitation.1.scale=2, or take "
-                         "it away (KEY=); repeatable")
-    command.add_argument("--allow", action="append", default=[], metavar="PACKAGE",
-                         help="the case may name classes of this Python package, as package.module:Name, and so run "
-                         "its code; repeatable (docs/guide/extend.md)")
+def add_command(
+    commands: Any, name: str, run: Callable[[argparse.Namespace], str], *parts: str, words: Mapping[str, Any] = _NONE
+) -> argparse.ArgumentParser:
+    """Add a command, or an action of one such as "motion info", with these parts of options.toml; return its parser.
+
+    run: what it calls. words: what the texts there, and the names of types, are looked up in.
+    """
+    known, command = {"float": float, "int": int} | dict(words), _told()[name]
+    told = command["help"]
+    about = command.get("description", f"{told[0].upper()}{told[1:]}.")
+    parser: argparse.ArgumentParser = commands.add_parser(name.split()[-1], help=told, description=about)
+    for part in parts:
+        table = _told()[part]
+        titled = parser.add_argument_group(table["title"], table.get("about")) if "title" in table else parser
+        _add(titled, table, known)
+    parser.set_defaults(run=run)
+    return parser
 
 
-def add_actions(
-    commands: Any, name: str, sentence: str, actions: Mapping[str, tuple[Callable[[argparse.Namespace], str], str]]
-) -> dict[str, argparse.ArgumentParser]:
-    """Add a command with its actions, name -> (what it calls, what it does), and return their parsers by name."""
-    group = commands.add_parser(name, help=sentence).add_subparsers(dest="action", required=True, metavar="ACTION")
-    parsers = {}
-    for action, (run, told) in actions.items():
-        parsers[action] = group.add_parser(action, help=told, description=told[0].upper() + told[1:] + ".")
-        parsers[action].set_defaults(run=run)
-    return parsers
+def add_actions(commands: Any, name: str) -> Any:
+    """Add a command that has actions, and return what they are added to."""
+    actions = commands.add_parser(name, help=_told()[name]["help"])
+    return actions.add_subparsers(dest="action", required=True, metavar="ACTION")
+
+
+@cache
+def _told() -> dict[str, Any]:
+    return tomllib.loads(Path(__file__).with_name("options.toml").read_text("utf-8"))
+
+
+def _add(place: Any, table: Mapping[str, Any], known: Mapping[str, Any]) -> None:
+    """Add the options of a table, which are its own tables."""
+    for option, told in table.items():
+        if option == "one_of":
+            _add(place.add_mutually_exclusive_group(required=told.get("required", False)), told, known)
+        elif isinstance(told, dict):
+            given = told | {"help": told["help"].format_map(known)}
+            given |= {"type": known[told["type"]]} if "type" in told else {}
+            if isinstance(told.get("metavar"), list):
+                given["metavar"] = tuple(told["metavar"])
+            place.add_argument(option, **given)
 
 
 def spaced(option: str, values: Sequence[float]) -> Any:

@@ -8,38 +8,14 @@ from typing import Any
 from ..core.checks import shown
 from ..core.errors import InputError
 from .errors import world
-from .options import output_file
+from .options import add_command, output_file
 
 
 def add_picture_commands(commands: Any) -> None:
     """Add ``report``, ``plot`` and ``film`` to the commands of the top parser."""
-    report = commands.add_parser(
-        "report", help="report on a run, with its pictures", description="Report on a run from the files in its "
-        "folder, as PDF and, with jinja2 and plotly, as a web page in one file; beside it peaks.csv and pictures."
-    )
-    report.add_argument("--out", metavar="FILE", help=".html or .pdf (default DIR/report.pdf and DIR/report.html)")
-    report.add_argument("--title", help="default: that of the case, or the name of the folder")
-    report.add_argument("--show", metavar="COLUMN[,COLUMN...]", action="append",
-                        help="a chart with these columns, of one unit; repeat for more (default: what moves)")
-    report.add_argument("--refine", action="store_true", help="run the case again with half the element size and with "
-                        "half the time step, into DIR/refined, and set the peaks beside each other")
-    report.add_argument("--allow", action="append", default=[], metavar="PACKAGE", help="as of run, for --refine")
-    plot = commands.add_parser("plot", help="draw the bodies of a run", description="Draw the deformed bodies of a run "
-                               "with their stress, contact pressure and states, from the frames in its folder.")
-    plot.add_argument("--times", metavar="T[,T...]", help="moments [s] (default: start, end, when most happens)")
-    plot.add_argument("--out", metavar="FOLDER", help="where deformed.png and faces.png go (default DIR)")
-    film = commands.add_parser("film", help="film the bodies of a run", description="Film the deformed bodies of a run "
-                               "above a history, from the frames in its folder.")
-    film.add_argument("--between", metavar="T,T", dest="times", help="first and last moment [s] (default: 48 frames "
-                      "around the one when most happens)")
-    film.add_argument("--out", metavar="FILE", help=".gif or, with ffmpeg, .mp4 (default DIR/film.gif)")
-    film.add_argument("--column", metavar="COLUMN", help="the history below (default: the one that tells most)")
-    for one, run in ((report, _report), (plot, _plot), (film, _film)):
-        one.add_argument("folder", metavar="DIR", help="output folder of a run")
-        one.set_defaults(run=run, spelling={"magnified": "--magnify"})
-    for one in (plot, film):
-        one.add_argument("--magnify", type=float, metavar="F", dest="magnified",
-                         help="how many times larger displacements are drawn (default: so that they are seen)")
+    for name, run, more in (("report", _report, ()), ("plot", _plot, ("magnify",)), ("film", _film, ("magnify",))):
+        one = add_command(commands, name, run, name, "folder", *more)
+        one.set_defaults(spelling={"magnified": "--magnify"})
 
 
 def _report(options: argparse.Namespace) -> str:

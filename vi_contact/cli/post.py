@@ -9,7 +9,7 @@ from ..core.files import write_csv
 from ..engineering import floor_spectrum, hysteresis, peaks, recorded_motion, transfer_function, write_peaks
 from ..plots.records import plot_loop, plot_spectra, plot_transfer
 from ..run.files.folder import FILES
-from .options import PICTURES, add_actions, output_file, spaced
+from .options import PICTURES, add_actions, add_command, output_file, spaced
 
 if TYPE_CHECKING:
     from ..run.files.reading import RunFolder
@@ -17,32 +17,10 @@ if TYPE_CHECKING:
 
 def add_post_commands(commands: Any) -> None:
     """Add ``post`` to the commands of the top parser."""
-    parsers = add_actions(commands, "post", "numbers and pictures from the folder of a run", {
-        "peaks": (_peaks, "largest and smallest value of every column, as a table"),
-        "spectrum": (_spectrum, "floor response spectra of recorded accelerations, as CSV and picture"),
-        "transfer": (_transfer, "transfer function of two recorded accelerations, as CSV and picture"),
-        "checks": (_checks, "what the run found beside the formulas of its [[check]] tables"),
-        "loop": (_loop, "a force over a deformation, with the work in it, as CSV and picture"),
-    })
-    for name, one in parsers.items():
-        one.add_argument("folder", metavar="DIR", help="output folder of a run")
-        one.add_argument("--out", metavar="CSV", help=f"default DIR/{name}.csv; a picture goes beside it")
-    parsers["peaks"].add_argument("columns", metavar="COLUMN", nargs="*", help="default: all")
-    spectrum, transfer, loop = parsers["spectrum"], parsers["transfer"], parsers["loop"]
-    spectrum.add_argument("columns", metavar="COLUMN", nargs="+", help="a_x_top, a_g_x; with an impact law v_x_top")
-    spectrum.add_argument("--damping", type=float, default=0.05, metavar="Z", help="ratio (default 0.05)")
-    spectrum.add_argument("--periods", type=float, nargs=3, default=(0.02, 4.0, 200), metavar=("FROM", "TO", "N"),
-                          help="logarithmically spaced [s] (default 0.02 4 200)")
-    spectrum.add_argument("--relative", action="store_true", help="motion relative to the ground, not the absolute one")
-    transfer.add_argument("surface", metavar="COLUMN", help="acceleration above, such as a_x_top")
-    transfer.add_argument("base", metavar="BASE", nargs="?", default="a_g_x", help="below (default a_g_x)")
-    transfer.add_argument("--bandwidth", type=float, default=40.0, metavar="B",
-                          help="of Konno and Ohmachi's smoothing (default 40), 0: none")
-    transfer.add_argument("--frequencies", type=float, nargs=3, metavar=("FROM", "TO", "N"),
-                          help="logarithmically spaced [Hz] (default: 200 from 4/duration to 1/(4 dt), raw: all)")
-    loop.add_argument("deformation", metavar="DEFORMATION", help="column such as u_x_top or theta_base")
-    loop.add_argument("force", metavar="FORCE", help="column such as reaction_x_base or M_base")
-    loop.add_argument("--turn", action="store_true", help="turn the sign of the force")
+    actions = add_actions(commands, "post")
+    for name, run in {"peaks": _peaks, "spectrum": _spectrum, "transfer": _transfer, "checks": _checks,
+                      "loop": _loop}.items():
+        add_command(actions, f"post {name}", run, "folder", "table", f"post {name}", words={"action": name})
 
 
 def _run(options: argparse.Namespace) -> "RunFolder":
