@@ -75,7 +75,8 @@ def published(count: int, dt: float, out: Path) -> dict[str, float]:
                 run.save(out / f"history_a2_{viscosity:g}.csv")
     labels = {f"a2 = {viscosity:g} s": run for viscosity, run in drawn.items()}
     plot_beam_energies(labels, out / "fig_8_1_energy.png", title=f"Fig. 8.1: energy, reading {READING}")
-    plot_tips(labels, out / "fig_8_2_and_8_3_tip.png", title="Figs. 8.2, 8.3: motion of the tip")
+    for number, (label, run) in enumerate(labels.items(), start=2):
+        plot_tips({label: run}, out / f"fig_8_{number}_tip.png", title=f"Fig. 8.{number}: motion of the tip")
     for number, (viscosity, span) in enumerate(((a, span) for a in drawn for span in SPANS), start=4):
         title = f"Fig. 8.{number}: t = {span[0]:g} to {span[1]:g} s, a2 = {viscosity:g} s"
         plot_shapes(drawn[viscosity], out / f"fig_8_{number}_shapes.png", span=span, title=title)
