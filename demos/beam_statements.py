@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Ask every reading of the normal force of Ahn (2012) for both things that its text says of the results.
 
-Larger contact forces cause more oscillations of the tip, and friction takes little beside viscosity: no reading has both.
+Larger contact forces cause more oscillations of the tip, and friction takes little beside viscosity: no reading has
+both.
 
     bash demos/run.sh beam_statements              # the table of docs/theory/beam.md
     bash demos/run.sh beam_statements --json       # the same as JSON
@@ -33,7 +34,8 @@ def main(quick: bool = False, as_json: bool = False) -> list[Row]:
         return rows
     both = [f"{one.reading} at a2 = {one.a2:g} s" for one in rows if one.statement_1 and one.statement_2]
     print(HEAD, *[one.line() for one in rows], sep="\n")
-    print(f"\nStatement 2: friction below {NEGLIGIBLE:g} of viscosity. Both statements: {', '.join(both) or 'no reading'}.")
+    print(f"\nStatement 2: friction below {NEGLIGIBLE:g} of viscosity.")
+    print(f"Both statements: {', '.join(both) or 'no reading'}.")
     return rows
 
 

@@ -12,8 +12,6 @@ friction saturates, a tip that sticks chatters from step to step. Statement 2 is
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
-import numpy as np
-
 from demos.beam.algorithm import BeamRun, BeamStepper, run_beam
 from demos.beam.tip import RegularisedFriction
 from demos.beam.values import TimoshenkoBeam
@@ -73,8 +71,8 @@ class Row:
 
 
 HEAD = (
-    "| reading | a2 [s] | turning points, force x 0.01, 0.1, 1, 10 | swings above eps, same forces | peak contact force "
-    "[N] | friction loss [J] | viscous loss [J] | ratio | statement 1 | statement 2 |\n|" + "---|" * 10
+    "| reading | a2 [s] | turning points, force x 0.01, 0.1, 1, 10 | swings above eps, same forces | peak contact "
+    "force [N] | friction loss [J] | viscous loss [J] | ratio | statement 1 | statement 2 |\n|" + "---|" * 10
 )
 
 
@@ -99,7 +97,7 @@ def rubbed(a2: float, force: Force, factor: float = 1.0, *, count: int = 1000, d
 
 
 def row(reading: str, a2: float, *, count: int = 1000, dt: float = DT, factors: Sequence[float] = FACTORS) -> Row:
-    """Return the row of a reading "A", "B" or "C" at a viscosity a2 [s], of one run for each factor; 1 is one of them."""
+    """Return the row of a reading "A", "B" or "C" at a viscosity a2 [s], of a run for each factor; 1 is one of them."""
     runs = {factor: rubbed(a2, readings(dt)[reading], factor, count=count, dt=dt).history for factor in factors}
     tips, whole = [run["u_tip"] for run in runs.values()], runs[1.0]
     return Row(

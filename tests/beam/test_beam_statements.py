@@ -42,7 +42,7 @@ def test_the_table_is_what_the_runs_give(printed: dict[tuple[str, float], list[s
 
 
 def test_no_reading_has_both(printed: dict[tuple[str, float], list[str]]) -> None:
-    """The verdicts follow from the printed counts and losses; friction is far from negligible where statement 1 holds."""
+    """The verdicts follow from the printed counts and losses; friction is not negligible where statement 1 holds."""
     for (reading, a2), cells in printed.items():
         found = Row(reading, a2, counts(cells[2]), counts(cells[3]), *map(float, cells[4:7]))
         assert [str(found.statement_1).lower(), str(found.statement_2).lower()] == cells[8:]
