@@ -95,18 +95,19 @@ def _left_out(item: pytest.Item) -> bool:
 
 
 def _covering(items: list[pytest.Item]) -> set[pytest.Item]:
-    """Tests without parameters, and of every other function so many that each value of each parameter occurs, on three
-    ranks that each parameter varies: their combinations run on one rank, where a law, a scheme or a shape takes the
-    path that it takes on several."""
-    kept: set[pytest.Item] = set()
+    """Of every function, on two ranks so many tests that each value of each parameter occurs, on three, which seldom
+    have a core each, one: their combinations run on one rank, where a law, a scheme or a shape takes the path that it
+    takes on several."""
     functions: dict[str, list[pytest.Item]] = {}
-    for item in items if SIZE % 2 == 0 else reversed(items):  # other combinations on three ranks than on two
+    for item in items:
         functions.setdefault(item.nodeid.split("[")[0], []).append(item)
+    if SIZE > 2:  # the last: other values than two ranks begin with
+        return {ones[-1] for ones in functions.values()}
+    kept: set[pytest.Item] = set()
     for ones in functions.values():
         alike = set.intersection(*map(_parameters, ones)) if len(ones) > 1 else set()
         seen: set[tuple[str, int]] = set()
-        # those of new values only and, on two ranks, those of some new value
-        for new in (all, any) if SIZE == 2 else (all,):
+        for new in (all, any):  # those of new values only, then those of some new value
             for item in ones:
                 values = _parameters(item) - alike
                 if item not in kept and (not values or new(value not in seen for value in values)):
