@@ -96,7 +96,7 @@ class EmbeddedBox:
         in_notch = np.asarray(self.bodies.one.contact)
         sides = [in_notch & (mesh.labels == side) for side in (BOTTOM, LEFT, RIGHT)]
         rows = conditions_on(mesh, condensed, *sides)
-        return BoundaryContact(condensed, friction=friction or Frictionless(), conditions=rows)
+        return self.bodies.contact(friction, conditions=rows)
 
 
 def embedded_problem(

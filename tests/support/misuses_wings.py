@@ -40,6 +40,7 @@ MASK = RAGGED | {"text": "bottom", "numbers": [0, 1], "short": np.ones(3, bool),
 OTHER = but(NEEDED, "list")
 BODY = {"mesh": OTHER | {"corners": SQUARE}, "material": OTHER}
 STEPS = COUNT | {"none": None}
+JUMP = {"text": "up", "nan": np.full((2, 2, 3), nan), "short": np.zeros((2, 2, 2))}
 
 
 def function(wrong: dict[str, Any]) -> dict[str, Any]:
@@ -127,7 +128,8 @@ def contacts() -> Table:
         (bem.SpaceTimeUzawa, {}, {"tolerance": POSITIVE, "rho": but(POSITIVE, "none"), "max_iterations": COUNT,
                                   "window": COUNT}),
         (bem.SpaceTimeUzawa().solve, {"contact": contact}, {"contact": OTHER}),
-        (TwoBodies, {"one": problem, "two": problem}, {"one": NEEDED, "two": NEEDED, "welded": MASK}),
+        (TwoBodies, {"one": problem, "two": problem}, {
+            "one": NEEDED, "two": NEEDED, "welded": MASK, "jump": JUMP, "traction": JUMP}),
     ]
 
 
