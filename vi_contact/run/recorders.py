@@ -4,9 +4,11 @@ Rows hold numbers (one column of ``history.csv`` each), equal on every rank, or 
 Displacements and velocities are those of the equations: relative to the ground when an excitation shakes the body.
 """
 
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -18,6 +20,14 @@ from ..core.problem import ContactProblem
 from ..core.step import AXES, Columns, Report, Row, State
 from ..core.verify import Energies, energies, energy_balance
 from .files.table import WORDS
+
+_COLUMNS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+
+
+def _named(words: Mapping[str, Sequence[str]], axes: str) -> Columns:
+    """Columns of a table of recorders.toml, for these axes."""
+    return {name.format(axis=one): (unit, meaning.format(axis=one)) for name, (unit, meaning) in words.items()
+            for one in (axes if "{axis}" in name else "-")}
 
 
 def refuse_overflow(row: Row) -> None:
@@ -37,13 +47,7 @@ class Steps:
 
     def columns(self) -> Columns:
         """Name t, k, iterations, certificate, escalated, a_g_x, …"""
-        return {
-            "t": ("s", "time at the end of the step"),
-            "k": ("-", "number of the step"),
-            "iterations": ("-", "iterations of the solver in this step"),
-            "certificate": ("-", "worst dimensionless residual of the inequality problem of this step"),
-            "escalated": ("-", "1 when the step needed another solver than the first, else 0"),
-        } | {f"a_g_{axis}": ("m/s²", f"ground acceleration along {axis} at time t") for axis in self._axes}
+        return _named(_COLUMNS["steps"], self._axes)
 
     def _row(self, state: State, iterations: int = 0, certificate: float = 0.0, escalated: bool = False) -> Row:
         ground = self._problem.ground_acceleration(state.t).tolist()
@@ -130,25 +134,7 @@ class Contact:
 
     def columns(self) -> Columns:
         """Name contact_uplift, contact_resultant, … and the arrays pressure, gap, active. Call ``start`` first."""
-        axes = self._axes
-        force = {f"contact_force_{a}": ("N", f"contact force on the body along {a}, -Σ r_n n_{a}") for a in axes}
-        place = {f"contact_{a}": ("m", f"{a} of the point of action, Σ r_n {a} / Σ r_n; nan while open") for a in axes}
-        friction = {f"friction_force_{a}": ("N", f"friction force on the body along {a}") for a in axes} | {
-            "contact_max_slip": ("m", "largest tangential displacement on the support; nan without contact points"),
-            "traction_t": ("Pa", "tangential reaction r_t / weight of every contact point, in its nodal tangents"),
-            "slip": ("m", "tangential displacement of every contact point, in its nodal tangents"),
-        }
-        every = {
-            "contact_uplift": ("-", "uplift ratio: share of the contact surface, by weight, that is open"),
-            "contact_active": ("-", "number of closed contact points"),
-            "contact_resultant": ("N", "sum of the normal reactions Σ r_n"),
-            **force, **place,
-            "contact_min_gap": ("m", "smallest gap; nan without contact points"),
-            "contact_max_pressure": ("Pa", "largest contact pressure; nan without contact points"),
-            "pressure": ("Pa", "contact pressure r_n / weight of every contact point"),
-            "gap": ("m", "gap of every contact point"),
-            "active": ("-", "whether the contact point is closed"),
-        } | (friction if self._frictional else {})
+        every = _named(_COLUMNS["contact"] | (_COLUMNS["friction"] if self._frictional else {}), self._axes)
         return {name: about for name, about in every.items() if self.arrays or name not in self._ARRAYS}
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
