@@ -105,7 +105,6 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "solvers/test_volume_system.py": "solvers.volume.bounded_system solvers.volume.scaled_step",
     "studies/test_case.py":
         "cli.case studies.cases.parsing studies.cases.toml_file studies.cases.vocabulary",
-    "studies/test_case_checks.py": "studies.cases.checks",
     "studies/test_case_inputs.py": "studies.cases.table_calls",
     "studies/test_description.py": "fem.output.outline plots.sketch",
     "studies/test_case_stages.py": "studies.cases.stage_tables studies.cases.stages",

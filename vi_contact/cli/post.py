@@ -81,7 +81,7 @@ def _loop(options: argparse.Namespace) -> str:
 
 
 def _checks(options: argparse.Namespace) -> str:
-    from ..studies.cases.checks import comparisons
+    from ..studies.report import comparisons
 
     found, table = comparisons(options.folder), _table_path(options)
     if not found:

@@ -7,9 +7,9 @@ from ..core.lazy import lazy
 
 _CONTENTS = {
     "bodies": ("draw_run", "film", "plot_deformed"),
+    "charts": ("plot_overview",),
     "deformed": ("read_frames",),
     "faces": ("plot_faces",),
-    "overview": ("plot_overview",),
     "records": ("plot_loop", "plot_motion", "plot_spectra", "plot_transfer"),
     "studies": ("plot_ida",),
 }

@@ -3,9 +3,9 @@
 from .bodies import draw_run as draw_run
 from .bodies import film as film
 from .bodies import plot_deformed as plot_deformed
+from .charts import plot_overview as plot_overview
 from .deformed import read_frames as read_frames
 from .faces import plot_faces as plot_faces
-from .overview import plot_overview as plot_overview
 from .records import plot_loop as plot_loop
 from .records import plot_motion as plot_motion
 from .records import plot_spectra as plot_spectra

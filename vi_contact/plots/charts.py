@@ -13,13 +13,14 @@ from ..engineering.floor_spectra import recorded_motion
 from ..ground_motion.processing import filtered
 from ..ground_motion.record import Record
 from ..ground_motion.spectra import response_spectrum
-from .histories import LEDGER, plain_numbers, scaled, shaken
+from .histories import LEDGER, panels, plain_numbers, scaled, shaken
 from .records import SAMPLES_A_PERIOD
 
 NOTHING = 1e-6  # of the largest energy: terms below it are not drawn; of the size of a column: that is constant
 FIRST_PERIOD = 0.02  # s, of a spectrum: 50 Hz, beyond which engineers ask for nothing
 LOW_PASS = 25.0  # Hz, CHOSEN: where records are filtered as a rule; lower where a period would have under five steps
 STEPS_A_PERIOD = 5
+CURVES = 8  # of probes in an overview: beyond, nobody tells them apart
 Run = Any  # a Solution, or a RunFolder, which needs h5py
 
 
@@ -136,9 +137,8 @@ def smoothed(run: Run, name: str) -> tuple[Record, Record, float]:
     return raw, filtered(raw, high=corner), corner
 
 
-def acceleration_chart(run: Run, name: str) -> Chart:
-    """Return an absolute acceleration low-passed and, pale, raw."""
-    raw, smooth, corner = smoothed(run, name)
+def acceleration_chart(run: Run, name: str, raw: Record, smooth: Record, corner: float) -> Chart:
+    """Return an absolute acceleration low-passed and, pale, raw, as ``smoothed`` gives them."""
     values, unit = scaled(np.array([smooth.acceleration, raw.acceleration]), "m/s²")
     t = run.history["t"][0] + raw.times
     lines = Line(f"below {corner:.3g} Hz", t, values[0]), Line("raw", t, values[1], pale=True)
@@ -194,3 +194,17 @@ def draw_chart(axis: Any, chart: Chart) -> None:
     if not chart.log_x:
         axis.margins(x=0.0)
     axis.set(xlabel=chart.x, ylabel=chart.y)
+
+
+def plot_overview(run: Run) -> Any:
+    """Return a matplotlib Figure of a Solution or RunFolder: the displacements of probes (the first 8), the contact
+    force, the energy ledger, each where it was recorded, and the certificate of every step."""
+    probes = [name for name in run.history if name.startswith("u_")][:CURVES]
+    charts = [of_columns(run, probes, "displacement")] if probes else []
+    charts += [of_columns(run, ["contact_resultant"], "contact force")] if "contact_resultant" in run.history else []
+    charts += [*filter(None, [energy_chart(run)]), certificate_chart(run)]
+    figure, axes = panels(len(charts), (9.0, 2.0 * len(charts)))
+    for axis, chart in zip(axes, charts, strict=True):
+        draw_chart(axis, chart)
+        axis.set_xlabel(chart.x if axis is axes[-1] else "")
+    return figure

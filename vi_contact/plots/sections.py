@@ -137,14 +137,14 @@ def _safety(run: RunFolder) -> Iterable[list[str]]:
 def _accelerations(run: RunFolder) -> Section:
     """Accelerations of probes, low-passed beside raw."""
     names = [name for axis in "xyz" for name in charts.varying(run, f"a_{axis}_")] if len(run.history["t"]) > 20 else []
-    title, rows, corner = "Accelerations, low-passed and raw", [], 0.0
-    for name in names:
-        raw, smooth, corner = charts.smoothed(run, name)
+    title, rows, found = "Accelerations, low-passed and raw", [], {name: charts.smoothed(run, name) for name in names}
+    corner = max((corner for _, _, corner in found.values()), default=0.0)  # the same for all: they have the run's step
+    for name, (raw, smooth, _) in found.items():
         low, high = (float(np.max(np.abs(one.acceleration))) for one in (smooth, raw))
         rows.append([name, *map(number, (low, low / STANDARD_GRAVITY, high, high / STANDARD_GRAVITY))])
     said, below = SAY["accelerations"].format(corner=corner), f"peak below {corner:.3g} Hz [m/s²]"
     table = Table(("column", below, "[g]", "raw peak, not convergent at impacts [m/s²]", "[g]"), rows, sortable=True)
-    shown = [charts.acceleration_chart(run, name) for name in names[:2]]
+    shown = [charts.acceleration_chart(run, name, *found[name]) for name in names[:2]]
     return Section(title, [said], [table], shown) if rows else Section(title)
 
 

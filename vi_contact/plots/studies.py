@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core.algebra import Array
 from ..core.units import STANDARD_GRAVITY
-from .histories import canvas, plain, scale
+from .histories import canvas, plain, save, scale
 
 _FRACTILES = (("16 %", "tab:blue", "--"), ("50 %", "black", "-"), ("84 %", "tab:red", "--"))
 
@@ -40,8 +40,7 @@ def plot_ida(demands: Sequence[DemandPanel], path: str | Path, *, intensity: str
     figure.suptitle(" ", fontsize=20)  # keeps room for the legend, which the layout of matplotlib 3.6 does not
     columns = min(len(labels), 3 * len(demands))
     figure.legend(handles, labels, loc="upper center", ncol=columns, fontsize=8, frameon=False)
-    figure.savefig(path, dpi=130)
-    return Path(path)
+    return save(figure, path)
 
 
 def plot_fragility(
@@ -63,8 +62,7 @@ def plot_fragility(
     axis.set(xlabel=f"{intensity} [{unit}]", ylabel="probability that the limit is passed [-]", ylim=(0.0, 1.0),
              xlim=(0.0, factor * x[-1]), title="Fit, its 95 % band, and where each record first passes")
     axis.legend(fontsize=8, frameon=False, loc="lower right")
-    figure.savefig(path, dpi=130)
-    return Path(path)
+    return save(figure, path)
 
 
 def _in_g(unit: str) -> tuple[float, str]:

@@ -7,6 +7,8 @@ from typing import Any
 
 from ..core.errors import InputError
 from ..core.version import __version__
+from ..engineering import checks
+from ..engineering.checks.comparison import Check, Comparison
 from ..engineering.peak_values import peaks, write_peaks
 from ..plots.bodies import draw_run
 from ..plots.pages import write_pages
@@ -15,8 +17,9 @@ from ..plots.sketch import sketch
 from ..plots.web_page import can_write, write_web_page
 from ..run.files.folder import MODEL
 from ..run.files.reading import read_object, read_run
-from .cases.checks import comparisons
-from .cases.library import read_copy, refuse_retired
+from .cases.library import COPY, read_copy, refuse_retired
+from .cases.parsing import Words, read
+from .cases.table_calls import Spot, build, callee
 from .refinement import refinement
 
 WRITERS = {".html": write_web_page, ".pdf": write_pages}
@@ -63,6 +66,17 @@ def _model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Path]]:
         return model, [picture]
     except (OSError, KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise InputError(f"'{folder / MODEL}' is damaged ({str(error)[:200]}): restore it, or delete it") from error
+
+
+def comparisons(folder: str | Path) -> tuple[Comparison, ...]:
+    """Return the comparisons of a run folder, one for each [[check]] of the case it keeps; InputError without a run."""
+    folder = Path(folder)
+    table = read_copy(folder).get("check", [])
+    words = Words(folder, {Check: {name: callee(getattr(checks, name)) for name in checks.__all__}}, {}, (), {})
+    made = build(read(table, Check | Sequence[Check], Spot(str(folder / COPY), "", "check"), words), {})
+    each = made if isinstance(made, tuple) else (made,)
+    history = read_run(folder).history if each else {}
+    return tuple(one.compare(history) for one in each)
 
 
 def _checks(folder: Path) -> Section:
