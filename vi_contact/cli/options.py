@@ -19,9 +19,8 @@ PICTURES = (".png", ".pdf", ".svg")
 _NONE: Mapping[str, Any] = {}
 
 
-def add_command(
-    commands: Any, name: str, run: Callable[[argparse.Namespace], str], *parts: str, words: Mapping[str, Any] = _NONE
-) -> argparse.ArgumentParser:
+def add_command(commands: Any, name: str, run: Callable[[argparse.Namespace], str], *parts: str,
+                words: Mapping[str, Any] = _NONE) -> argparse.ArgumentParser:
     """Add a command, or an action of one such as "motion info", with these parts of options.toml; return its parser.
 
     run: what it calls. words: what the texts there, and the names of types, are looked up in.

@@ -59,9 +59,8 @@ def recorded_motion(history: Mapping[str, Array], column: str, *, relative: bool
     return Record(values, dt, title=f"{column}, {frame}", source=column, notes=(f"{frame} acceleration of a run",))
 
 
-def floor_spectrum(
-    history: Mapping[str, Array], column: str, periods: Array, *, damping: float = 0.05, relative: bool = False
-) -> ResponseSpectrum:
+def floor_spectrum(history: Mapping[str, Array], column: str, periods: Array, *, damping: float = 0.05,
+                   relative: bool = False) -> ResponseSpectrum:
     """Return the response spectrum of an oscillator of each period [s] standing where the column was recorded."""
     return response_spectrum(recorded_motion(history, column, relative=relative), periods, damping=damping)
 
@@ -80,10 +79,9 @@ class TransferFunction:
         return float(self.frequencies[k]), float(self.amplitude[k])
 
 
-def transfer_function(
-    history: Mapping[str, Array], surface: str, base: str = "a_g_x", *, frequencies: Array | None = None,
-    bandwidth: float | None = BANDWIDTH, floor: float = 1e-3,
-) -> TransferFunction:
+def transfer_function(history: Mapping[str, Array], surface: str, base: str = "a_g_x", *,
+                      frequencies: Array | None = None, bandwidth: float | None = BANDWIDTH,
+                      floor: float = 1e-3) -> TransferFunction:
     """Return |A_surface(f)| / |A_base(f)| of absolute accelerations, from the Fourier amplitudes of two columns.
 
     Amplitudes are smoothed alike with Konno and Ohmachi's window (1998), which widens peaks, before they are divided;

@@ -61,10 +61,8 @@ class Part:
     ``slots``: the numbers of the conditions whose share in it is held; those of one rank, all when None.
     """
 
-    def __init__(
-        self, name: str, geometry: Geometry, centre: Sequence[float] | None, where: Where | None,
-        normal: Sequence[float] | None, slots: Indices | None = None,
-    ) -> None:
+    def __init__(self, name: str, geometry: Geometry, centre: Sequence[float] | None, where: Where | None,
+                 normal: Sequence[float] | None, slots: Indices | None = None) -> None:
         check_part(name, centre, where, normal)
         points, normals = geometry.points, geometry.normals
         given = np.ones(len(points), dtype=bool) if where is None else where(points, normals)
@@ -267,10 +265,8 @@ class Resultants:
         return {f"{quantity}_{self.name}": value for quantity, value in found.items()}
 
 
-def contact_summary(
-    history: Mapping[str, Array], geometry: Geometry, *, centre: Sequence[float], name: str = "contact",
-    where: Where | None = None, normal: Sequence[float] | None = None,
-) -> dict[str, Array]:
+def contact_summary(history: Mapping[str, Array], geometry: Geometry, *, centre: Sequence[float], name: str = "contact",
+                    where: Where | None = None, normal: Sequence[float] | None = None) -> dict[str, Array]:
     """Return the resultants of a run that recorded ``Contact()``: quantity -> (rows,), without theta and settlement.
 
     ``geometry``: the surface of the problem (then collective), or ``read_run(folder).contact``. Slip and friction count

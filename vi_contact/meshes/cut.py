@@ -44,9 +44,8 @@ class Welded:
         add_arrays(gmsh, welded(arrays_of(self.source), self.first, self.second))
 
 
-def cut_open(
-    arrays: MeshArrays, group: str, *, inside: str | None = None, towards: Sequence[float] | None = None
-) -> MeshArrays:
+def cut_open(arrays: MeshArrays, group: str, *, inside: str | None = None,
+             towards: Sequence[float] | None = None) -> MeshArrays:
     """Double the nodes along an inner boundary; its two sides become the groups "<group>_1", "<group>_2".
 
     Side 1 is that of the cell group `inside`, or the one from which the vector `towards` leads across the boundary:
@@ -119,9 +118,8 @@ def _group(arrays: MeshArrays, name: str) -> Rows:
     return arrays.facet_groups[name]
 
 
-def _on_first_side(
-    arrays: MeshArrays, group: str, one: Rows, other: Rows, inside: str | None, towards: Sequence[float] | None
-) -> Mask:
+def _on_first_side(arrays: MeshArrays, group: str, one: Rows, other: Rows, inside: str | None,
+                   towards: Sequence[float] | None) -> Mask:
     """Tell for every cut facet whether the first of its two cells is on side 1."""
     if inside is not None:
         if inside not in arrays.cell_groups:

@@ -71,10 +71,8 @@ def add_grids(gmsh: Any, grids: Sequence[Grid]) -> None:
         first += n
 
 
-def add_outline(
-    model: Any, name: str, outline: Sequence[tuple[float, float]], names: Sequence[str], sizes: Sequence[float],
-    cells: Sequence[int] = (),
-) -> int:
+def add_outline(model: Any, name: str, outline: Sequence[tuple[float, float]], names: Sequence[str],
+                sizes: Sequence[float], cells: Sequence[int] = ()) -> int:
     """Add a surface within an outline, its curves in the groups ``names``; return its tag, to be meshed irregularly.
 
     ``sizes``: of the cells at the corners [m]; ``cells``: exact numbers of them on the first curves.

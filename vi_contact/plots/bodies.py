@@ -120,10 +120,8 @@ def _round_down(factor: float) -> float:
     return float(max([1.0, *(step * power for step in (1.0, 2.0, 5.0) if step * power <= factor)]))
 
 
-def plot_deformed(
-    run: RunFolder, path: str | Path, *, times: Sequence[float] | None = None, magnified: float | None = None,
-    title: str = "Deformed bodies",
-) -> Path:
+def plot_deformed(run: RunFolder, path: str | Path, *, times: Sequence[float] | None = None,
+                  magnified: float | None = None, title: str = "Deformed bodies") -> Path:
     """Draw the bodies of a run with fields, in plane or space, in the frames next to ``times`` [s] (None: the first,
     the last, and when most happens), coloured by von Mises stress, the edges of elements by body; in the plane dots
     show the contact pressure, and below which points are open, stick and slip. In space y points upwards where contact
@@ -153,10 +151,8 @@ def _headed(title: str, scene: Scene) -> str:
     return "\n".join(wrap(plain(title) + told, 64))
 
 
-def film(
-    run: RunFolder, path: str | Path, *, times: Sequence[float] | None = None, magnified: float | None = None,
-    column: str | None = None, title: str = "", fps: int = 10,
-) -> Path:
+def film(run: RunFolder, path: str | Path, *, times: Sequence[float] | None = None, magnified: float | None = None,
+         column: str | None = None, title: str = "", fps: int = 10) -> Path:
     """Write a GIF or, by ffmpeg, an MP4 of the frames next to ``times`` [s] (None: up to 48 around that in which most
     happens): the bodies as ``plot_deformed`` draws them, in space beside them the pressure on each contact face, and
     below a ``column`` of the history with the moment marked, and dashed the acceleration of the ground.
@@ -229,10 +225,8 @@ def _trace(axis: Any, run: RunFolder, column: str, times: Array) -> Any:
     return axis.axvline(times[0], color="tab:red", lw=1.2)
 
 
-def draw_run(
-    run: RunFolder, out: str | Path, *, title: str, times: Sequence[float] | None = None,
-    magnified: float | None = None,
-) -> list[Path]:
+def draw_run(run: RunFolder, out: str | Path, *, title: str, times: Sequence[float] | None = None,
+             magnified: float | None = None) -> list[Path]:
     """Draw into the folder ``out`` what a run has data for: with fields deformed.png, the bodies and their contact, and
     in space with ``Contact()`` faces.png, next to the ``times`` [s] (None: the first, the last, and when most happens).
 

@@ -152,9 +152,8 @@ def add_polygons(axis: Any, polygons: Array, **look: Any) -> Any:
     return axis.add_collection(PolyCollection(polygons, **look))
 
 
-def limit(
-    axis: Any, low: Array, high: Array, names: Sequence[str] = AXES, *, margin: float = 0.0, up: str = "z"
-) -> None:
+def limit(axis: Any, low: Array, high: Array, names: Sequence[str] = AXES, *, margin: float = 0.0,
+          up: str = "z") -> None:
     """Set limits (d,) [m], one scale along all axes, and their names; ``margin``: part of the largest size; ``up``: the
     axis that points upwards in projection."""
     room = margin * (float((high - low).max()) or 1.0)
@@ -184,9 +183,8 @@ def moments(history: History) -> list[float]:
     return history["t"][[0, leading(history)[1], -1]].tolist()
 
 
-def plot_faces(
-    run: RunFolder, path: str | Path, *, times: Sequence[float] | None = None, title: str = "Contact faces"
-) -> Path:
+def plot_faces(run: RunFolder, path: str | Path, *, times: Sequence[float] | None = None,
+               title: str = "Contact faces") -> Path:
     """Draw the contact faces of a run in space, a column for each of ``times`` [s] (None: see ``moments``), for every
     face a row with its pressure and one with its open, sticking and slipping points and the slip of the body.
 

@@ -62,9 +62,8 @@ def thinned(t: Array, values: Array, rows: int = ROWS) -> tuple[Array, Array]:
     return t[starts], np.where(high >= -low, high, low)
 
 
-def draw_map(
-    axis: Any, t: Array, position: Array, values: Array, unit: str, *, title: str, axis_label: str, colours: str
-) -> None:
+def draw_map(axis: Any, t: Array, position: Array, values: Array, unit: str, *, title: str, axis_label: str,
+             colours: str) -> None:
     """Draw values (rows, m) as colours, zero white; points at the same place (corners) side by side in their order."""
     image, prefixed, _ = coloured(axis, t, position, values, unit, colours)
     axis.figure.colorbar(image, ax=axis, pad=0.02, fraction=0.06)

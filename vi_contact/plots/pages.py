@@ -94,9 +94,8 @@ class _Pages:
         self.y += high + 0.15
 
 
-def write_pages(
-    path: Path, title: str, facts: Sequence[tuple[str, str]], sections: Sequence[Section], foot: str
-) -> Path:
+def write_pages(path: Path, title: str, facts: Sequence[tuple[str, str]], sections: Sequence[Section],
+                foot: str) -> Path:
     """Write a PDF: the title, (name, value) of facts, the sections, and a line at the foot of every page."""
     import matplotlib
     from matplotlib.backends.backend_pdf import PdfPages

@@ -39,10 +39,8 @@ def plot_motion(record: Record, path: str | Path, *, title: str | None = None, u
     return save(figure, path)
 
 
-def plot_spectra(
-    spectra: Mapping[str, ResponseSpectrum], path: str | Path, *, target: EC8Spectrum | None = None,
-    steps: Mapping[str, float] | None = None, title: str = "Response spectra", units: str = "g",
-) -> Path:
+def plot_spectra(spectra: Mapping[str, ResponseSpectrum], path: str | Path, *, target: EC8Spectrum | None = None,
+                 steps: Mapping[str, float] | None = None, title: str = "Response spectra", units: str = "g") -> Path:
     """Draw pseudo-acceleration in `units` and displacement over the period, one line for each label, the target dashed.
 
     steps: time step [s] of the record behind each label; below ten of them its line is pale.
@@ -76,9 +74,8 @@ def plot_spectra(
     return save(figure, path)
 
 
-def plot_loop(
-    loop: Loop, path: str | Path, *, x: tuple[str, str], y: tuple[str, str], title: str | None = None
-) -> Path:
+def plot_loop(loop: Loop, path: str | Path, *, x: tuple[str, str], y: tuple[str, str],
+              title: str | None = None) -> Path:
     """Draw force over deformation; ``x``, ``y``: (name, SI unit) of the two. The title says the work at the end."""
     figure, ((axis,),) = canvas(1, 1, (6.4, 4.8))
     across, x_unit = scaled(loop.deformation, x[1])

@@ -47,9 +47,8 @@ class Section:
     pictures: Sequence[Path] = ()
 
 
-def sections_of(
-    run: RunFolder, model: Mapping[str, Any], columns: Sequence[Sequence[str]] | None = None
-) -> list[Section]:
+def sections_of(run: RunFolder, model: Mapping[str, Any],
+                columns: Sequence[Sequence[str]] | None = None) -> list[Section]:
     """Return the sections that a run has data for; ``model``: model.json, empty where there is none; ``columns``:
     groups of columns for the histories, in place of those that move."""
     if len(run.history["t"]) < 2:

@@ -43,9 +43,8 @@ def plot_ida(demands: Sequence[DemandPanel], path: str | Path, *, intensity: str
     return save(figure, path)
 
 
-def plot_fragility(
-    curves: Mapping[str, tuple[Callable[[Array], Array], Array]], path: str | Path, *, intensity: str, unit: str
-) -> Path:
+def plot_fragility(curves: Mapping[str, tuple[Callable[[Array], Array], Array]], path: str | Path, *, intensity: str,
+                   unit: str) -> Path:
     """Draw the probability that each limit is passed, (3, n) lower bound, curve, upper bound at intensities (n,), and
     the brackets (records, 2) that it is fitted to, one above the other."""
     figure, ((axis,),) = canvas(1, 1, (6.4, 4.4))

@@ -35,9 +35,8 @@ def can_write() -> bool:
     return all(find_spec(name) is not None for name in ("jinja2", "plotly"))
 
 
-def write_web_page(
-    path: Path, title: str, facts: Sequence[tuple[str, str]], sections: Sequence[Section], foot: str
-) -> Path:
+def write_web_page(path: Path, title: str, facts: Sequence[tuple[str, str]], sections: Sequence[Section],
+                   foot: str) -> Path:
     """Write a page: the title, (name, value) of facts, the sections with curves to zoom and tables to sort, a foot.
 
     Histories are thinned; largest and smallest values stay. InputError without jinja2 or plotly.

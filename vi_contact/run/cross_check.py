@@ -120,10 +120,8 @@ class PreparedCrossCheck:
         found.steps += 1
 
 
-def cross_check(
-    problem: ContactProblem, *, scheme: Scheme | None = None, solvers: Sequence[Solver], dt: TimeSteps, steps: int,
-    state: State | None = None,
-) -> CrossChecked:
+def cross_check(problem: ContactProblem, *, scheme: Scheme | None = None, solvers: Sequence[Solver], dt: TimeSteps,
+                steps: int, state: State | None = None) -> CrossChecked:
     """March with the first solver and compare the others with it at every step; see ``worst`` and ``report()``.
 
     ``dt`` and ``steps`` as in ``march``: ``steps`` counts base steps, the statistics all accepted ones.

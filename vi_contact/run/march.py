@@ -16,11 +16,9 @@ from .method import Method, checked_method
 from .time_steps import StepPlan, TimeSteps, step_plan
 
 
-def march(
-    problem: ContactProblem, *, scheme: Scheme | None = None, solver: Solver | None = None, dt: TimeSteps,
-    steps: int | None = None, t_end: float | None = None, state: State | None = None, escalation: Sequence[Solver] = (),
-    tolerance: float = TOLERANCE,
-) -> Iterator[tuple[State, Report]]:
+def march(problem: ContactProblem, *, scheme: Scheme | None = None, solver: Solver | None = None, dt: TimeSteps,
+          steps: int | None = None, t_end: float | None = None, state: State | None = None,
+          escalation: Sequence[Solver] = (), tolerance: float = TOLERANCE) -> Iterator[tuple[State, Report]]:
     """Yield (state, report) after every certified step.
 
     ``scheme`` None, and the mass matrix of a problem that does not name one: see ``run.method.with_defaults``, whose

@@ -14,11 +14,10 @@ from .time_steps import TimeSteps, step_plan
 from .together import Together, grouped
 
 
-def march_many(
-    problems: Sequence[ContactProblem], *, scheme: Scheme | None = None, solver: Solver | None = None, dt: TimeSteps,
-    steps: int | Sequence[int] | None = None, t_end: float | Sequence[float] | None = None,
-    states: Sequence[State | None] | None = None, escalation: Sequence[Solver] = (), tolerance: float = TOLERANCE,
-) -> Iterator[tuple[int, Report | ViContactError]]:
+def march_many(problems: Sequence[ContactProblem], *, scheme: Scheme | None = None, solver: Solver | None = None,
+               dt: TimeSteps, steps: int | Sequence[int] | None = None, t_end: float | Sequence[float] | None = None,
+               states: Sequence[State | None] | None = None, escalation: Sequence[Solver] = (),
+               tolerance: float = TOLERANCE) -> Iterator[tuple[int, Report | ViContactError]]:
     """Yield (number of the run, report) after every certified step, a step of each run in turn.
 
     A run that fails yields its error, last; the others go on. ``steps`` or ``t_end``: one for all, or one for each run,

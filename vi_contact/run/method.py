@@ -38,10 +38,9 @@ class Method:
             companion.bind(self.scheme, self.dt)
 
 
-def checked_method(
-    owner: str, problem: ContactProblem, scheme: Scheme | None, solvers: tuple[Solver | None, Sequence[Solver]],
-    dt: TimeSteps, *, steps: int | None, t_end: float | None, state: State | None, tolerance: float,
-) -> Method:
+def checked_method(owner: str, problem: ContactProblem, scheme: Scheme | None,
+                   solvers: tuple[Solver | None, Sequence[Solver]], dt: TimeSteps, *, steps: int | None,
+                   t_end: float | None, state: State | None, tolerance: float) -> Method:
     """Return the method with its defaults; ``solvers``: the first one, None for Automatic(), and the escalation.
 
     InputError for arguments of the wrong kind, and a state of another problem or inside the obstacle. Collective.
@@ -59,9 +58,8 @@ def checked_method(
     return method
 
 
-def with_defaults(
-    problem: ContactProblem, scheme: Scheme | None, others: Sequence[ContactProblem] = ()
-) -> tuple[ContactProblem, Scheme]:
+def with_defaults(problem: ContactProblem, scheme: Scheme | None,
+                  others: Sequence[ContactProblem] = ()) -> tuple[ContactProblem, Scheme]:
     """Return the problem with a mass matrix and the scheme to run it with.
 
     Without a scheme: the trapezoidal rule on redistributed mass; with an impact law, or with mass at the contact nodes

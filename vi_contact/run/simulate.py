@@ -29,15 +29,13 @@ from .wall_time import WallTime
 __all__ = ["Solution", "simulate"]
 
 
-def simulate(
-    problem: ContactProblem, *, scheme: Scheme | None = None, solver: Solver | None = None, dt: TimeSteps,
-    t_end: float | None = None, steps: int | None = None, record: Sequence[Recorder] | None = None,
-    out: str | Path | None = None, state: State | None = None, escalation: Sequence[Solver] = (),
-    tolerance: float = TOLERANCE, checkpoint_every: int = 100, restart: bool | str | Path = False,
-    changed: bool = False, progress: bool = True, fields: FieldWriter | None = None,
-    cross_check: Comparison | None = None, wall_time: str | None = None,
-    callback: Callable[[State, Report], Any] | None = None,
-) -> Solution:
+def simulate(problem: ContactProblem, *, scheme: Scheme | None = None, solver: Solver | None = None, dt: TimeSteps,
+             t_end: float | None = None, steps: int | None = None, record: Sequence[Recorder] | None = None,
+             out: str | Path | None = None, state: State | None = None, escalation: Sequence[Solver] = (),
+             tolerance: float = TOLERANCE, checkpoint_every: int = 100, restart: bool | str | Path = False,
+             changed: bool = False, progress: bool = True, fields: FieldWriter | None = None,
+             cross_check: Comparison | None = None, wall_time: str | None = None,
+             callback: Callable[[State, Report], Any] | None = None) -> Solution:
     """March to t_end, or for so many steps, and records. Collective; every rank gets the solution.
 
     Args:
@@ -74,13 +72,12 @@ def simulate(
 
 
 @contextmanager
-def opened(
-    problem: ContactProblem, scheme: Scheme | None, solver: Solver | None, dt: TimeSteps, t_end: float | None,
-    steps: int | None, record: Sequence[Recorder] | None, out: str | Path | None, state: State | None,
-    escalation: Sequence[Solver], tolerance: float, checkpoint_every: int, restart: bool | str | Path, changed: bool,
-    progress: bool, fields: FieldWriter | None, cross_check: Comparison | None, wall_time: str | None,
-    callback: Callable[[State, Report], Any] | None, others: Sequence[ContactProblem] = (), runs: int = 1,
-) -> Iterator[tuple[Session, Writer]]:
+def opened(problem: ContactProblem, scheme: Scheme | None, solver: Solver | None, dt: TimeSteps, t_end: float | None,
+           steps: int | None, record: Sequence[Recorder] | None, out: str | Path | None, state: State | None,
+           escalation: Sequence[Solver], tolerance: float, checkpoint_every: int, restart: bool | str | Path,
+           changed: bool, progress: bool, fields: FieldWriter | None, cross_check: Comparison | None,
+           wall_time: str | None, callback: Callable[[State, Report], Any] | None,
+           others: Sequence[ContactProblem] = (), runs: int = 1) -> Iterator[tuple[Session, Writer]]:
     """Check the arguments of ``simulate`` and set a run up, in its locked folder. ``others``: problems that lend their
     matrices and factors to it, if they are its own. ``runs``: how many take turns. Collective."""
     _check_outputs(record, out, restart, checkpoint_every, (progress, changed), fields, cross_check)
@@ -111,9 +108,8 @@ def opened(
         yield session, Writer(problem, folder, fields, table, stored)
 
 
-def _check_outputs(
-    record: Any, out: Any, restart: Any, checkpoint_every: Any, flags: tuple[Any, Any], fields: Any, cross_check: Any
-) -> None:
+def _check_outputs(record: Any, out: Any, restart: Any, checkpoint_every: Any, flags: tuple[Any, Any], fields: Any,
+                   cross_check: Any) -> None:
     """InputError for what is no recorder, folder, number of steps, writer of fields or cross-check."""
     owner = "simulate"
     for one in () if record is None else several(owner, "record", record, "give a list of recorders, or None"):
@@ -142,9 +138,8 @@ def _source(restart: bool | str | Path, folder: Path | None) -> Path | None:
     return path.parent if path.suffix == ".npz" else path
 
 
-def _started(
-    problem: ContactProblem, recorders: Sequence[Recorder], state: State, resumed: Mapping[str, Any] | None = None
-) -> tuple[Columns, Row]:
+def _started(problem: ContactProblem, recorders: Sequence[Recorder], state: State,
+             resumed: Mapping[str, Any] | None = None) -> tuple[Columns, Row]:
     """Start the recorders: their columns, and the row of the state. InputError when two record the same column."""
     row: dict[str, Any] = {}
     columns: dict[str, tuple[str, str]] = {}

@@ -20,9 +20,8 @@ from .together import Together, grouped
 Ended = tuple[int, Solution | ViContactError]
 
 
-def simulate_many(
-    runs: Sequence[Mapping[str, Any]], *, tell: Callable[[float], None] = lambda share: None
-) -> Iterator[Ended]:
+def simulate_many(runs: Sequence[Mapping[str, Any]], *,
+                  tell: Callable[[float], None] = lambda share: None) -> Iterator[Ended]:
     """Yield (number of the run, its solution) as the runs end; each is given by the arguments of ``simulate``.
 
     A run that fails yields its error instead, and the others go on; what cannot begin is told before the first step.

@@ -42,9 +42,7 @@ class Solution:
     problem: ContactProblem
     folder: Path | None = None
 
-    def function(
-        self, name: str, *, t: float | None = None, frame: int | None = None, continuous: bool = False
-    ) -> Any:
+    def function(self, name: str, *, t: float | None = None, frame: int | None = None, continuous: bool = False) -> Any:
         """Return "u", "v", "stress" or "contact_pressure" as a DOLFINx Function, ``fem.as_function`` of the end state.
 
         With ``t`` [s] or ``frame`` that of a frame in the run folder, ``fem.read_function``. Collective.

@@ -30,9 +30,8 @@ from .proximal import Proximal
 ADVICE = "try another solver, or smaller load steps, and check the data"
 
 
-def static_equilibrium(
-    problem: ContactProblem, *, solver: Solver | None = None, t: float = 0.0, tolerance: float = TOLERANCE
-) -> State:
+def static_equilibrium(problem: ContactProblem, *, solver: Solver | None = None, t: float = 0.0,
+                       tolerance: float = TOLERANCE) -> State:
     """Return the gravity stage: K u = f(t) - B_nᵀ r_n - B_tᵀ r_t with contact active, without excitation.
 
     The state it leaves has v = 0, keeps stresses, reactions and contact set, and is the start of the dynamic stage. A
@@ -77,10 +76,8 @@ class Equilibria:
         return State(t, old.k, result.x, np.zeros_like(old.u), result.r_n, result.active, r_t=result.r_t)
 
 
-def quasi_static(
-    problem: ContactProblem, times: Iterable[float], *, solver: Solver | None = None, state: State | None = None,
-    tolerance: float = TOLERANCE,
-) -> Iterator[State]:
+def quasi_static(problem: ContactProblem, times: Iterable[float], *, solver: Solver | None = None,
+                 state: State | None = None, tolerance: float = TOLERANCE) -> Iterator[State]:
     """Yield the equilibrium at each of the times, from where the one before left the body. v = 0; k counts stages.
 
     A load that grows in proportion needs one step as long as all slips go one way; a cyclic one at least a step for

@@ -75,10 +75,8 @@ class SoilCurves:
         return cls(_TABLES["strain"], reduction, damping, f"Vucetic-Dobry PI {index:g}")
 
     @classmethod
-    def darendeli(
-        cls, *, mean_stress: float, plasticity: float = 0.0, ocr: float = 1.0, frequency: float = 1.0,
-        cycles: float = 10.0,
-    ) -> "SoilCurves":
+    def darendeli(cls, *, mean_stress: float, plasticity: float = 0.0, ocr: float = 1.0, frequency: float = 1.0,
+                  cycles: float = 10.0) -> "SoilCurves":
         """Return those of Darendeli (2001), for p = mean_stress / 1 atm, PI in %, strains in % up to 1:
 
             G/Gmax = 1 / (1 + (s/s_r)^0.919),    s_r = (0.0352 + 0.001 PI ocr^0.3246) p^0.3483

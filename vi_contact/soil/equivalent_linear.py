@@ -55,10 +55,9 @@ class SiteResponse:
         return SoilColumn(heights, *np.repeat(values, parts, axis=0)[::-1].T)
 
 
-def equivalent_linear(
-    layers: Sequence[Layer], record: Record, *, rock: LinearElastic | None = None, rock_damping: float = 0.01,
-    ratio: float = 0.65, tolerance: float = 0.01, frequency: float | None = None, most: int = 50,
-) -> SiteResponse:
+def equivalent_linear(layers: Sequence[Layer], record: Record, *, rock: LinearElastic | None = None,
+                      rock_damping: float = 0.01, ratio: float = 0.65, tolerance: float = 0.01,
+                      frequency: float | None = None, most: int = 50) -> SiteResponse:
     """Return the response of layers to a record along the surface.
 
     layers: (thickness [m], material at small strains, curves) of each, from the top.
@@ -106,9 +105,8 @@ def equivalent_linear(
     return SiteResponse(layers, stiff * values[0], values[1], strain, risen, len(changes))
 
 
-def iterated(
-    owner: str, run: Callable[[Array], tuple[T, Array]], values: Array, tolerance: float, most: int, comm: Comm
-) -> tuple[T, Array, tuple[float, ...]]:
+def iterated(owner: str, run: Callable[[Array], tuple[T, Array]], values: Array, tolerance: float, most: int,
+             comm: Comm) -> tuple[T, Array, tuple[float, ...]]:
     """Return (what the last run returned, the values it had, changes) as soon as none of run(values) -> (…, new values)
     changes by more than the tolerance, relative to the new one. ViContactError after so many runs. Collective."""
     number(owner, "tolerance", tolerance, positive=True)
@@ -124,9 +122,8 @@ def iterated(
                          "motion is too strong for this soil, or most is too small")
 
 
-def _waves(
-    layers: Sequence[Layer], shear: Array, xi: Array, w: Array, slope: Array, rock: NDArray[np.complex128] | None
-) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+def _waves(layers: Sequence[Layer], shear: Array, xi: Array, w: Array, slope: Array,
+           rock: NDArray[np.complex128] | None) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
     """Surface acceleration and strains in the middle of the layers, (n, frequencies), over the acceleration given.
 
     From the top down: B/A, and A over that of the layer below, of which none grows with depth or frequency. Below a

@@ -55,9 +55,8 @@ class SoilColumn:
         size = 2 * len(self.heights)
         return sp.csr_matrix((blocks.ravel(), (rows, columns)), shape=(size, size))
 
-    def on_rigid_base(
-        self, acceleration: Callable[[float], Array], velocity: Callable[[float], Array] | None = None
-    ) -> ContactProblem:
+    def on_rigid_base(self, acceleration: Callable[[float], Array],
+                      velocity: Callable[[float], Array] | None = None) -> ContactProblem:
         """Return the system of nodes 1 to n, node 0 held, in the frame of a base with this acceleration (2,).
 
         velocity: of the base, where mass damping acts on absolute velocities; None where it acts on relative ones.

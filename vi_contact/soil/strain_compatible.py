@@ -34,10 +34,9 @@ class StrainCompatible(Generic[T]):
     changes: tuple[float, ...]
 
 
-def strain_compatible(
-    mesh: Any, material: Materials, curves: Sequence[tuple[Cells, SoilCurves]],
-    run: Callable[[Heterogeneous, LargestStrain], T], *, ratio: float = 0.65, tolerance: float = 0.01, most: int = 20,
-) -> StrainCompatible[T]:
+def strain_compatible(mesh: Any, material: Materials, curves: Sequence[tuple[Cells, SoilCurves]],
+                      run: Callable[[Heterogeneous, LargestStrain], T], *, ratio: float = 0.65, tolerance: float = 0.01,
+                      most: int = 20) -> StrainCompatible[T]:
     """Run a model until G and xi of every cell are those of its effective strain. Collective.
 
     Args:

@@ -39,10 +39,8 @@ class UpgoingVelocity:
         return self.share * speed * np.asarray(self.excitation.direction, dtype=float)
 
 
-def upgoing(
-    motion: Record | Excitation | Sequence[Excitation], *, direction: tuple[float, ...] = (1.0, 0.0),
-    dt: float | None = None, outcrop: bool = True,
-) -> Callable[[float], Array]:
+def upgoing(motion: Record | Excitation | Sequence[Excitation], *, direction: tuple[float, ...] = (1.0, 0.0),
+            dt: float | None = None, outcrop: bool = True) -> Callable[[float], Array]:
     """Return the upgoing velocity of a motion: half its velocity, or all when ``outcrop`` is False (already upgoing).
 
     motion: a record, along ``direction``, or an excitation, which has its own, or several, which act together (the

@@ -25,10 +25,9 @@ from .refinement import refinement
 WRITERS = {".html": write_web_page, ".pdf": write_pages}
 
 
-def report(
-    folder: str | Path, *, out: str | Path | None = None, title: str | None = None,
-    columns: Sequence[Sequence[str]] | None = None, failed: Mapping[str, str] | None = None,
-) -> tuple[Section, list[Path]]:
+def report(folder: str | Path, *, out: str | Path | None = None, title: str | None = None,
+           columns: Sequence[Sequence[str]] | None = None,
+           failed: Mapping[str, str] | None = None) -> tuple[Section, list[Path]]:
     """Write the report on a run folder, the table peaks.csv and the pictures beside it; return what it says of
     discretisation error, and their paths.
 

@@ -18,8 +18,7 @@ STEPS = 1e-6, 100.0  # shortest and longest time step [s] of a file; that of sei
 
 
 def read_record(path: str | os.PathLike[str], units: str | None = None, *, dt: float | None = None,
-                resample_dt: float | None = None, channel: int | None = None,
-                largest: float = LARGEST_PEAK) -> Record:
+                resample_dt: float | None = None, channel: int | None = None, largest: float = LARGEST_PEAK) -> Record:
     """Read one component of ground motion from a file of any format listed in docs/guide/records.md.
 
     units: a key of UNITS ("m/s2", "cm/s2", "gal", "g", ...); required for columns, elsewhere only

@@ -55,10 +55,8 @@ class RestartPoint:
         return self.k_start + self.base
 
 
-def write_checkpoint(
-    folder: Path, problem: ContactProblem, place: RestartPoint, *, of: Mapping[str, Any], rows: str = "",
-    safe: bool = True,
-) -> None:
+def write_checkpoint(folder: Path, problem: ContactProblem, place: RestartPoint, *, of: Mapping[str, Any],
+                     rows: str = "", safe: bool = True) -> None:
     """Replace the checkpoint in the folder. ``of``: the "run", as ``identity`` sees it over a "span" of times [s];
     ``rows``: checksum of the histories up to here; ``safe``: whether these are on the medium, and the checkpoint shall
     be. Collective; ViContactError on all ranks when the disk refuses it."""
@@ -110,9 +108,8 @@ def _split(problem: ContactProblem, state: State) -> tuple[Arrays, Arrays]:
     return vectors, same
 
 
-def read_checkpoint(
-    folder: Path, problem: ContactProblem, *, scheme: Scheme, dt: TimeSteps, changed: bool = False
-) -> tuple[RestartPoint, str]:
+def read_checkpoint(folder: Path, problem: ContactProblem, *, scheme: Scheme, dt: TimeSteps,
+                    changed: bool = False) -> tuple[RestartPoint, str]:
     """Return (where a run was left, with the state on the ranks of this one; checksum of its histories). Collective.
 
     InputError when the checkpoint is missing, damaged, of an unknown format, or of another problem, dt (or plan of
@@ -144,9 +141,8 @@ def _own(problem: ContactProblem, vectors: list[str], whole: Arrays | None) -> A
     return own
 
 
-def _compare(
-    file: Path, problem: ContactProblem, scheme: Scheme, dt: TimeSteps, about: Mapping[str, Any], changed: bool
-) -> list[str]:
+def _compare(file: Path, problem: ContactProblem, scheme: Scheme, dt: TimeSteps, about: Mapping[str, Any],
+             changed: bool) -> list[str]:
     """The names of what is another problem's; InputError unless that was allowed, or can be. Collective."""
     start, end = about["span"]
     found = differences(identity(problem, scheme, dt, start=start, end=end), about["run"])

@@ -37,9 +37,8 @@ class HistoryFiles:
     ``stored``: the rows of an earlier run that this one continues, in this folder (later ones are dropped) or another.
     """
 
-    def __init__(
-        self, folder: Path, table: Table, geometry: Mapping[str, Array], stored: StoredRows | None = None
-    ) -> None:
+    def __init__(self, folder: Path, table: Table, geometry: Mapping[str, Array],
+                 stored: StoredRows | None = None) -> None:
         self._folder, self._table, self._geometry = folder, table, geometry
         self._rows = self._saved = self._tail = self._last = 0
         self._hash = hashlib.sha256()

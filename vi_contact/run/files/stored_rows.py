@@ -67,9 +67,8 @@ class StoredRows:
                                  "damaged: restore it or start a new run")
 
 
-def read_blocks(
-    csv: Any, table: Table, arrays: "StoredArrays", *, first: int = 0, k: int | None = None
-) -> Iterator[tuple[list[bytes], Block]]:
+def read_blocks(csv: Any, table: Table, arrays: "StoredArrays", *, first: int = 0,
+                k: int | None = None) -> Iterator[tuple[list[bytes], Block]]:
     """Return (lines, rows) from where history.csv is, row ``first``, to step k or its end; no line cut short."""
     done = first
     while True:

@@ -46,10 +46,8 @@ class Writer:
     ``stored``: the rows of an earlier run that this one continues. Unless they are in this folder, ``open`` clears it.
     """
 
-    def __init__(
-        self, problem: ContactProblem, folder: Path | None, fields: FieldWriter | None, table: Table,
-        stored: StoredRows | None = None,
-    ) -> None:
+    def __init__(self, problem: ContactProblem, folder: Path | None, fields: FieldWriter | None, table: Table,
+                 stored: StoredRows | None = None) -> None:
         self._problem, self.folder, self._table, self._stored = problem, folder, table, stored
         self._continued = stored is not None and folder is not None and stored.folder.resolve() == folder.resolve()
         self._settings = fields

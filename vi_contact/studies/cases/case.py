@@ -150,10 +150,9 @@ class Case:
         """Return the recorders of [[record]]; None for those of ``simulate``."""
         return self._several("record", tags=parts.tags) if "record" in self.nodes else None
 
-    def run(
-        self, comm: Any, *, out: str | Path | None = None, restart: bool | str | Path = False, progress: bool = True,
-        changed: bool = False, wall_time: str | None = None, reached: Reached | None = None,
-    ) -> Solution:
+    def run(self, comm: Any, *, out: str | Path | None = None, restart: bool | str | Path = False,
+            progress: bool = True, changed: bool = False, wall_time: str | None = None,
+            reached: Reached | None = None) -> Solution:
         """Compute the whole run; collective. ``out``: the run folder, by default the one of [run], if any.
 
         Without ``steps`` and ``t_end`` it lasts as long as the excitation. A problem with weight starts from its static

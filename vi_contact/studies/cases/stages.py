@@ -57,9 +57,8 @@ def leading(case: Any, comm: Any) -> tuple[Reached | None, Parts, State | None]:
     return reached, *_entered(case.stages[reached.number], reached, comm)[1:]
 
 
-def run_stages(
-    case: Any, comm: Any, out: Path | None, *, restart: bool | str | Path, reached: Reached | None, **options: Any
-) -> Solution:
+def run_stages(case: Any, comm: Any, out: Path | None, *, restart: bool | str | Path, reached: Reached | None,
+               **options: Any) -> Solution:
     """Run those stages of a case that are not reached yet; the solution of the last one. Collective."""
     ranks, stages, reached = MpiComm(comm), case.stages, reached or Reached(0, case.meshed(comm))
     inner = [Path("stages") / f"{number}_{one.name}" for number, one in enumerate(stages[:-1], start=1)] + [Path()]
@@ -106,9 +105,8 @@ def _begin(folder: Path, before: str) -> None:
     write_atomically(folder / FOLLOWS, before.encode())
 
 
-def _made(
-    stage: Stage, reached: Reached, comm: Any, folder: Path | None, options: dict[str, Any]
-) -> tuple[Reached, Solution]:
+def _made(stage: Stage, reached: Reached, comm: Any, folder: Path | None,
+          options: dict[str, Any]) -> tuple[Reached, Solution]:
     """Run a stage, or go on with it."""
     reached, parts, state = _entered(stage, reached, comm)
     if stage.static and options.get("restart"):  # it has been solved

@@ -96,9 +96,8 @@ class Callee:
     given: tuple[str, ...] = ()
 
 
-def callee(
-    function: Callable[..., Any], *, name: str = "", only: Sequence[str] = (), given: Sequence[str] = GIVEN
-) -> Callee:
+def callee(function: Callable[..., Any], *, name: str = "", only: Sequence[str] = (),
+           given: Sequence[str] = GIVEN) -> Callee:
     """Return how to call a function or class; ``only``: what a file may give; parameters ``given`` are supplied."""
     plain_class = isinstance(function, type) and not is_dataclass(function)
     hints = get_type_hints(function.__init__ if plain_class else function)  # type: ignore[misc]

@@ -60,20 +60,17 @@ class MeshFile:
     path: Path
 
 
-def record(
-    path: Path, units: str | None = None, *, dt: float | None = None, resample_dt: float | None = None,
-    channel: int | None = None, largest: float = LARGEST_PEAK, processing: "ground_motion.Processing | None" = None,
-) -> Record:
+def record(path: Path, units: str | None = None, *, dt: float | None = None, resample_dt: float | None = None,
+           channel: int | None = None, largest: float = LARGEST_PEAK,
+           processing: "ground_motion.Processing | None" = None) -> Record:
     """Read a record, ``read_record``, then apply ``processing``."""
     found = ground_motion.read_record(path, units, dt=dt, resample_dt=resample_dt, channel=channel, largest=largest)
     return found if processing is None else processing(found)
 
 
-def surface(
-    system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obstacle | None = None,
-    points: Sequence[tuple[float, ...]] | None = None, feature_angle: float = FEATURE_ANGLE, held: bool = False,
-    springs: float | None = None, frictionless_corners: bool = False, name: str = "",
-) -> ContactSurface:
+def surface(system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obstacle | None = None,
+            points: Sequence[tuple[float, ...]] | None = None, feature_angle: float = FEATURE_ANGLE, held: bool = False,
+            springs: float | None = None, frictionless_corners: bool = False, name: str = "") -> ContactSurface:
     """Make a ``contact_surface``; held: bilateral everywhere; springs: on these; no friction in corners; name: of it
     as ``part`` of recorders."""
     found = fem.contact_surface(system, facets, obstacle=obstacle, points=points, feature_angle=feature_angle)
@@ -82,29 +79,24 @@ def surface(
     return found.bilateral_everywhere() if held else found
 
 
-def pair(
-    system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *, matching: Matching | None = None,
-    points: Sequence[tuple[float, ...]] | None = None, feature_angle: float = FEATURE_ANGLE, held: bool = False,
-    frictionless_corners: bool = False, name: str = "",
-) -> ContactSurface:
+def pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *, matching: Matching | None = None,
+         points: Sequence[tuple[float, ...]] | None = None, feature_angle: float = FEATURE_ANGLE, held: bool = False,
+         frictionless_corners: bool = False, name: str = "") -> ContactSurface:
     """Make a ``contact_pair``; held: ``.bilateral_everywhere()``; the others: as of ``surface``."""
     found = fem.contact_pair(system, facets1, facets2, matching=matching, points=points, feature_angle=feature_angle)
     found = found.with_frictionless_corners() if frictionless_corners else found
     return found.bilateral_everywhere() if held else found
 
 
-def weight(
-    system: SemiDiscreteSystem, *, acceleration: float = STANDARD_GRAVITY, direction: tuple[float, ...] | None = None,
-    cells: Cells | None = None,
-) -> SemiDiscreteSystem:
+def weight(system: SemiDiscreteSystem, *, acceleration: float = STANDARD_GRAVITY,
+           direction: tuple[float, ...] | None = None, cells: Cells | None = None) -> SemiDiscreteSystem:
     """Return the system ``with_weight``; cells: a group of whole bodies, which alone have weight."""
     bodies = None if cells is None else fem.bodies_of(system, cells)
     return laws.with_weight(system, acceleration=acceleration, direction=direction, bodies=bodies)
 
 
-def first_mode_harmonic(
-    system: SemiDiscreteSystem, *, amplitude: float, ratio: float = 0.5, direction: tuple[float, ...] = (1.0, 0.0)
-) -> laws.Harmonic:
+def first_mode_harmonic(system: SemiDiscreteSystem, *, amplitude: float, ratio: float = 0.5,
+                        direction: tuple[float, ...] = (1.0, 0.0)) -> laws.Harmonic:
     """Return the harmonic with ``ratio`` times the lowest frequency of the body without contact."""
     return laws.Harmonic(amplitude, ratio * engineering.lowest_frequency(system), direction=direction)
 
@@ -114,9 +106,8 @@ def first_mode_period(system: SemiDiscreteSystem, *, parts: float) -> float:
     return 1.0 / (number("the period", "parts", parts, positive=True) * engineering.lowest_frequency(system))
 
 
-def heterogeneous(
-    E: float | Expression, nu: float | Expression, rho: float | Expression, xi: float | Expression = 0.0
-) -> Heterogeneous:
+def heterogeneous(E: float | Expression, nu: float | Expression, rho: float | Expression,
+                  xi: float | Expression = 0.0) -> Heterogeneous:
     def of(value: float | Expression) -> Any:
         return (lambda x, own=Places(value): own(x.T)) if isinstance(value, Expression) else value
 
@@ -127,33 +118,25 @@ def analytic_gap(function: Expression) -> core.AnalyticGap:
     return core.AnalyticGap(Places(function))
 
 
-def resultants(
-    name: str = "", centre: tuple[float, ...] | None = None, normal: tuple[float, ...] | None = None,
-    part: Facets | str | tuple[tuple[float, ...], ...] | None = None,
-) -> engineering.Resultants:
+def resultants(name: str = "", centre: tuple[float, ...] | None = None, normal: tuple[float, ...] | None = None,
+               part: Facets | str | tuple[tuple[float, ...], ...] | None = None) -> engineering.Resultants:
     """Record ``Resultants``; part: the name of a [[contact]] or of a boundary group, or a box."""
     return engineering.Resultants(name, centre, normal=normal, part=part)
 
 
-def upgoing(
-    excitations: Any, motion: Record | Excitation | Sequence[Excitation] | None = None, *,
-    direction: tuple[float, ...] = (1.0, 0.0), dt: float | None = None, outcrop: bool = True,
-) -> Any:
+def upgoing(excitations: Any, motion: Record | Excitation | Sequence[Excitation] | None = None, *,
+            direction: tuple[float, ...] = (1.0, 0.0), dt: float | None = None, outcrop: bool = True) -> Any:
     """Return ``soil.upgoing`` of a motion, or of the run's excitations, which then come up through the base alone."""
     return soil.upgoing(excitations if motion is None else motion, direction=direction, dt=dt, outcrop=outcrop)
 
 
-def compliant_base(
-    facets: Facets, *, motion: UpgoingVelocity, material: LinearElastic | None = None, normal: float = 1.0,
-    tangential: float = 1.0,
-) -> CompliantBase:
+def compliant_base(facets: Facets, *, motion: UpgoingVelocity, material: LinearElastic | None = None,
+                   normal: float = 1.0, tangential: float = 1.0) -> CompliantBase:
     return CompliantBase(facets, material, normal, tangential, motion=motion)
 
 
-def free_field(
-    excitations: Any, facets: Facets, *, base: CompliantBase | None = None,
-    material: LinearElastic | None = None, normal: float = 1.0, tangential: float = 1.0,
-) -> "soil.FreeField":
+def free_field(excitations: Any, facets: Facets, *, base: CompliantBase | None = None,
+               material: LinearElastic | None = None, normal: float = 1.0, tangential: float = 1.0) -> "soil.FreeField":
     """Make a free-field side on the base of the run's excitations, or a compliant one."""
     foot = excitations if base is None else base
     return soil.FreeField(facets, material, normal, tangential, base=foot)

@@ -105,10 +105,8 @@ class IDA:
         return OneRun(self.case, shaking, factor, folder)
 
 
-def run_ida(
-    study: IDA, out: str | Path, *, jobs: int = 1, part: tuple[int, int] = (1, 1), launch: Sequence[str] = (),
-    say: Callable[[str], None] = print, wall_time: str | None = None,
-) -> list[Row]:
+def run_ida(study: IDA, out: str | Path, *, jobs: int = 1, part: tuple[int, int] = (1, 1), launch: Sequence[str] = (),
+            say: Callable[[str], None] = print, wall_time: str | None = None) -> list[Row]:
     """Make the runs that have not finished yet, and the table and figure of all that are in ``out``; returns its rows.
 
     Eight runs share a process and, where the body serves all excitations, its assembly and every pass over its
