@@ -6,6 +6,7 @@ too, and their cubic elements give static forms exactly. V2 of a user who brings
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
 
@@ -22,6 +23,7 @@ from vi_contact.core.algebra import SerialMatrix
 from vi_contact.core.errors import InputError
 from vi_contact.core.system import Load
 from vi_contact.laws.free_motions import free_motions
+from vi_contact.solvers import NSGS, Lemke
 
 pytestmark = pytest.mark.serial  # numpy and scipy alone: ranks would all do the same
 EI, EA, RHO_A, L = 2.0e3, 5.0e5, 3.0, 2.0
@@ -177,22 +179,30 @@ def test_beam_strikes_a_stop_and_rubs(scheme):
 
 
 @pytest.mark.parametrize("name", ["K", "C"])
-def test_matrices_that_are_not_symmetric_are_for_volume(name):
-    """A follower force, or gyroscopic damping, in one step of MoreauJean (theta = 1) against its 2 x 2 problem."""
+def test_matrices_that_are_not_symmetric(name):
+    """A follower force, or gyroscopic damping, in one step of MoreauJean (theta = 1) against its 2 x 2 problem, by
+    Volume() and condensed; methods that need symmetry say which do not."""
     pytest.importorskip("petsc4py")
     skew = {"K": np.diag([30.0, 20.0]), "C": np.diag([3.0, 2.0])}
     skew[name] += np.array([[0.0, 5.0], [-3.0, 0.0]])
     v0, dt = np.array([1.0, 0.5]), 0.01
     system = vc.system_from_arrays([1.0, 2.0], **skew, coordinates=[[0.0, 0.0]], v0=v0)
-    assert f"{name} not symmetric: only Volume() solves it" in system.notes[0]
+    assert f"{name} not symmetric: for Volume() and Condensed(Lemke())" in system.notes[0]
     problem = vc.ContactProblem(system, vc.contact_points(system, [0], [1.0, 0.0]), mass=vc.ConsistentMass())
-    with pytest.raises(InputError, match=r"Condensed needs symmetric matrices.*solver=Volume\(\)"):
-        marched(problem, steps=1, scheme=vc.MoreauJean(theta=1.0), dt=dt)
-    (state,) = marched(problem, steps=1, scheme=vc.MoreauJean(theta=1.0), dt=dt, solver=vc.Volume())
+    rubbing = replace(problem, friction=vc.Coulomb(0.1))
+    for one, solver in ((problem, vc.Condensed()), (rubbing, vc.Condensed(Lemke(), NSGS()))):
+        with pytest.raises(InputError, match=r"Condensed needs symmetric matrices.*Condensed\(Lemke\(\)\) or solver=Vol"):
+            marched(one, steps=1, scheme=vc.MoreauJean(theta=1.0), dt=dt, solver=solver)
     A = np.diag([1.0, 2.0]) + dt * skew["C"] + dt**2 * skew["K"]
-    free = A[1, 1] * state.v[1] - 2.0 * v0[1]
-    assert state.v[0] == pytest.approx(0.0, abs=1e-15) and free == pytest.approx(0.0, abs=1e-13)
-    assert dt * state.r_n[0] == pytest.approx(1.0 - A[0, 1] * state.v[1], rel=1e-12)
+    for solver in (vc.Volume(), vc.Condensed(Lemke())):
+        (state,) = marched(problem, steps=1, scheme=vc.MoreauJean(theta=1.0), dt=dt, solver=solver)
+        free = A[1, 1] * state.v[1] - 2.0 * v0[1]
+        assert state.v[0] == pytest.approx(0.0, abs=1e-15) and free == pytest.approx(0.0, abs=1e-13)
+        assert dt * state.r_n[0] == pytest.approx(1.0 - A[0, 1] * state.v[1], rel=1e-12)
+        (state,) = marched(rubbing, steps=1, scheme=vc.MoreauJean(theta=1.0), dt=dt, solver=solver)
+        slides = A[1, 1] * state.v[1] - 2.0 * v0[1] + 0.1 * dt * state.r_n[0]
+        assert state.v[1] > 0.1 and slides == pytest.approx(0.0, abs=1e-13)
+        assert dt * state.r_n[0] == pytest.approx(1.0 - A[0, 1] * state.v[1], rel=1e-12)
 
 
 # Mass laws, weight, bodies --------------------------------------------------------------------------------------------

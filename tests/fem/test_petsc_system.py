@@ -21,6 +21,7 @@ from vi_contact import fem, meshes
 from vi_contact.core.errors import InputError
 from vi_contact.fem.petsc_algebra import PetscMatrix
 from vi_contact.fem.petsc_rows import aij_of, rows_of
+from vi_contact.solvers import Lemke
 
 COMM = MPI.COMM_WORLD
 SOFT = vc.LinearElastic(E=1.0e7, nu=0.3, rho=1000.0)
@@ -155,7 +156,7 @@ def test_bodies_and_node_against_node_on_ranks():
 
 
 def test_stiffness_that_is_not_symmetric_on_ranks():
-    """By Volume() on any number of ranks the serial run; other solvers refuse it."""
+    """By Volume() and Lemke's method on any number of ranks the serial run; other solvers refuse it."""
     M, K = bar_matrices(12, length=1.0, E=1e6, rho=1000.0)
     K = sp.csr_matrix(K + sp.diags([np.full(12, 1e6)], [1]))
     points, v0 = line([0.0], [1.0], 12), np.full(13, 1.0)
@@ -165,10 +166,11 @@ def test_stiffness_that_is_not_symmetric_on_ranks():
     runs = []
     for one in (alone, system):
         problem = vc.ContactProblem(one, vc.contact_points(one, [12], [1.0]), mass=vc.ConsistentMass())
-        runs.append(history(problem, np.arange(13), scheme=vc.MoreauJean(), solver=vc.Volume()))
+        for solver in (vc.Volume(), vc.Condensed(Lemke())):
+            runs.append(history(problem, np.arange(13), scheme=vc.MoreauJean(), solver=solver))
         with pytest.raises(InputError, match="needs symmetric matrices"):
             history(problem, np.arange(13), scheme=vc.MoreauJean())
-    assert same(*runs, 1e-9)
+    assert all(same(runs[0], other, 1e-9) for other in runs[1:])
 
 
 def test_function_space_in_place_of_coordinates():

@@ -26,12 +26,13 @@ from ..core.obstacles import Obstacle, Touching, admissible_gap, facing
 from ..core.protocols import FrictionLaw, Frictionless
 from ..core.step import StepProblem
 from ..core.surfaces import ContactSurface, nodal_frames
+from ..solvers.normal.p_matrix import PMatrix, p_matrix
 from .boundary_mesh import BoundaryMesh
 from .energetic import summed
 from .poincare_steklov import CondensedCompliance
 
 ObstacleMotion = Callable[[float], float | Array]
-ASYMMETRIC = 1e-8  # of W[0], beyond which there is no small problem to solve
+ASYMMETRIC = 1e-8  # of W[0], beyond which it is that of the unsymmetric form
 SUPPORTED = 1e-12  # of the largest flexibility: supported unknowns
 
 
@@ -86,8 +87,7 @@ class BoundaryContact:
     obstacle; conditions: None for one per contact node. Points with two conditions do not rub.
 
     Raises InputError for a contact boundary that turns by more than 30° where the obstacle follows it and no conditions
-    are given, for a compliance W[0] that is not symmetric and positive definite (the unsymmetric form is not),
-    supports that hold a contact direction, and bodies that penetrate their obstacle.
+    are given, for a symmetric compliance W[0] that is not positive definite and any that is singular, supports that hold a contact direction, and bodies that penetrate their obstacle.
     """
 
     compliance: CondensedCompliance
@@ -202,12 +202,26 @@ class BoundaryContact:
         return surface.moving(self.towards, self.along)
 
     @cached_property
+    def symmetric(self) -> bool:
+        """Tell whether W[0] is: that of the unsymmetric Poincaré-Steklov operator is not."""
+        return bool(np.abs(self.W[0] - self.W[0].T).max() <= ASYMMETRIC * np.abs(self.W[0]).max())
+
+    @cached_property
+    def p_matrix(self) -> PMatrix:
+        """Tell whether the step matrix, W[0] of the contact unknowns, is one: a step, or one of given limits of
+        friction, then has one solution."""
+        rows = np.arange(self.free.sum()) if self.frictional else self.surface.owned
+        return p_matrix(self.W[0][np.ix_(rows, rows)])
+
+    @cached_property
     def matrix(self) -> EffectiveMatrix:
         """Return the matrix A of the step."""
         first = self.W[0]
-        if np.abs(first - first.T).max() > ASYMMETRIC * np.abs(first).max():
-            raise InputError("BoundaryContact: the compliance of one step is not symmetric, so there is no small "
-                             "problem to solve; use the symmetric Poincaré-Steklov operator")
+        if not self.symmetric:
+            if np.linalg.cond(first) > 1.0 / ASYMMETRIC:
+                raise InputError("BoundaryContact: the compliance of one step is singular; use the symmetric "
+                                 "Poincaré-Steklov operator")
+            return EffectiveMatrix(SerialMatrix(np.linalg.inv(first)), SerialAlgebra(symmetric=False))
         first = 0.5 * (first + first.T)
         if np.linalg.eigvalsh(first)[0] <= 0.0:
             raise InputError("BoundaryContact: the compliance of one step is not positive definite; use the symmetric "

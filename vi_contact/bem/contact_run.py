@@ -13,6 +13,7 @@ from ..core.step import StepProblem, StepResult
 from ..core.verify import kkt_residual
 from ..solvers.certified import TOLERANCE
 from ..solvers.condensed import Condensed
+from ..solvers.normal.lemke import Lemke
 from .contact import BoundaryContact
 from .poincare_steklov import work
 
@@ -20,7 +21,8 @@ from .poincare_steklov import work
 def march_contact(
     contact: BoundaryContact, *, solver: Condensed | None = None, tolerance: float = TOLERANCE
 ) -> "ContactRun":
-    """March through all steps of the compliance; ``solver``: Condensed with any of its methods.
+    """March through all steps of the compliance; ``solver``: Condensed with any of its methods, by default ActiveSet, or
+    Lemke where the compliance is not symmetric.
 
     Raises StepFailure when a step's certificate exceeds ``tolerance``, with step, time and residuals.
     """
@@ -28,7 +30,8 @@ def march_contact(
     if solver is not None:
         instance("march_contact", "solver", solver, Condensed, "give Condensed() with any of its methods, or None")
     number("march_contact", "tolerance", tolerance, positive=True)
-    prepared = (solver or Condensed()).prepare(contact.matrix, contact.surface, 1.0)
+    default = Condensed() if contact.symmetric else Condensed(Lemke())
+    prepared = (solver or default).prepare(contact.matrix, contact.surface, 1.0)
 
     def solved(step: StepProblem) -> StepResult:
         result = prepared.solve(step)

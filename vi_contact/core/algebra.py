@@ -220,7 +220,7 @@ class SerialMatrix:
 
 
 class SerialFactor:
-    """Factorise by the sparse LU of scipy (SuperLU) with a symmetric ordering."""
+    """Factorise by the sparse LU of scipy (SuperLU) with a symmetric ordering; rows are exchanged where they must."""
 
     def __init__(self, matrix: SerialMatrix) -> None:
         self._lu = splu(matrix.csr.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
@@ -237,12 +237,11 @@ class SerialFactor:
 
 
 class SerialAlgebra:
-    """Combine matrices of scipy.sparse on one process."""
+    """Combine matrices of scipy.sparse on one process; solvers that need symmetric ones ask for ``symmetric``."""
 
-    symmetric = True
-
-    def __init__(self) -> None:
+    def __init__(self, *, symmetric: bool = True) -> None:
         self.comm: Comm = SerialComm()
+        self.symmetric = symmetric
 
     def combine(self, terms: Sequence[tuple[float, Matrix]]) -> Matrix:
         return SerialMatrix(sum(factor * serial(matrix).csr for factor, matrix in terms))

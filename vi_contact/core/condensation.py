@@ -78,7 +78,7 @@ class _Twice:
     ) -> None:
         self._A, self._comm, self._owned, self._places, self.there = A, surface.comm, owned, places, there
         G = self._everywhere(A.factor.solve_units(owned, places, len(there), owned))
-        self.flexibility: Array = 0.5 * (G + G.T)
+        self.flexibility: Array = 0.5 * (G + G.T) if A.algebra.symmetric else G
 
     def _everywhere(self, values: Array) -> Array:
         whole = np.zeros((len(self.there), *values.shape[1:]))

@@ -30,7 +30,7 @@ class Forms:
     must keep its values while the system is used: reactions and section forces integrate them again.
 
     Args:
-        stiffness: the form of K [N/m]. One that is not symmetric is for solver=Volume() alone, and has no energy.
+        stiffness: the form of K [N/m]. One that is not symmetric is for Volume() and Condensed(Lemke()), and has no energy.
         mass: the form of M [kg], symmetric and positive; None: the density of ``assemble(…, material)``.
         damping: the form of C [N s/m]; None: that of ``assemble(…, damping=)``, Rayleigh on these M and K, or
             KelvinVoigt; both add up.
@@ -96,7 +96,7 @@ class OwnForms(ElasticForms):
         notes = [f"the body is stated by forms: its mass by {mass}, its stress by {stress} form, wave speeds at "
                  f"boundaries by {waves}"]
         if not self.symmetric:
-            notes.append("its matrices are not symmetric: only Volume() solves it, and ½ uᵀKu is no energy")
+            notes.append("its matrices are not symmetric: for Volume() and Condensed(Lemke()), and ½ uᵀKu is no energy")
         if self.tells_stress and isinstance(self.section, PlaneStrain) and self._stress(self.u).ufl_shape == (2, 2):
             notes.append("von Mises stresses take sigma_zz as zero: give a stress of shape (3, 3)")
         return tuple(notes)

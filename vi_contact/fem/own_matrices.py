@@ -22,12 +22,6 @@ from .matrix_space import MatrixSpace
 OWNER = "system_from_arrays"
 
 
-class UnsymmetricSerial(SerialAlgebra):
-    """Combine matrices on one process of which some is not symmetric: solvers that need that refuse them."""
-
-    symmetric = False
-
-
 def system_from_arrays(
     M: Any, C: Any, K: Any, *, coordinates: Any, unknowns: Any = None, clamped: Any = (),
     load: Load | Sequence[float] | Array | None = None, u0: Any = None, v0: Any = None,
@@ -39,7 +33,7 @@ def system_from_arrays(
 
     Args:
         M, C, K: (n, n), symmetric: mass [kg], M also (n,) where lumped; damping [N s/m] or None; stiffness [N/m]. C and
-            K that are not symmetric are for ``solver=Volume()`` alone.
+            K that are not symmetric are for ``Volume()`` and ``Condensed(Lemke())``.
         coordinates: (nodes, d) [m], d = 1, 2 or 3.
         unknowns: (n, 2) node and component 0, …, d - 1 of each row, component -1 for what is no displacement of a point
             (a rotation); None: row node * d + c is component c of the node. Components without a row stand still.
@@ -58,7 +52,7 @@ def system_from_arrays(
             raise InputError(f"{OWNER}: {name} has shape {one.csr.shape} and K has {n} rows; give square matrices of "
                              "one size")
     given = {"coordinates": coordinates, "unknowns": unknowns, "clamped": clamped, "load": load, "u0": u0, "v0": v0}
-    return own_system(OWNER, SerialAlgebra(), UnsymmetricSerial(), matrices, given)
+    return own_system(OWNER, SerialAlgebra(), SerialAlgebra(symmetric=False), matrices, given)
 
 
 def _serial(name: str, value: Any) -> SerialMatrix:
@@ -99,7 +93,7 @@ def own_system(
         algebra=algebra, M=M, C=matrices.get("C"), K=K, load=load, influence=influence[free], u0=u0[free],
         v0=v0[free], space=space, base_mass=np.column_stack(momenta),
         massless=massless if largest(comm, massless.any()) else None,
-        notes=tuple(f"{name} not symmetric: only Volume() solves it, and ½ uᵀKu is no energy" for name in skew),
+        notes=tuple(f"{name} not symmetric: for Volume() and Condensed(Lemke()), and ½ uᵀKu is no energy" for name in skew),
     ))
 
 

@@ -38,7 +38,7 @@ from .normal.lcp import LCPResult
 
 
 class SmallMethod(Protocol):
-    """Solve the small problem without friction: ActiveSet or Hildreth."""
+    """Solve the small problem without friction: ActiveSet, Hildreth or Lemke."""
 
     def prepare(self, G: Array, bilateral: Mask) -> Any:
         """Check G (m, m) and factor or scale it, once for many right-hand sides; ``bilateral`` (m,).
@@ -51,9 +51,10 @@ class SmallMethod(Protocol):
 class Condensed:
     """Condense onto the contact unknowns, with a method for the small problem; with or without friction, on any ranks.
 
-    ``method`` solves it without friction: ActiveSet or Hildreth. ``friction_method`` solves it with friction:
-    FrictionNewton, NSGS or FixedPoint or GivenForces; ``rates`` is the iteration around it for laws that depend
-    on the slip rate. Contact sets too large for a dense G are for ``Iterative``.
+    ``method`` solves it without friction: ActiveSet or Hildreth, or Lemke, which matrices that are not symmetric need.
+    ``friction_method`` solves it with friction: FrictionNewton, or for symmetric matrices NSGS, FixedPoint or
+    GivenForces; ``rates`` is the iteration around it for laws that depend on the slip rate. Contact sets too large for
+    a dense G are for ``Iterative``.
     """
 
     method: SmallMethod = field(default_factory=ActiveSet)
@@ -61,20 +62,21 @@ class Condensed:
     rates: RateIteration = field(default_factory=RateIteration)
 
     def __post_init__(self) -> None:
-        remedy = "give ActiveSet() or Hildreth()"
+        remedy = "give ActiveSet(), Hildreth() or Lemke()"
         provides("Condensed", "method", self.method, ("prepare",), remedy, lacks=("check", "carries_friction"))
         inner_method("Condensed", "friction_method", self.friction_method)
         instance("Condensed", "rates", self.rates, RateIteration, "give RateIteration()")
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for friction without a tangential direction, or of a wrong number of values, and for more
-        contact unknowns than a dense matrix suits."""
+        """Raise InputError for friction without a tangential direction, or of a wrong number of values, for more contact
+        unknowns than a dense matrix suits, and for matrices that are not symmetric unless the methods take them."""
         surface = problem.surface
         if problem.frictional:
             refuse_dense(f"Condensed() with {problem.friction}", surface.total * (1 + surface.tangents.shape[1]))
         else:
             refuse_dense("Condensed()", surface.total)
-        check_laws("Condensed", problem)
+        used = (self.method, self.friction_method) if problem.frictional else (self.method,)
+        check_laws("Condensed", problem, unsymmetric=all(getattr(one, "unsymmetric", False) for one in used))
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> "PreparedCondensed":
         """Return what condenses A at its first step, which tells of friction. InputError for too many conditions."""

@@ -105,7 +105,7 @@ class Reduced:
         return r
 
     def matrix(self, G: Array) -> Array:
-        """Return K, made as its transpose: G is symmetric, and rows are near each other in memory."""
+        """Return K, made as its transpose, whose rows are near each other in memory; G is transposed too."""
         places = np.concatenate([self.plain, self._turned.ravel()])
         part = _block(G, self.plain, places)
         growth = self.growth[self.closed]  # of the first rows of part
@@ -131,9 +131,11 @@ class Factored:
         self.reduced, self._delassus, self._H = reduced, delassus, None
         self._lu: Any = None
         self.sound = True
-        if LARGE <= reduced.size == len(reduced.plain) and MOST * len(delassus.matrix) < reduced.size < INVERTED:
+        large = delassus.symmetric and LARGE <= reduced.size == len(reduced.plain)
+        if large and MOST * len(delassus.matrix) < reduced.size < INVERTED:
             self._H = delassus.inverse
-        matrix = reduced.matrix(delassus.matrix) if self._H is None else self._rest(self._H)
+        G = delassus.matrix if delassus.symmetric else delassus.matrix.T
+        matrix = reduced.matrix(G) if self._H is None else self._rest(self._H)
         if matrix.size:
             lu, pivots, info = lapack.dgetrf(matrix, overwrite_a=1)
             self._lu, self.sound = (lu, pivots), info == 0

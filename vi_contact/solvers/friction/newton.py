@@ -22,7 +22,7 @@ slip to and fro. Where Newton cycles all the same, Gauss-Seidel sweeps (nsgs.py)
 from ctypes import c_double
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -49,12 +49,14 @@ class FrictionNewton(Settings):
     ``history`` the residual after those and after each linear solve.
     """
 
+    unsymmetric: ClassVar[bool] = True  # matrices are welcome
     tolerance: float = 1e-11
     max_iterations: int = 30
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedFriction:
         """Check and scale G (m d, m d). Answers depend on their right-hand side alone, not on steps before."""
-        delassus, compiled = ScaledDelassus(G, bilateral), library(SerialComm())
+        delassus = ScaledDelassus(G, bilateral, unsymmetric=True)
+        compiled = library(SerialComm()) if delassus.symmetric else None  # its sweeps read half of G
         if compiled and delassus.count:
             delassus.short  # noqa: B018  a part of set-up
         return PreparedFriction(self, self.tolerance, delassus, partial(self._loop, compiled, {}))

@@ -60,7 +60,8 @@ class _Node:
         d = step.delassus.dimension
         block = step.delassus.matrix[i * d : (i + 1) * d, i * d : (i + 1) * d]
         self.normal, self.coupling, self.tangential = float(block[0, 0]), block[0, 1:], block[1:, 1:]
-        self.condensed = self.tangential - np.outer(self.coupling, self.coupling) / self.normal
+        self.pushed = block[1:, 0]  # the coupling, unless G is not symmetric
+        self.condensed = self.tangential - np.outer(self.pushed, self.coupling) / self.normal
         self.cohesion, self.slope = float(step.cohesion[i]), float(step.slope[i])
         self.bilateral = bool(step.delassus.bilateral[i])
 
@@ -75,7 +76,7 @@ class _Node:
         def pressure(r_t: Array) -> float:
             return float(-(q_n + self.coupling @ r_t) / self.normal)
 
-        r_t = on_disk(self.condensed, q_t - self.coupling * (q_n / self.normal),
+        r_t = on_disk(self.condensed, q_t - self.pushed * (q_n / self.normal),
                       lambda r_t: self.cohesion + self.slope * max(pressure(r_t), 0.0))
         r_n = pressure(r_t)
         return np.concatenate([[r_n if self.bilateral else max(r_n, 0.0)], r_t])

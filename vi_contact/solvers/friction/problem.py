@@ -29,7 +29,7 @@ from ...core.algebra import Array, Mask, max_abs
 from ...core.checks import attributes, provides
 from ...core.errors import InputError, StepFailure
 from ...laws.friction import project
-from ..normal.lcp import EPS, check_gap, energy_scale, scaled_symmetric
+from ..normal.lcp import EPS, check_gap, energy_scale, scaled_matrix
 
 Iterated = tuple[Array, int, Sequence[float]]  # scaled r, iterations, history
 
@@ -168,7 +168,7 @@ class ScaledProblem:
 class ScaledDelassus:
     """Hold d G d with its scale (m, d): what the methods work on."""
 
-    def __init__(self, G: Array, bilateral: Mask) -> None:
+    def __init__(self, G: Array, bilateral: Mask, *, unsymmetric: bool = False) -> None:
         m = len(bilateral)
         d = G.shape[0] // m if m else 1
         if G.ndim != 2 or G.shape != (m * d, m * d):
@@ -177,10 +177,13 @@ class ScaledDelassus:
         if d > 1:
             scale[:, 1:] = np.mean(scale[:, 1:] ** -2.0, axis=1)[:, None] ** -0.5
         self.scale, self.bilateral, self.count, self.dimension = scale, bilateral.copy(), m, d
-        self.matrix, self.norm = scaled_symmetric(G, scale.ravel())
+        self.matrix, self.norm = scaled_matrix(G, scale.ravel(), unsymmetric=unsymmetric)
+        self.symmetric = not unsymmetric or np.array_equal(self.matrix, self.matrix.T)
 
     def product(self, r: Array) -> Array:
         """Return G r, (m d,)."""
+        if not self.symmetric:
+            return np.asarray(self.matrix @ r)
         carried = np.flatnonzero(r)
         if len(carried) <= 0.25 * len(r):
             return np.asarray(r[carried] @ self.matrix[carried])

@@ -109,29 +109,35 @@ class PreparedLCP:
         return LCPResult(r * scaled.scale, active, iterations, residual, self.method, tuple(history))
 
 
-def scaled_dense(G: Array, bilateral: Mask) -> ScaledLCP:
-    """Check and scale a dense G. InputError when it is not finite, symmetric (to 1e-8), of positive diagonal."""
+def scaled_dense(G: Array, bilateral: Mask, *, unsymmetric: bool = False) -> ScaledLCP:
+    """Check and scale a dense G. InputError when it is not finite or, unless ``unsymmetric`` allows it, not symmetric
+    (to 1e-8) of positive diagonal."""
     check_operator(G, bilateral)
     if not isinstance(G, np.ndarray):
         raise InputError("This method needs the Delassus operator as an array: form it.")
-    d = energy_scale(G)
-    return ScaledLCP(d, *scaled_symmetric(G, d), bilateral.copy())
+    d = energy_scale(G, signed=unsymmetric)
+    return ScaledLCP(d, *scaled_matrix(G, d, unsymmetric=unsymmetric), bilateral.copy())
 
 
-def scaled_symmetric(G: Array, d: Array) -> tuple[Array, float]:
-    """Return d G d and its norm; InputError when it is not symmetric (to 1e-8)."""
+def scaled_matrix(G: Array, d: Array, *, unsymmetric: bool = False) -> tuple[Array, float]:
+    """Return d G d, exactly symmetric where it is so to 1e-8, and its norm; InputError when it should be and is not."""
     matrix = np.ascontiguousarray(d[:, None] * G * d)
-    if max_abs(matrix - matrix.T) > 1e-8:
-        raise InputError("The Delassus operator is not symmetric: use a symmetric effective matrix A.")
-    matrix = 0.5 * (matrix + matrix.T)
+    if max_abs(matrix - matrix.T) <= 1e-8:
+        matrix = 0.5 * (matrix + matrix.T)
+    elif not unsymmetric:
+        raise InputError("The Delassus operator is not symmetric: use a symmetric effective matrix A, or the methods "
+                         "Lemke() and, with friction, FrictionNewton().")
     return matrix, float(np.abs(matrix).sum(axis=1).max(initial=0.0))
 
 
-def energy_scale(G: Array) -> Array:
-    """Return d = G_ii^(-1/2) (m,)."""
+def energy_scale(G: Array, *, signed: bool = False) -> Array:
+    """Return d = |G_ii|^(-1/2) (m,). InputError where G_ii is not positive, unless it may be: 0 is then as good as the
+    largest entry."""
     if not np.isfinite(G).all():
         raise InputError("The Delassus operator contains NaN or infinity: check the factorisation it came from.")
     diagonal = np.asarray(G.diagonal(), dtype=float)
+    if signed:
+        diagonal = np.where(diagonal == 0.0, max_abs(G) or 1.0, np.abs(diagonal))
     wrong = np.flatnonzero(~(diagonal > 0.0))
     if wrong.size:
         raise InputError(f"Row {wrong[0]} cannot move (G_ii is not positive): fixed unknowns cannot be contacts.")
