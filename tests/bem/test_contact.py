@@ -212,9 +212,14 @@ def test_part_of_an_interface_is_welded():
 def test_bad_input():
     """One sentence that names the thing and the remedy."""
     problem = square()
-    tilted = PoincareSteklov(problem.operator.blocks, 1.0, symmetric=False)
-    with pytest.raises(InputError, match="symmetric Poincaré-Steklov"):
-        march_contact(BoundaryContact(replace(problem, operator=tilted).condensed()))
+    for first, words in ((np.ones((12, 12)), "not positive definite"), (np.tril(np.ones((12, 1)) * np.ones(12)), None),
+                         (np.ones((12, 1)) * np.arange(1.0, 13.0), "one step is singular")):
+        wrong = BoundaryContact(replace(condensed(), W=np.concatenate([first[None], condensed().W[1:]])))
+        if words is None:
+            assert wrong.matrix.algebra.symmetric is wrong.symmetric is False
+            continue
+        with pytest.raises(InputError, match=words):
+            march_contact(wrong)
     nodes = problem.operator.mesh.nodes_of(problem.contact)
     for fixed, words in ((np.stack([0 * nodes, nodes]), "in its contact direction"), (None, "penetrates")):
         held = replace(problem, fixed=None if fixed is None else fixed.astype(bool)).condensed()

@@ -268,7 +268,7 @@ def leaning(comm: Any) -> tuple[Any, Any]:
 
 
 def test_stiffness_that_is_not_symmetric(comm: Any) -> None:
-    """Both methods of the volume route and Lemke's agree, statically with a certificate and partly open, and in dynamics;
+    """Both methods of the volume route and Lemke's agree, statically, certified and partly open, and in dynamics;
     reactions are rows of K u - f; routes that need symmetry say so, as does the log of a run."""
     problem, push = leaning(comm)
     assert problem.system.algebra.symmetric is False and "not symmetric" in problem.system.notes[1]

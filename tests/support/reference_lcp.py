@@ -144,3 +144,21 @@ def problems(kind_index: int, count: int = 25) -> list[LCP]:
     """``count`` problems of one kind, m = 1…12, always the same."""
     rng = np.random.default_rng(kind_index)
     return [KINDS[kind_index](rng, 1 + i % 12) for i in range(count)]
+
+
+def solutions(G: Array, q: Array) -> list[Array]:
+    """All solutions with regular sets, by enumeration of the 2^m sets."""
+    m, found = len(q), []
+    for bits in product((False, True), repeat=len(q)):
+        a, r = np.array(bits), np.zeros(m)
+        if abs(np.linalg.det(G[np.ix_(a, a)])) > 1e-12:
+            r[a] = np.linalg.solve(G[np.ix_(a, a)], -q[a])
+            if r.min() >= -1e-12 and (q + G @ r).min() >= -1e-12 and not any(np.allclose(r, one) for one in found):
+                found.append(r)
+    return found
+
+
+def minors(G: Array) -> float:
+    """The smallest principal minor."""
+    sets = (np.flatnonzero(bits) for bits in product((False, True), repeat=len(G)))
+    return min(float(np.linalg.det(G[np.ix_(a, a)])) for a in sets if len(a))

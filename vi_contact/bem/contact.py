@@ -18,7 +18,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.algebra import Array, EffectiveMatrix, Indices, Mask, SerialAlgebra, SerialComm, SerialMatrix
+from ..core.algebra import Array, EffectiveMatrix, Indices, Mask, SerialAlgebra, SerialComm, SerialMatrix, max_abs
 from ..core.checks import array, at, flag, function, instance, integers, optional, provides
 from ..core.corners import FEATURE_ANGLE
 from ..core.errors import InputError
@@ -26,7 +26,7 @@ from ..core.obstacles import Obstacle, Touching, admissible_gap, facing
 from ..core.protocols import FrictionLaw, Frictionless
 from ..core.step import StepProblem
 from ..core.surfaces import ContactSurface, nodal_frames
-from ..solvers.normal.p_matrix import PMatrix, p_matrix
+from ..solvers.normal.uniqueness import PMatrix, p_matrix
 from .boundary_mesh import BoundaryMesh
 from .energetic import summed
 from .poincare_steklov import CondensedCompliance
@@ -87,7 +87,8 @@ class BoundaryContact:
     obstacle; conditions: None for one per contact node. Points with two conditions do not rub.
 
     Raises InputError for a contact boundary that turns by more than 30° where the obstacle follows it and no conditions
-    are given, for a symmetric compliance W[0] that is not positive definite and any that is singular, supports that hold a contact direction, and bodies that penetrate their obstacle.
+    are given, for a symmetric compliance W[0] that is not positive definite and any that is singular, supports that
+    hold a contact direction, and bodies that penetrate their obstacle.
     """
 
     compliance: CondensedCompliance
@@ -204,12 +205,11 @@ class BoundaryContact:
     @cached_property
     def symmetric(self) -> bool:
         """Tell whether W[0] is: that of the unsymmetric Poincaré-Steklov operator is not."""
-        return bool(np.abs(self.W[0] - self.W[0].T).max() <= ASYMMETRIC * np.abs(self.W[0]).max())
+        return max_abs(self.W[0] - self.W[0].T) <= ASYMMETRIC * max_abs(self.W[0])
 
     @cached_property
     def p_matrix(self) -> PMatrix:
-        """Tell whether the step matrix, W[0] of the contact unknowns, is one: a step, or one of given limits of
-        friction, then has one solution."""
+        """Tell whether the step matrix, W[0] of contact, is one: steps then have one solution, see there."""
         rows = np.arange(self.free.sum()) if self.frictional else self.surface.owned
         return p_matrix(self.W[0][np.ix_(rows, rows)])
 

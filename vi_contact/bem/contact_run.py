@@ -21,8 +21,8 @@ from .poincare_steklov import work
 def march_contact(
     contact: BoundaryContact, *, solver: Condensed | None = None, tolerance: float = TOLERANCE
 ) -> "ContactRun":
-    """March through all steps of the compliance; ``solver``: Condensed with any of its methods, by default ActiveSet, or
-    Lemke where the compliance is not symmetric.
+    """March through all steps of the compliance; ``solver``: Condensed with any of its methods, by default ActiveSet,
+    or Lemke where the compliance is not symmetric.
 
     Raises StepFailure when a step's certificate exceeds ``tolerance``, with step, time and residuals.
     """

@@ -30,7 +30,7 @@ class Forms:
     must keep its values while the system is used: reactions and section forces integrate them again.
 
     Args:
-        stiffness: the form of K [N/m]. One that is not symmetric is for Volume() and Condensed(Lemke()), and has no energy.
+        stiffness: the form of K [N/m]. One that is not symmetric has no energy, and is for Volume() and Lemke().
         mass: the form of M [kg], symmetric and positive; None: the density of ``assemble(…, material)``.
         damping: the form of C [N s/m]; None: that of ``assemble(…, damping=)``, Rayleigh on these M and K, or
             KelvinVoigt; both add up.

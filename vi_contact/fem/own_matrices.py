@@ -33,7 +33,7 @@ def system_from_arrays(
 
     Args:
         M, C, K: (n, n), symmetric: mass [kg], M also (n,) where lumped; damping [N s/m] or None; stiffness [N/m]. C and
-            K that are not symmetric are for ``Volume()`` and ``Condensed(Lemke())``.
+            K that are not symmetric are for Volume() and Condensed(Lemke()).
         coordinates: (nodes, d) [m], d = 1, 2 or 3.
         unknowns: (n, 2) node and component 0, …, d - 1 of each row, component -1 for what is no displacement of a point
             (a rotation); None: row node * d + c is component c of the node. Components without a row stand still.
@@ -93,7 +93,7 @@ def own_system(
         algebra=algebra, M=M, C=matrices.get("C"), K=K, load=load, influence=influence[free], u0=u0[free],
         v0=v0[free], space=space, base_mass=np.column_stack(momenta),
         massless=massless if largest(comm, massless.any()) else None,
-        notes=tuple(f"{name} not symmetric: for Volume() and Condensed(Lemke()), and ½ uᵀKu is no energy" for name in skew),
+        notes=tuple(f"{name} not symmetric: for Volume() and Condensed(Lemke()); no energy ½ uᵀKu" for name in skew),
     ))
 
 

@@ -12,9 +12,12 @@ from .friction import RateIteration as RateIteration
 from .iterative import Iterative as Iterative
 from .normal import ActiveSet as ActiveSet
 from .normal import Hildreth as Hildreth
+from .normal import Lemke as Lemke
+from .normal import p_matrix as p_matrix
+from .normal import PMatrix as PMatrix
 from .volume import ReducedNewton as ReducedNewton
 from .volume import SemismoothNewton as SemismoothNewton
 from .volume import TaoTron as TaoTron
 from .volume import Volume as Volume
 
-__all__: list[str] = ['ActiveSet', 'Anderson', 'Automatic', 'Condensed', 'FixedPoint', 'FrictionNewton', 'GivenForces', 'Hildreth', 'Iterative', 'NSGS', 'Plain', 'RateIteration', 'ReducedNewton', 'SemismoothNewton', 'TaoTron', 'Volume']
+__all__: list[str] = ['ActiveSet', 'Anderson', 'Automatic', 'Condensed', 'FixedPoint', 'FrictionNewton', 'GivenForces', 'Hildreth', 'Iterative', 'Lemke', 'NSGS', 'PMatrix', 'Plain', 'RateIteration', 'ReducedNewton', 'SemismoothNewton', 'TaoTron', 'Volume', 'p_matrix']

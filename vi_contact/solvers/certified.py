@@ -81,7 +81,7 @@ def check_laws(owner: str, problem: ContactProblem, *, unsymmetric: bool = False
     surface, law = problem.surface, problem.friction
     if not unsymmetric and not problem.system.algebra.symmetric:
         raise InputError(f"{owner} needs symmetric matrices and those of the system are not: use "
-                         "solver=Condensed(Lemke()) or solver=Volume(), whose ReducedNewton and SemismoothNewton do not")
+                         "Condensed(Lemke()) or solver=Volume(), whose ReducedNewton and SemismoothNewton do not")
     if problem.frictional and surface.tangents.shape[1] == 0:
         raise InputError(f"{owner} would ignore {law}: a body in one dimension cannot slide, use Frictionless()")
     on_all(surface.comm, "the friction law", lambda: law.limit(np.zeros(surface.count), surface.weights, 1.0))

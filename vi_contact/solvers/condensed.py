@@ -51,10 +51,9 @@ class SmallMethod(Protocol):
 class Condensed:
     """Condense onto the contact unknowns, with a method for the small problem; with or without friction, on any ranks.
 
-    ``method`` solves it without friction: ActiveSet or Hildreth, or Lemke, which matrices that are not symmetric need.
-    ``friction_method`` solves it with friction: FrictionNewton, or for symmetric matrices NSGS, FixedPoint or
-    GivenForces; ``rates`` is the iteration around it for laws that depend on the slip rate. Contact sets too large for
-    a dense G are for ``Iterative``.
+    ``method`` solves it without friction: ActiveSet, Hildreth or Lemke. ``friction_method`` solves it with friction:
+    FrictionNewton, NSGS or FixedPoint or GivenForces; ``rates`` is the iteration around it for laws that depend on the
+    slip rate. Matrices that are not symmetric need Lemke. Contact sets too large for a dense G are for ``Iterative``.
     """
 
     method: SmallMethod = field(default_factory=ActiveSet)
@@ -68,8 +67,8 @@ class Condensed:
         instance("Condensed", "rates", self.rates, RateIteration, "give RateIteration()")
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for friction without a tangential direction, or of a wrong number of values, for more contact
-        unknowns than a dense matrix suits, and for matrices that are not symmetric unless the methods take them."""
+        """Raise InputError for friction without a tangential direction, or of a wrong number of values, for more
+        contact unknowns than a dense matrix suits, and matrices that are not symmetric unless the methods take them."""
         surface = problem.surface
         if problem.frictional:
             refuse_dense(f"Condensed() with {problem.friction}", surface.total * (1 + surface.tangents.shape[1]))

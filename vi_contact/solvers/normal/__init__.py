@@ -6,6 +6,6 @@ _CONTENTS = {
     "active_set": ("ActiveSet",),
     "hildreth": ("Hildreth",),
     "lemke": ("Lemke",),
-    "p_matrix": ("PMatrix", "p_matrix"),
+    "uniqueness": ("PMatrix", "p_matrix"),
 }
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

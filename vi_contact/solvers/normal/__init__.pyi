@@ -2,5 +2,8 @@
 # Made from __init__.py by docs/make_api.py, for checkers of types and editors.
 from .active_set import ActiveSet as ActiveSet
 from .hildreth import Hildreth as Hildreth
+from .lemke import Lemke as Lemke
+from .uniqueness import PMatrix as PMatrix
+from .uniqueness import p_matrix as p_matrix
 
-__all__: list[str] = ['ActiveSet', 'Hildreth']
+__all__: list[str] = ['ActiveSet', 'Hildreth', 'Lemke', 'PMatrix', 'p_matrix']

@@ -13,6 +13,7 @@ from ...core.algebra import Array, max_abs
 from .lcp import EPS, energy_scale, scaled_matrix
 
 MOST = 18  # rows: 2^18 pivots, a tenth of a second
+NONE = "is no P-matrix to rounding, a principal minor is not positive: contact may have no solution or several"
 
 
 @dataclass(frozen=True)
@@ -31,8 +32,7 @@ def p_matrix(G: Array) -> PMatrix:
     Schur complement of G_11 are.
     """
     if not (np.asarray(G.diagonal()) > 0.0).all() and np.isfinite(G).all():
-        return PMatrix(False, "is no P-matrix, an entry of its diagonal is not positive: contact may have no solution "
-                              "or several")
+        return PMatrix(False, NONE)
     matrix, norm = scaled_matrix(G, energy_scale(G), unsymmetric=True)
     if np.linalg.eigvalsh(0.5 * (matrix + matrix.T)).min(initial=1.0) > len(G) * EPS * norm:
         return PMatrix(True, "is a P-matrix, its symmetric part is positive definite: the solution is unique")
@@ -43,8 +43,7 @@ def p_matrix(G: Array) -> PMatrix:
     while parts.shape[1]:
         pivots = parts[:, 0, 0]
         if pivots.min() <= EPS * len(G) * max_abs(parts):
-            return PMatrix(False, "is no P-matrix, a principal minor is not positive: contact may have no solution "
-                                  "or several")
+            return PMatrix(False, NONE)
         rest, across = parts[:, 1:, 1:], parts[:, 1:, :1] * parts[:, :1, 1:]
         parts = np.concatenate([rest, rest - across / pivots[:, None, None]])
     return PMatrix(True, "is a P-matrix, all its principal minors are positive: the solution is unique")
