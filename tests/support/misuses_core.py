@@ -149,6 +149,7 @@ def values() -> Table:
         (vc.Condensed, {}, {"method": METHOD | {"with friction": solvers.NSGS(), "solver": vc.Condensed()},
                             "friction_method": METHOD | {"without": solvers.ActiveSet()}, "rates": METHOD}),
         (solvers.ActiveSet, {}, RULE),
+        (solvers.Lemke, {}, RULE),
         (solvers.Hildreth, {}, {"tolerance": POSITIVE, "max_sweeps": COUNT, "primal": FLAG, "record": FLAG}),
         (solvers.FrictionNewton, {}, RULE),
         (solvers.NSGS, {}, RULE),
