@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.algebra import Array, Mask
-from .problem import Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, Settings, iterated
+from .problem import Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, Settings
 
 
 @dataclass(frozen=True)
@@ -34,15 +34,22 @@ class NSGS(Settings):
         return PreparedFriction(self, self.tolerance, ScaledDelassus(G, bilateral), self._loop)
 
     def _loop(self, step: ScaledProblem, r: Array) -> Iterated:
-        return iterated(step, r, sweeper(step), self.tolerance, self.max_iterations)
+        sweep, history = sweeper(step), list[float]()
+        while step.unit > 0.0 and len(history) < self.max_iterations:
+            r = sweep(r)
+            residual = step.residual(r, step.w(r))
+            history.append(residual / step.unit)
+            if not np.isfinite(residual) or residual <= max(self.tolerance * step.unit, step.rounding(r)):
+                break
+        return r, len(history), history
 
 
-def sweeper(step: ScaledProblem) -> Callable[..., Array]:
+def sweeper(step: ScaledProblem) -> Callable[[Array], Array]:
     """Return one sweep: r -> r."""
     d, matrix = step.delassus.dimension, step.delassus.matrix
     nodes = [_Node(step, i) for i in range(step.count)]
 
-    def sweep(r: Array, w: Array | None = None) -> Array:  # w of r is not needed
+    def sweep(r: Array) -> Array:
         flat = r.copy().ravel()
         for i, node in enumerate(nodes):
             rows = slice(i * d, (i + 1) * d)

@@ -235,19 +235,3 @@ class PreparedFriction:
         step = self.delassus.problem(q, cohesion, slope)
         found = self.loop(step, step.start(guess if step.unit > 0.0 else None))
         return step.result(self.method, self.tolerance, found)
-
-
-def iterated(
-    step: ScaledProblem, r: Array, update: Callable[[Array, Array], Array], tolerance: float, most: int
-) -> Iterated:
-    """Update r <- update(r, w) until the residual, the history, is at ``tolerance`` or at rounding."""
-    w = step.w(r)
-    history: list[float] = []
-    while step.unit > 0.0 and len(history) < most:
-        r = update(r, w)
-        w = step.w(r)
-        residual = step.residual(r, w)
-        history.append(residual / step.unit)
-        if not np.isfinite(residual) or residual <= max(tolerance * step.unit, step.rounding(r)):
-            break
-    return r, len(history), history
