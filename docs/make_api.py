@@ -41,7 +41,7 @@ CONTRACT = (
     ("core.step", ("Scheme", "Solver", "PreparedSolver", "Recorder")),
     ("core.protocols", ("FrictionLaw", "ImpactLaw", "MassLaw", "Excitation")),
     ("core.obstacles", ("Obstacle",)),
-    ("core.companion", ("Companion",)),
+    ("core.system", ("Companion",)),
 )
 VALUES = (
     ("core.step", ("State", "StepProblem", "EffectiveMatrix", "StepResult", "Balance", "Report")),

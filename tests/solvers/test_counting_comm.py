@@ -29,7 +29,7 @@ from vi_contact.laws.mass import Redistributed
 from vi_contact.run.march import march
 from vi_contact.run.method import with_defaults
 from vi_contact.run.recorders import Energy, Steps
-from vi_contact.solvers.iterative.regime import KINDS
+from vi_contact.solvers.iterative.preconditioners import KINDS
 from vi_contact.solvers.iterative.route import PreparedIterative
 
 COMM = MPI.COMM_WORLD

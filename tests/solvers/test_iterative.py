@@ -18,9 +18,9 @@ from vi_contact.core.algebra import EffectiveMatrix, SerialAlgebra, SerialMatrix
 from vi_contact.core.errors import InputError, StepFailure
 from vi_contact.core.verify import kkt_residual
 from vi_contact.solvers import Iterative
-from vi_contact.solvers.iterative.failures import told
+from vi_contact.solvers.iterative.conjugate_gradients import told
 from vi_contact.solvers.iterative.layout import Nodewise
-from vi_contact.solvers.iterative.regime import KINDS, chosen, courant
+from vi_contact.solvers.iterative.preconditioners import KINDS, chosen, courant
 
 M = 8  # contact points of pushed_block
 HALF = np.array([0.3, 0.0] * 4)

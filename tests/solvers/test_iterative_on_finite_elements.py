@@ -20,8 +20,7 @@ from vi_contact import fem
 from vi_contact.core.verify import kkt_residual
 from vi_contact.solvers import Iterative
 from vi_contact.solvers.iterative.layout import Nodewise
-from vi_contact.solvers.iterative.preconditioners import rigid_modes
-from vi_contact.solvers.iterative.regime import KINDS
+from vi_contact.solvers.iterative.preconditioners import KINDS, rigid_modes
 from vi_contact.solvers.volume import ReducedNewton
 
 COMM = MPI.COMM_WORLD

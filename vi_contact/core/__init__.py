@@ -7,14 +7,13 @@ from .lazy import lazy
 
 _CONTENTS = {
     "certificate": ("Certificate",),
-    "companion": ("Companion",),
     "errors": ("InputError", "Interrupted", "OutOfTime", "StepFailure", "ViContactError"),
     "obstacles": ("AnalyticGap", "HalfSpace", "Obstacle", "Touching"),
     "problem": ("ContactProblem",),
     "protocols": ("Excitation", "Frictionless", "FrictionLaw", "ImpactLaw", "MassLaw"),
     "step": ("PreparedSolver", "Recorder", "Report", "Scheme", "Solver", "State", "StepProblem", "StepResult"),
     "surfaces": ("ContactSurface",),
-    "system": ("Load", "SemiDiscreteSystem"),
+    "system": ("Companion", "Load", "SemiDiscreteSystem"),
     "verify": ("energy_balance", "kkt_residual"),
 }
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)

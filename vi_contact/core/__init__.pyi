@@ -1,7 +1,6 @@
 # ruff: noqa
 # Made from __init__.py by docs/make_api.py, for checkers of types and editors.
 from .certificate import Certificate as Certificate
-from .companion import Companion as Companion
 from .errors import InputError as InputError
 from .errors import Interrupted as Interrupted
 from .errors import OutOfTime as OutOfTime
@@ -26,6 +25,7 @@ from .step import State as State
 from .step import StepProblem as StepProblem
 from .step import StepResult as StepResult
 from .surfaces import ContactSurface as ContactSurface
+from .system import Companion as Companion
 from .system import Load as Load
 from .system import SemiDiscreteSystem as SemiDiscreteSystem
 from .verify import energy_balance as energy_balance

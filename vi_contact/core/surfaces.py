@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from .algebra import Array, Comm, Indices, Mask, Matrix, SerialComm, largest, on_first, total
 from .checks import function, number, shown
-from .companion import Companion
 from .contact_last import at
 from .errors import InputError
+from .system import Companion
 
 log = logging.getLogger(__name__)
 Motion = Callable[[float], float | Array]

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from ..core.checks import instance
-from ..core.excitation_values import check_excitation, vector
+from ..core.protocols import check_excitation, vector
 from .record import Record
 
 

@@ -12,11 +12,10 @@ _CONTENTS = {
     "excitation": ("FullSine", "HalfSine", "Harmonic", "Rectangular", "Ricker", "Tabulated"),
     "friction": ("Coulomb", "ExponentialDecay", "SlipRateCoulomb", "StaticKinetic", "Tresca"),
     "impact": ("ComponentReset", "Elastic", "ImpulseUpdate", "Inelastic", "Newton"),
-    "kelvin_voigt": ("KelvinVoigt",),
     "mass": ("ConsistentMass", "Redistributed"),
     "materials": (
-        "DampingRatio", "LinearElastic", "MassProportional", "NoDamping", "PlaneStrain", "PlaneStress", "Rayleigh",
-        "Solid",
+        "DampingRatio", "KelvinVoigt", "LinearElastic", "MassProportional", "NoDamping", "PlaneStrain", "PlaneStress",
+        "Rayleigh", "Solid",
     ),
     "orthotropic": ("Orthotropic",),
     "weight": ("with_weight",),

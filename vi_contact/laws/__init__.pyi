@@ -16,10 +16,10 @@ from .impact import Elastic as Elastic
 from .impact import ImpulseUpdate as ImpulseUpdate
 from .impact import Inelastic as Inelastic
 from .impact import Newton as Newton
-from .kelvin_voigt import KelvinVoigt as KelvinVoigt
 from .mass import ConsistentMass as ConsistentMass
 from .mass import Redistributed as Redistributed
 from .materials import DampingRatio as DampingRatio
+from .materials import KelvinVoigt as KelvinVoigt
 from .materials import LinearElastic as LinearElastic
 from .materials import MassProportional as MassProportional
 from .materials import NoDamping as NoDamping

@@ -16,7 +16,7 @@ from typing import ClassVar
 
 from ..core.checks import number, optional
 from ..core.errors import InputError
-from ..core.excitation_values import check_excitation, finite_tuple, vector
+from ..core.protocols import check_excitation, finite_tuple, vector
 
 
 @dataclass(frozen=True)

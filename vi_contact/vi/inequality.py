@@ -1,27 +1,31 @@
 """Find u between bounds: F(u; v - u) >= 0 for all v with lower <= v <= upper, at the points of a Function's space.
 
-Newton's method (N. H. Josephy, 1979) solves F(u_k) + J(u_k) (u - u_k) in the place of F (``linear``) and goes towards
-the answer as far as makes the natural residual u - mid(lower, u - F/J_ii, upper) smaller by a part of what the slope
-promises. A linear problem takes one step.
+Newton's method (N. H. Josephy, 1979) solves F(u_k) + J(u_k) (u - u_k) in the place of F (``solve_linear``) and goes
+towards the answer as far as makes the natural residual u - mid(lower, u - F/J_ii, upper) smaller by a part of what the
+slope promises. A linear problem takes one step.
 """
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ..core.algebra import Array, lowest, max_abs, total
+from ..core.algebra import Array, EffectiveMatrix, lowest, max_abs, total
 from ..core.certificate import Certificate
 from ..core.checks import instance, whole
 from ..core.errors import StepFailure
+from ..core.matrix_checks import SYMMETRIC, asymmetry
+from ..core.step import StepProblem
+from ..core.surfaces import empty_surface
 from ..core.verify import ROUNDED
 from ..fem import compat
+from ..fem.communicators import MpiComm
 from ..fem.form_checks import refuse_complex
-from ..solvers.volume.route import Method, TaoTron, Volume
+from ..fem.petsc_algebra import PetscAlgebra, PetscMatrix, UnsymmetricAlgebra
+from ..solvers.volume.route import Method, ReducedNewton, SemismoothNewton, TaoTron, Volume
 from .forms import Problem, refused
-from .linear import solve_linear
 
 ARMIJO, HALVINGS = 1e-4, 12
 REFINEMENTS = 5  # of a linear problem, at most
@@ -151,3 +155,35 @@ def solve(
     pushes, seconds = [problem.spread(one) for one in best.push], time.process_time() - ready
     return Result(u, pushes[0], pushes[1], (active[0], active[1]), best.certificate, count, inner, used, reason,
                   {"setup": ready - start, "solve": seconds})
+
+
+def solve_linear(
+    settings: Volume, methods: Sequence[Method], A: PetscMatrix, b: Array, lower: Array, upper: Array, start: Array,
+    comm: MpiComm,
+) -> tuple[Array, int, str]:
+    """Return (x, iterations, name) of the first method that finds x, of those that suit A if none is given; StepFailure
+    with what all said. Every unknown is the one of a contact condition. Collective."""
+    numbers, tried = np.arange(A.rows), []
+    symmetric = asymmetry(A, comm, PetscAlgebra(comm.mpi).first(A.rows) + numbers) <= SYMMETRIC
+    if not methods:
+        methods = (TaoTron(), ReducedNewton()) if symmetric else (ReducedNewton(), SemismoothNewton())
+    elif isinstance(methods[0], TaoTron) and not symmetric:
+        raise refused(f"{methods[0]} minimises, and the form is not symmetric, so there is nothing to minimise: leave "
+                      "method out, or take ReducedNewton() or SemismoothNewton()")
+    bAb, bb, some = (total(comm, one) for one in (b @ (A @ b), b @ b, np.any(start)))
+    if bAb > 0.0 and not some:  # from nothing: along b as far as energy and bounds say, which tells the size of x
+        start = np.clip(bb / bAb * b, lower, upper)
+    zero, none = np.zeros(A.rows), np.zeros(A.rows, dtype=bool)
+    surface = replace(empty_surface(comm, 1), owned=numbers, gap0=zero, compliance=zero, bilateral=none)
+    matrix = EffectiveMatrix(A, (PetscAlgebra if symmetric else UnsymmetricAlgebra)(comm.mpi))
+    step = StepProblem(matrix, b, upper, surface, 1.0, start, none, 0.0, 0, lower=lower)
+    for method in methods:
+        solver = replace(settings, method=method).prepare(matrix, surface, 1.0)
+        try:
+            found = solver.solve(step)
+            return np.clip(found.x, lower, upper), found.iterations, type(method).__name__
+        except StepFailure as failure:
+            tried.append(str(failure))
+        finally:
+            solver.close()
+    raise StepFailure("; ".join(tried))

@@ -20,8 +20,8 @@ from ...core.checks import attributes
 from ...core.files import FIELDS, FIELDS_INDEX, frames_of, hdf5_atomically, on_root, open_hdf5, write_atomically
 from ...core.problem import ContactProblem
 from ...core.step import Report, State
-from ..matrix_space import MatrixSpace
 from ..nodal_space import NodalSpace
+from ..own_matrices import MatrixSpace
 
 log = logging.getLogger(__name__)
 

@@ -6,13 +6,14 @@ reaction there. To look at the signs costs no product, and to go on from a known
 solves for the correction.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
 
 from ...core.algebra import Array
+from ...core.errors import StepFailure
 from ..volume.snes import Lent, weakly
 from .operator import Operator
 from .preconditioners import Masked
@@ -20,6 +21,19 @@ from .preconditioners import Masked
 Watch = Callable[[int, Array, Callable[[], Array]], int]
 SOLVED, WRONG_SIGNS = 3, 2  # of PETSc's reasons: below an absolute, a relative tolerance
 STAGNATED, NOT_A_NUMBER, INDEFINITE = -3, -9, -10  # too many iterations; not a number; indefinite matrix
+HELD = ("check that every body is held or has mass, that A is positive definite, and that no material is a million "
+        "times stiffer than its neighbour")
+OTHER = "take another preconditioner, or Condensed() where a factor fits into memory"
+NUMBERS = "check the load, the guess and the bound of this step for NaN"
+SAID = {
+    STAGNATED: ("the residual stagnated", f"{HELD}; else {OTHER}"),
+    INDEFINITE: ("A is not positive definite", HELD),
+    NOT_A_NUMBER: ("the residual is not a number", NUMBERS),
+    WRONG_SIGNS: ("the contact set did not settle", OTHER),
+    -8: ("the preconditioner is not positive definite", OTHER),
+    -11: ("the preconditioner could not be applied", OTHER),
+}
+SHOWN = 6  # residuals
 
 
 class ConjugateGradients:
@@ -52,3 +66,17 @@ class ConjugateGradients:
     def _test(self, ksp: Any, iteration: int, _norm: float) -> int:
         ksp.buildResidual(self._residual)
         return self._watch(iteration, self._residual.array_r, lambda: self._start + ksp.getSolution().array_r)
+
+
+def stopped(name: str, reason: int, iterations: int, history: Sequence[float]) -> StepFailure:
+    """Return the failure of a solver that stopped for PETSc's ``reason``; ``history``: residuals over the forces."""
+    words, remedy = SAID.get(reason, ("conjugate gradients broke down", f"{HELD}; else {OTHER}"))
+    return StepFailure(f"{name} stopped after {iterations} linear iterations, {words} (residuals {told(history)}): "
+                       f"{remedy}")
+
+
+def told(history: Sequence[float]) -> str:
+    """Return the first residual, some, and the last."""
+    last = len(history) - 1
+    chosen = sorted({round(i * last / (SHOWN - 1)) for i in range(SHOWN)}) if last > 0 else range(len(history))
+    return ", ".join(f"{history[i]:.1e}" for i in chosen) or "none"

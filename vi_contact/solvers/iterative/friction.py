@@ -13,9 +13,8 @@ from ...core.errors import StepFailure
 from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
 from ...laws.friction import project
-from .conjugate_gradients import NOT_A_NUMBER
+from .conjugate_gradients import NOT_A_NUMBER, OTHER, SAID, told
 from .contact import Contact
-from .failures import OTHER, SAID, told
 from .friction_krylov import Gmres, Turned
 from .friction_laws import LawOfStep
 from .friction_states import Limits, States, Tangents

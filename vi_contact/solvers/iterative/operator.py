@@ -1,5 +1,6 @@
-"""Apply A, and the springs of closed points, to what PETSc hands over."""
+"""Apply A, and the springs of closed points, to what PETSc hands over, and count what the solver has done."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -7,7 +8,22 @@ from petsc4py import PETSc
 
 from ...core.algebra import Array, Indices
 from ..volume.snes import Lent
-from .work import Work
+
+
+@dataclass
+class Work:
+    """Hold sums since the solver was prepared.
+
+    ``linear_iterations`` of conjugate gradients, those of the fallback too, or of GMRES; ``newton_steps`` with
+    friction; ``products`` with A; ``renewals`` of the preconditioner after the first; ``fallbacks``: steps that ended
+    by projected gradients, or with limits of friction given for some rounds.
+    """
+
+    linear_iterations: int = 0
+    newton_steps: int = 0
+    products: int = 0
+    renewals: int = 0
+    fallbacks: int = 0
 
 
 class Operator:

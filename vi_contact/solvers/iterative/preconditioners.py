@@ -25,9 +25,11 @@ from ...laws.mass_transfer import rigid_motions
 from ..volume.failures import last_line
 from ..volume.options import OptionLayers, Options
 from .layout import Layout, Nodewise
-from .regime import GAMG, ICC, JACOBI
-from .work import Work
+from .operator import Work
 
+JACOBI, ICC, GAMG = "jacobi", "icc", "gamg"
+KINDS = (JACOBI, ICC, GAMG)
+SMALL, LARGE = 0.5, 30.0  # Courant numbers; CHOSEN: docs/guide/solvers.md has what was measured
 DRIFT = 0.1  # of the contact set that may move before GAMG is renewed
 RENEWALS = 4  # in a step, at most
 RAISED = 0.5  # of the diagonal, for factors that were not positive definite; CHOSEN: docs/guide/solvers.md
@@ -37,6 +39,33 @@ DEFAULTS: dict[str, Options] = {
     GAMG: {"pc_type": "gamg", "pc_gamg_threshold": 0.01, "pc_gamg_reuse_interpolation": True},
 }
 OVERLAP: Options = {"pc_type": "asm", "pc_asm_type": "basic"}  # of one layer
+
+
+def courant(A: EffectiveMatrix) -> float:
+    """Return C; NaN when A does not know what inertia is in it. Collective.
+
+    With A = m M + c C + k K the number
+
+        C² = sum (A_ii - m M_ii) / sum m M_ii
+
+    compares stiffness and inertia of the diagonal over all unknowns. On uniform meshes it is 0.7 (hexahedra) to 1.0
+    times (tetrahedra) the Courant number c_p dt / h of the trapezoidal rule, infinite in statics, and needs no cells.
+    """
+    if A.inertia is None:
+        return float("nan")
+    factor, M = A.inertia
+    diagonal = float(np.sum(A.matrix.diagonal()))
+    mass = factor * float(np.sum(M.diagonal())) if factor else 0.0
+    total, inertia = A.algebra.comm.sum(np.array([diagonal, mass]))
+    return float(np.sqrt(max(total - inertia, 0.0) / inertia)) if inertia > 0.0 else float("inf")
+
+
+def chosen(number: float, modes: bool) -> str:
+    """Return the preconditioner for a Courant number: Jacobi up to 0.5, ICC up to 30 or where it is not known, GAMG
+    beyond. ``modes``: whether rigid motions are known, without which GAMG is no use."""
+    if number <= SMALL:
+        return JACOBI
+    return GAMG if number > LARGE and modes else ICC
 
 
 def defaults(kind: str, ranks: int) -> Options:

@@ -25,18 +25,15 @@ from ...core.surfaces import ContactSurface
 from ..certified import check_laws
 from ..volume.failures import raised
 from ..volume.options import OptionLayers
-from .conjugate_gradients import SOLVED, WRONG_SIGNS, ConjugateGradients
+from .conjugate_gradients import SOLVED, WRONG_SIGNS, ConjugateGradients, stopped
 from .contact import Contact
-from .failures import stopped
 from .friction import Friction
 from .layout import Nodewise
 from .measures import Worth
-from .operator import Operator
-from .preconditioners import RAISED, Inverse, Masked, Multigrid, defaults
+from .operator import Operator, Work
+from .preconditioners import GAMG, ICC, KINDS, RAISED, Inverse, Masked, Multigrid, chosen, courant, defaults
 from .projected_gradients import largest_eigenvalue, projected_gradients
-from .regime import GAMG, ICC, KINDS, chosen, courant
 from .search import Search, search
-from .work import Work
 
 log = logging.getLogger(__name__)
 AUTO = "auto"

@@ -2,9 +2,5 @@
 
 from ...core.lazy import lazy
 
-_CONTENTS = {
-    "route": ("Volume",),
-    "snes": ("ReducedNewton", "SemismoothNewton"),
-    "tao": ("TaoTron",),
-}
+_CONTENTS = {"route": ("Volume",), "snes": ("ReducedNewton", "SemismoothNewton"), "tao": ("TaoTron",)}
 __all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)
