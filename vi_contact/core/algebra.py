@@ -136,10 +136,8 @@ class EffectiveMatrix:
     ``image(x)``: A x, made of products with M, C and K that others need too, where that is told.
     """
 
-    def __init__(
-        self, matrix: Matrix, algebra: Algebra, *, space: Any = None, inertia: tuple[float, Matrix] | None = None,
-        image: Callable[[Array], Array] | None = None,
-    ) -> None:
+    def __init__(self, matrix: Matrix, algebra: Algebra, *, space: Any = None,
+                 inertia: tuple[float, Matrix] | None = None, image: Callable[[Array], Array] | None = None) -> None:
         self.matrix = matrix
         self.algebra = algebra
         self.space, self.inertia = space, inertia

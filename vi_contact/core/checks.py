@@ -24,9 +24,8 @@ LARGEST = 50_000_000  # numbers in one array that an input may ask for: 400 MB
 MOST_CELLS = 20_000_000  # of a mesh made here: Gmsh takes some kilobytes for each
 
 
-def number(
-    owner: str, meaning: str, value: Any, *, positive: bool = False, not_negative: bool = False, unit: str = ""
-) -> float:
+def number(owner: str, meaning: str, value: Any, *, positive: bool = False, not_negative: bool = False,
+           unit: str = "") -> float:
     """Return a finite real number as a float; InputError for texts, NaN, infinity, truth values and wrong signs."""
     kind = "a finite number above zero" if positive else "zero or a positive finite number"
     wanted = (kind if positive or not_negative else "a finite number") + (f" in {unit}" if unit else "")
@@ -65,10 +64,8 @@ def counted(owner: str, asked: str, value: Any, things: str = "samples", *, most
     return int(value)
 
 
-def attributes(
-    owner: object, *, finite: tuple[str, ...] = (), positive: tuple[str, ...] = (), not_negative: tuple[str, ...] = (),
-    counts: tuple[str, ...] = (), flags: tuple[str, ...] = (),
-) -> None:
+def attributes(owner: object, *, finite: tuple[str, ...] = (), positive: tuple[str, ...] = (),
+               not_negative: tuple[str, ...] = (), counts: tuple[str, ...] = (), flags: tuple[str, ...] = ()) -> None:
     """Raise InputError naming the first attribute of ``owner`` that is not a finite number, or not > 0, or not >= 0, or
     no whole number of at least 1 (``counts``), or neither True nor False (``flags``)."""
     what = type(owner).__name__
@@ -115,9 +112,8 @@ def instance(owner: str, meaning: str, value: Any, kinds: type | tuple[type, ...
     raise InputError(f"{owner}: {meaning} is {shown(value)}; {_called(value)}{remedy}")
 
 
-def provides(
-    owner: str, meaning: str, value: Any, names: tuple[str, ...], remedy: str, *, lacks: tuple[str, ...] = ()
-) -> Any:
+def provides(owner: str, meaning: str, value: Any, names: tuple[str, ...], remedy: str, *,
+             lacks: tuple[str, ...] = ()) -> Any:
     """Return an object with these attributes (a protocol's) and without those of other kinds; else InputError."""
     fits = all(hasattr(value, name) for name in names) and not any(hasattr(value, name) for name in lacks)
     if fits and not isinstance(value, type):

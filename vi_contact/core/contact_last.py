@@ -34,10 +34,8 @@ class ContactLast:
     of c are in the order of ``last``. ``corner``: L_cc, lower triangular.
     """
 
-    def __init__(
-        self, library: Any, A: sp.csr_matrix, last: Indices, *, whole: Callable[[Array], Array] | None = None,
-        mine: slice = slice(None),
-    ) -> None:
+    def __init__(self, library: Any, A: sp.csr_matrix, last: Indices, *, whole: Callable[[Array], Array] | None = None,
+                 mine: slice = slice(None)) -> None:
         """Factorise; ArithmeticError when A is not positive definite, or too large for 32 bits."""
         self._library, self._whole, self._mine = library, whole, mine
         self.rows, A = A.shape[0], _readable(A)

@@ -7,9 +7,8 @@ from types import ModuleType
 from typing import Any
 
 
-def lazy(
-    package: str, contents: Mapping[str, Sequence[str]]
-) -> tuple[list[str], Callable[[str], Any], Callable[[], list[str]]]:
+def lazy(package: str,
+         contents: Mapping[str, Sequence[str]]) -> tuple[list[str], Callable[[str], Any], Callable[[], list[str]]]:
     """Return ``__all__``, ``__getattr__``, ``__dir__`` of a package (PEP 562): module -> names."""
     home = {name: module for module, names in contents.items() for name in names}
     public = sorted(home)

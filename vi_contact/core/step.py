@@ -268,9 +268,8 @@ class Recorder(Protocol):
         Names are made of letters, digits and underscores; no two recorders of a run have one in common.
         """
 
-    def start(
-        self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
-    ) -> Mapping[str, Any]:
+    def start(self, problem: ContactProblem, state: State,
+              resumed: Mapping[str, float] | None = None) -> Mapping[str, Any]:
         """Return the row of the initial ``state`` of ``problem``; forget whatever an earlier run has left.
 
         ``resumed``: the last row of the run that a restart continues, from which sums over time go on; else None.

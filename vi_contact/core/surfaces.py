@@ -196,10 +196,8 @@ class ContactSurface:
             function("moving", name, way, "give a function of the time t [s] that returns metres")
             return lambda t: _spread(name, way(t), shape, t)
 
-        return replace(
-            self, motion=None if towards is None else spread("towards", towards, (self.count,)),
-            slide=None if along is None else spread("along", along, (self.count, self.tangents.shape[1])),
-        )
+        return replace(self, motion=None if towards is None else spread("towards", towards, (self.count,)),
+                       slide=None if along is None else spread("along", along, (self.count, self.tangents.shape[1])))
 
     def bilateral_everywhere(self) -> "ContactSurface":
         """Return the bilateral comparison case: every point stays on the obstacle."""
@@ -291,8 +289,7 @@ def tangential_columns(column: Indices, d: int) -> Indices:
 def empty_surface(comm: Comm, dimension: int) -> ContactSurface:
     """Return a surface without any contact: the linear comparison case."""
     none = np.zeros(0, dtype=np.int64)
-    return ContactSurface(
-        comm=comm, points=np.zeros((0, dimension)), normals=np.zeros((0, dimension)), weights=np.zeros(0),
-        gap0=np.zeros(0), bilateral=np.zeros(0, dtype=bool), compliance=np.zeros(0), owned=none, slots=none,
-        tangents=np.zeros((0, max(dimension - 1, 0)), dtype=np.int64),
-    )
+    return ContactSurface(comm=comm, points=np.zeros((0, dimension)), normals=np.zeros((0, dimension)),
+                          weights=np.zeros(0), gap0=np.zeros(0), bilateral=np.zeros(0, dtype=bool),
+                          compliance=np.zeros(0), owned=none, slots=none,
+                          tangents=np.zeros((0, max(dimension - 1, 0)), dtype=np.int64))

@@ -293,11 +293,10 @@ class SemiDiscreteSystem:
 
     def _in_unknowns(self, T: Matrix, inverse: Callable[[Array], Array]) -> "SemiDiscreteSystem":
         turn = self.algebra.congruence
-        return self.changed(
-            M=turn(T, self.M), C=None if self.C is None else turn(T, self.C), K=turn(T, self.K),
-            load=self.load.in_basis(T), influence=_columns(self.influence, inverse),
-            base_mass=_columns(self.base_mass, T.transpose_apply), u0=inverse(self.u0), v0=inverse(self.v0),
-        )
+        return self.changed(M=turn(T, self.M), C=None if self.C is None else turn(T, self.C), K=turn(T, self.K),
+                            load=self.load.in_basis(T), influence=_columns(self.influence, inverse),
+                            base_mass=_columns(self.base_mass, T.transpose_apply), u0=inverse(self.u0),
+                            v0=inverse(self.v0))
 
 
 def _columns(values: Array | None, apply: Callable[[Array], Array]) -> Array | None:

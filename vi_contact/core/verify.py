@@ -25,9 +25,8 @@ def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
     return _judged(step, result, _sizes(step, result)[0])
 
 
-def kkt_residuals(
-    many: StepProblem, result: StepResult, own: Callable[[int], tuple[StepProblem, StepResult]]
-) -> list[Certificate]:
+def kkt_residuals(many: StepProblem, result: StepResult,
+                  own: Callable[[int], tuple[StepProblem, StepResult]]) -> list[Certificate]:
     """Return the certificate of each of several steps on one rank, whose rows these hold; ``own`` makes one of each."""
     rubs, rows = many.slip0 is not None, enumerate(_sizes(many, result))
     return [_judged(*(own(row) if rubs else (many, result)), sizes) for row, sizes in rows]
@@ -49,9 +48,8 @@ def _sizes_compiled(step: StepProblem, result: StepResult, Ax: Array, functions:
     return np.asarray(kept[-1])
 
 
-def _places(
-    desk: dict[Any, tuple[list[Any], list[Any]]], counts: tuple[int, ...], arrays: tuple[Any, ...]
-) -> tuple[list[Any], list[Any]]:
+def _places(desk: dict[Any, tuple[list[Any], list[Any]]], counts: tuple[int, ...],
+            arrays: tuple[Any, ...]) -> tuple[list[Any], list[Any]]:
     """Where compiled functions find the arrays, room and sizes, and what lies there, of their types and sizes whatever
     a solver gave: copies on the desk where they are small, which takes less than to ask numpy where an array lies."""
     shapes = tuple([None if one is None else one.shape for one in arrays])
@@ -177,10 +175,8 @@ def _dots(system: SemiDiscreteSystem, *pairs: tuple[Array, Array], sums: tuple[f
     return found if comm.size == 1 else comm.sum(np.array(found)).tolist()
 
 
-def energy_balance(
-    problem: ContactProblem, old: State, new: State, balance: Balance, *, before: Energies | None = None,
-    after: Energies | None = None,
-) -> StepEnergy:
+def energy_balance(problem: ContactProblem, old: State, new: State, balance: Balance, *, before: Energies | None = None,
+                   after: Energies | None = None) -> StepEnergy:
     """Return the ledger of a step before the impact law, for any scheme.
 
     The step satisfied M a + C v + K u = f - B_nᵀ r_n - B_tᵀ r_t with the averages of ``balance``. Times the increment
@@ -204,10 +200,8 @@ def energy_balance(
         sums=(rubbing, pushed, dragged, 0.0 if system.C is None else float(du.dot(system.product("C", balance.v)))),
     )
     rubbing, pushed, dragged, damping = local
-    return StepEnergy(
-        change=after.total - before.total, input=work + pushed + dragged, damping=damping, contact=lost + pushed,
-        friction=rubbing + dragged, algorithmic=inertia - kinetic + stiffness,
-    )
+    return StepEnergy(change=after.total - before.total, input=work + pushed + dragged, damping=damping,
+                      contact=lost + pushed, friction=rubbing + dragged, algorithmic=inertia - kinetic + stiffness)
 
 
 def _obstacle_work(problem: ContactProblem, start: float, end: float, balance: Balance) -> tuple[float, float]:

@@ -45,14 +45,13 @@ LIGHTER = (
 
 
 @stage("assembling")
-def assemble(
-    mesh: Any, material: Materials | None = None, *, forms: Forms | None = None, section: Section | None = None,
-    clamped: Facets | Sequence[Facets] = (), prescribed: Prescribed | Sequence[Prescribed] = (),
-    tied: Tied | Sequence[Tied] = (), dashpots: Dashpots | Sequence[Dashpots] = (), loads: Loads = (),
-    damping: Damping | None = None, initial_displacement: Initial = None, initial_velocity: Initial = None,
-    base_inertia: bool = True, degree: int = 1, quadrature_degree: int | None = None, integration: str = "full",
-    space: Any = None, bcs: Any = (),
-) -> SemiDiscreteSystem:
+def assemble(mesh: Any, material: Materials | None = None, *, forms: Forms | None = None,
+             section: Section | None = None, clamped: Facets | Sequence[Facets] = (),
+             prescribed: Prescribed | Sequence[Prescribed] = (), tied: Tied | Sequence[Tied] = (),
+             dashpots: Dashpots | Sequence[Dashpots] = (), loads: Loads = (), damping: Damping | None = None,
+             initial_displacement: Initial = None, initial_velocity: Initial = None, base_inertia: bool = True,
+             degree: int = 1, quadrature_degree: int | None = None, integration: str = "full", space: Any = None,
+             bcs: Any = ()) -> SemiDiscreteSystem:
     """Assemble the system of a body, on the free unknowns.
 
     Args:
@@ -98,10 +97,9 @@ def assemble(
     mass = body.matrix("M")  # momenta, less M r: what accelerated prescribed nodes pull on the free ones
     momenta = [space.pull(PetscMatrix(mass) @ one) for one in space.translations] if base_inertia else []
     M, inertial = _reduced(mass, space, algebra, 2)
-    load = replace(
-        load, inertial=inertial, general=(*load.general, *pull, *(one for part in acting for one in part.elastic)),
-        viscous=(*viscous, *(one for part in acting for one in part.viscous)),
-    )
+    load = replace(load, inertial=inertial,
+                   general=(*load.general, *pull, *(one for part in acting for one in part.elastic)),
+                   viscous=(*viscous, *(one for part in acting for one in part.viscous)))
     system = floating(SemiDiscreteSystem(
         algebra=algebra, M=M, C=C, K=K, load=load, influence=rigid,
         base_mass=np.column_stack([one - M @ r for one, r in zip(momenta, rigid.T, strict=True)]) if momenta else None,
@@ -117,10 +115,8 @@ def assemble(
     return system
 
 
-def _space(
-    mesh: Any, given: tuple[Prescribed | GivenValues, ...], tied: tuple[Tied, ...], degree: int,
-    quadrature_degree: int | None, V: Any,
-) -> FemSpace:
+def _space(mesh: Any, given: tuple[Prescribed | GivenValues, ...], tied: tuple[Tied, ...], degree: int,
+           quadrature_degree: int | None, V: Any) -> FemSpace:
     """The space of the displacements."""
     optional(whole, "assemble", "quadrature_degree", quadrature_degree)
     space = FemSpace(mesh, given, tied, degree, V)
@@ -129,10 +125,8 @@ def _space(
     return space
 
 
-def _stated(
-    space: FemSpace, material: Materials | None, forms: Forms | None, section: Section, damping: Damping,
-    boundaries: tuple[Dashpots, ...], *, selective: bool,
-) -> ElasticForms:
+def _stated(space: FemSpace, material: Materials | None, forms: Forms | None, section: Section, damping: Damping,
+            boundaries: tuple[Dashpots, ...], *, selective: bool) -> ElasticForms:
     """The forms of the materials, or the user's own with those of the materials beside them."""
     materials = [] if material is None else cell_materials(space.mesh, material)
     if forms is None:
@@ -151,9 +145,8 @@ def _damper(forms: ElasticForms, absorbers: Sequence[DashpotMatrix]) -> Any:
     return as_petsc(PetscAlgebra(forms.space.mesh.comm).combine([(1.0, PetscMatrix(one)) for one in terms])).mat
 
 
-def _reduced(
-    full: Any, space: FemSpace, algebra: PetscAlgebra, derivative: int
-) -> tuple[PetscMatrix, tuple[Callable[[float], Array], ...]]:
+def _reduced(full: Any, space: FemSpace, algebra: PetscAlgebra,
+             derivative: int) -> tuple[PetscMatrix, tuple[Callable[[float], Array], ...]]:
     """(Pᵀ A P as the algebra stores it, the load of prescribed motions); the full matrix is destroyed."""
     moves = any(condition.moves for condition in space.prescribed)
     pull = (_prescribed_load(space, derivative, full),) if moves else ()

@@ -29,10 +29,8 @@ OWNER = "assemble"
 LOCKING = 0.495  # Poisson's ratio; CHOSEN: 0.49 is common for wet soil, 0.499 is 10 % to 40 % too stiff
 
 
-def check_body(
-    mesh: Any, material: Any, forms: Any, section: Any, damping: Any, base_inertia: Any, degree: Any = 1,
-    integration: Any = "full",
-) -> tuple[Section, Damping]:
+def check_body(mesh: Any, material: Any, forms: Any, section: Any, damping: Any, base_inertia: Any, degree: Any = 1,
+               integration: Any = "full") -> tuple[Section, Damping]:
     """Return (section, damping), the usual for None; InputError for objects of another kind, cells of another mesh."""
     instance(OWNER, "mesh", mesh, Mesh, "give a DOLFINx mesh, such as fem.read_mesh(path, comm)[0]")
     if mesh.topology.dim != mesh.geometry.dim:
@@ -94,18 +92,16 @@ def _check_degree(mesh: Mesh, degree: Any) -> None:
         raise InputError("assemble: the mesh has cells of an order above 2 or without all mid-points; mesh it with "
                          "complete cells of first or second order")
     size, det = ufl.TestFunction(compat.cell_space(mesh)), ufl.JacobianDeterminant(mesh)
-    signed, whole = (
-        compat.assemble_vector(compat.compile_form(one * size * ufl.dx)).array_r for one in (det / abs(det), 1.0)
-    )
+    signed, whole = (compat.assemble_vector(compat.compile_form(one * size * ufl.dx)).array_r
+                     for one in (det / abs(det), 1.0))
     folded = mesh.comm.allreduce(int(np.sum(np.abs(signed) < (1.0 - 1e-9) * whole)))
     if folded:
         raise InputError(f"assemble: {folded} curved cells of the mesh are folded, their Jacobian changes its sign; "
                          "mesh them finer, or with straight sides")
 
 
-def _check_integration(
-    mesh: Mesh, materials: Sequence[Any], section: Section, damping: Damping, degree: int, integration: Any
-) -> None:
+def _check_integration(mesh: Mesh, materials: Sequence[Any], section: Section, damping: Damping, degree: int,
+                       integration: Any) -> None:
     """Raise InputError for a word that is none, and where cells cannot or need not be integrated selectively."""
     check_word("integration of assemble", integration, ("full", "selective"))
     if integration == "full":

@@ -40,10 +40,8 @@ _defaults["timeout"] = (120, "Timeout for JIT compilation [s]")
 # Meshes ---------------------------------------------------------------------------------------------------------------
 
 
-def create_mesh(
-    comm: MPI.Comm, cell: str, cells: npt.NDArray[np.int64], x: npt.NDArray[np.float64],
-    destinations: tuple[Indices, Indices],
-) -> Mesh:
+def create_mesh(comm: MPI.Comm, cell: str, cells: npt.NDArray[np.int64], x: npt.NDArray[np.float64],
+                destinations: tuple[Indices, Indices]) -> Mesh:
     """Create a mesh of cells of first or second order, distributed as told.
 
     `cell` is a UFL name ("interval", "triangle", "quadrilateral", "tetrahedron", "hexahedron"). `cells`

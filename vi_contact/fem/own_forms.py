@@ -59,9 +59,8 @@ class OwnForms(ElasticForms):
     Its matrices are assembled and checked at once. InputError as for ``Forms``. Collective.
     """
 
-    def __init__(
-        self, space: FemSpace, given: Forms, materials: list[tuple[Any, Material]], section: Section, damping: Damping
-    ) -> None:
+    def __init__(self, space: FemSpace, given: Forms, materials: list[tuple[Any, Material]], section: Section,
+                 damping: Damping) -> None:
         super().__init__(space, materials, section, damping)
         if given.mass is None and not materials:
             raise InputError("assemble: forms=… have no mass; give Forms(…, mass=), or a material for its density")

@@ -22,10 +22,9 @@ from .nodal_space import NodalSpace, bounding_box, parts_of
 OWNER = "system_from_arrays"
 
 
-def system_from_arrays(
-    M: Any, C: Any, K: Any, *, coordinates: Any, unknowns: Any = None, clamped: Any = (),
-    load: Load | Sequence[float] | Array | None = None, u0: Any = None, v0: Any = None,
-) -> SemiDiscreteSystem:
+def system_from_arrays(M: Any, C: Any, K: Any, *, coordinates: Any, unknowns: Any = None, clamped: Any = (),
+                       load: Load | Sequence[float] | Array | None = None, u0: Any = None,
+                       v0: Any = None) -> SemiDiscreteSystem:
     """Make the system M u'' + C u' + K u = f of scipy or dense matrices, on one process, by numpy and scipy alone.
 
     ``contact_points`` makes contact for it. All that asks for no material works: every scheme and impact law, friction,
@@ -66,9 +65,8 @@ def _serial(name: str, value: Any) -> SerialMatrix:
     return SerialMatrix(sp.csr_matrix(value, dtype=float, copy=True))
 
 
-def own_system(
-    owner: str, algebra: Algebra, unsymmetric: Algebra, matrices: Mapping[str, Matrix], given: Mapping[str, Any]
-) -> SemiDiscreteSystem:
+def own_system(owner: str, algebra: Algebra, unsymmetric: Algebra, matrices: Mapping[str, Matrix],
+               given: Mapping[str, Any]) -> SemiDiscreteSystem:
     """Return the system of matrices M, K and perhaps C of one size and of what is given of this rank's rows and nodes,
     which is checked here. ``unsymmetric``: the algebra for C or K that are not symmetric. Collective."""
     comm, n = algebra.comm, matrices["K"].rows

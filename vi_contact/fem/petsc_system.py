@@ -20,10 +20,9 @@ from .petsc_rows import aij_of, rows_of
 OWNER = "system_from_matrices"
 
 
-def system_from_matrices(
-    M: Any, C: Any, K: Any, *, coordinates: Any, unknowns: Any = None, clamped: Any = (),
-    load: Load | Sequence[float] | Array | None = None, u0: Any = None, v0: Any = None,
-) -> SemiDiscreteSystem:
+def system_from_matrices(M: Any, C: Any, K: Any, *, coordinates: Any, unknowns: Any = None, clamped: Any = (),
+                         load: Load | Sequence[float] | Array | None = None, u0: Any = None,
+                         v0: Any = None) -> SemiDiscreteSystem:
     """Make the system M u'' + C u' + K u = f of PETSc matrices, on the ranks of these. Collective.
 
     The arguments are those of ``vc.system_from_arrays``, each rank giving them for the rows that it owns and for the

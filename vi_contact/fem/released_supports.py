@@ -28,9 +28,8 @@ log = logging.getLogger(__name__)
 BALANCED = 1e-6  # of the largest nodal force: what may be missing where nothing was released
 
 
-def release(
-    static: ContactProblem, state: State, problem: ContactProblem, *, earlier: Sequence[ContactProblem] = ()
-) -> tuple[ContactProblem, State]:
+def release(static: ContactProblem, state: State, problem: ContactProblem, *,
+            earlier: Sequence[ContactProblem] = ()) -> tuple[ContactProblem, State]:
     """Return (problem with the reactions of removed supports as forces, its first state at rest) after a static stage.
 
     ``state``: of ``static_equilibrium`` on ``static``; ``problem``: on the same mesh, with the same materials, loads
@@ -73,9 +72,8 @@ def same_supports(before: ContactProblem, problem: ContactProblem) -> bool:
     return True
 
 
-def started(
-    problem: ContactProblem, u0: Array, v0: Array, state: State, force: Array | float = 0.0
-) -> tuple[ContactProblem, State]:
+def started(problem: ContactProblem, u0: Array, v0: Array, state: State,
+            force: Array | float = 0.0) -> tuple[ContactProblem, State]:
     """Return the problem that begins with u0, v0 (its own unknowns) and has a constant force [N] more; that beginning
     with the contact of another state."""
     surface, system, load = problem.surface, problem.system, problem.system.load

@@ -92,10 +92,8 @@ class FemSpace(NodalSpace):
         unknowns: number of free unknowns on all ranks.
     """
 
-    def __init__(
-        self, mesh: Any, prescribed: Sequence[Prescribed | GivenValues], tied: Sequence[Tied] = (), degree: int = 1,
-        V: Any = None,
-    ) -> None:
+    def __init__(self, mesh: Any, prescribed: Sequence[Prescribed | GivenValues], tied: Sequence[Tied] = (),
+                 degree: int = 1, V: Any = None) -> None:
         self.mesh, self.degree = mesh, degree
         self.V = compat.vector_space(mesh, degree) if V is None else V
         self.comm: MpiComm = MpiComm(kept(mesh.comm))
@@ -132,10 +130,10 @@ class FemSpace(NodalSpace):
         degree = self.quadrature_degree
         if degree is None:
             return compat.compile_form(form)
-        return compat.compile_form(ufl.Form([
-            one if "quadrature_degree" in one.metadata()
-            else one.reconstruct(metadata={**one.metadata(), "quadrature_degree": degree}) for one in form.integrals()
-        ]))
+        integrals = [one if "quadrature_degree" in one.metadata()
+                     else one.reconstruct(metadata={**one.metadata(), "quadrature_degree": degree})
+                     for one in form.integrals()]
+        return compat.compile_form(ufl.Form(integrals))
 
     @property
     def translations(self) -> list[Array]:

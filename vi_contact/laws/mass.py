@@ -82,9 +82,7 @@ class Redistributed:
         for P in levels:  # the last one is applied to velocities first
             moved, load = algebra.congruence(P, moved), load.handed_over(P)
             C = None if C is None else algebra.congruence(P, C)
-        corrections = [
-            _inertia_correction(system, moved, body & inner, body, nodal) for body in _bodies(system, inner)
-        ]
+        corrections = [_inertia_correction(system, moved, body & inner, body, nodal) for body in _bodies(system, inner)]
         M = algebra.combine([(1.0, moved), *((1.0, correction) for correction in corrections)])
         massless = massless if system.massless is None else massless | system.massless
         return system.changed(M=M, C=C, load=load, massless=massless)

@@ -48,9 +48,8 @@ def from_neighbours(system: SemiDiscreteSystem, massless: Mask, contact: Mask, n
     return levels[::-1]
 
 
-def _rows(
-    system: SemiDiscreteSystem, left: Mask, donors: Mask, nodal: Array, *, exact: bool
-) -> tuple[Indices, sp.csr_matrix]:
+def _rows(system: SemiDiscreteSystem, left: Mask, donors: Mask, nodal: Array, *,
+          exact: bool) -> tuple[Indices, sp.csr_matrix]:
     """(numbers, rows of P) of those of the unknowns ``left`` that have neighbours among the donors; ``exact``: enough
     of them to keep every rigid motion. Collective."""
     asked = np.flatnonzero(left)
@@ -62,9 +61,8 @@ def _rows(
     directions, points = system.influence[asked], system.space.coordinates[asked]
     for rows in _alike(np.diff(fitted.indptr), enough):
         places = fitted.indptr[rows][:, None] + np.arange(fitted.indptr[rows[0] + 1] - fitted.indptr[rows[0]])
-        row, error = neighbours.fit(
-            fitted.indices[places], fitted.data[places], directions[rows], points[rows], turning=exact
-        )
+        row, error = neighbours.fit(fitted.indices[places], fitted.data[places], directions[rows], points[rows],
+                                    turning=exact)
         fitted.data[places] = row
         fits[rows] = True if not exact else error <= KEPT
     node = np.asarray(system.space.ids)[asked] // system.influence.shape[1]
@@ -113,9 +111,8 @@ class _Neighbours:
         found.sort_indices()
         return found
 
-    def fit(
-        self, used: Indices, weights: Array, directions: Array, points: Array, *, turning: bool
-    ) -> tuple[Array, Array]:
+    def fit(self, used: Indices, weights: Array, directions: Array, points: Array, *,
+            turning: bool) -> tuple[Array, Array]:
         """(rows R_i G⁻¹ w_J R_Jᵀ (n, k) on the ``used`` neighbours (n, k), how much of a rigid motion each loses); with
         ``turning`` False of translations only, which a single neighbour can tell."""
         offset = self.points[used] - points[:, None, :]
@@ -168,8 +165,6 @@ def named(system: SemiDiscreteSystem, columns: Indices) -> Indices:
 def rigid_motions(directions: Array, offset: Array) -> Array:
     """Return rows R of rigid motions (…, modes), d translations and the rotations, of directions (…, d) at offsets."""
     d = directions.shape[-1]
-    turns = [
-        directions[..., j] * offset[..., i] - directions[..., i] * offset[..., j]
-        for i in range(d) for j in range(i + 1, d)
-    ]
+    turns = [directions[..., j] * offset[..., i] - directions[..., i] * offset[..., j]
+             for i in range(d) for j in range(i + 1, d)]
     return np.concatenate([directions, np.stack(turns, axis=-1)] if turns else [directions], axis=-1)

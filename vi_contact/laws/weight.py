@@ -12,10 +12,8 @@ from ..core.units import STANDARD_GRAVITY
 from .free_motions import bodies_in
 
 
-def with_weight(
-    system: SemiDiscreteSystem, *, acceleration: float = STANDARD_GRAVITY, direction: tuple[float, ...] | None = None,
-    bodies: Sequence[int] | None = None,
-) -> SemiDiscreteSystem:
+def with_weight(system: SemiDiscreteSystem, *, acceleration: float = STANDARD_GRAVITY,
+                direction: tuple[float, ...] | None = None, bodies: Sequence[int] | None = None) -> SemiDiscreteSystem:
     """Return the same system under its own weight, f + M r g: whatever its materials and densities.
 
     acceleration: g [m/s²]; direction: where it acts, of length one, (0, -1) or (0, 0, -1) by default, in one dimension

@@ -63,11 +63,9 @@ def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float
     if problem.frictional:
         rate, sliding = surface.tangential_values(state.v), surface.sliding(state.t, state.t + dt)
         rate = rate if sliding is None else rate - sliding / dt
-    step = StepProblem(
-        A=mass_matrix(problem), b=force - springs, bound=np.where(resting, 0.0, np.inf), surface=rigid_part(surface),
-        scale=1.0, guess=np.zeros_like(force), active=resting, t=state.t, k=state.k, friction=problem.friction,
-        slip0=None if rate is None else -rate / dt, rate_factor=dt,
-    )
+    step = StepProblem(A=mass_matrix(problem), b=force - springs, bound=np.where(resting, 0.0, np.inf),
+                       surface=rigid_part(surface), scale=1.0, guess=np.zeros_like(force), active=resting, t=state.t,
+                       k=state.k, friction=problem.friction, slip0=None if rate is None else -rate / dt, rate_factor=dt)
     solver: PreparedSolver = problem.equations.cached(
         "resting contacts", lambda: solver_beside_steps(step.A, step.surface).prepare(step.A, step.surface, 1.0)
     )
@@ -107,11 +105,9 @@ def equilibrated(problem: ContactProblem, state: State) -> State:
     surface = problem.surface
     tangents = np.where(surface.tangents >= 0, place[surface.tangents], -1)
     surface = replace(surface, owned=place[surface.owned], tangents=tangents, basis=None, coupling=None, dual=None)
-    step = StepProblem(
-        A=A, b=load[layer], bound=surface.gap(state.t), surface=surface, scale=1.0, guess=state.u[layer],
-        active=state.active, t=state.t, k=state.k, friction=problem.friction,
-        slip0=problem.slip_origin(state.u, state.t, state.t),
-    )
+    step = StepProblem(A=A, b=load[layer], bound=surface.gap(state.t), surface=surface, scale=1.0, guess=state.u[layer],
+                       active=state.active, t=state.t, k=state.k, friction=problem.friction,
+                       slip0=problem.slip_origin(state.u, state.t, state.t))
     solver = solver_beside_steps(A, surface)
     result, _, _ = CertifiedSolver(problem, A, 1.0, [solver], TOLERANCE, surface=surface).solve(step)
     u = state.u.copy()

@@ -114,12 +114,10 @@ class AlphaStep(BalanceStep, ABC):
 def weighted(problem: ContactProblem, old: State, new: State, m: float, f: float, level: str = "") -> Balance:
     """Return 1 - m of the new and m of the old acceleration, 1 - f and f of all else; ``level``: of names in memory."""
     load, surface, r0 = problem.equations.load_at, problem.surface, old.memory[f"reaction{level}"]
-    return Balance(
-        u=(1.0 - f) * new.u + f * old.u, v=(1.0 - f) * new.v + f * old.v,
-        a=(1.0 - m) * new.memory[f"a{level}"] + m * old.memory[f"a{level}"],
-        f=(1.0 - f) * load(new.t) + f * load(old.t), r_n=(1.0 - f) * new.r_n + f * surface.normal_values(r0),
-        r_t=None if new.r_t is None else (1.0 - f) * new.r_t + f * surface.tangential_values(r0),
-    )
+    return Balance(u=(1.0 - f) * new.u + f * old.u, v=(1.0 - f) * new.v + f * old.v,
+                   a=(1.0 - m) * new.memory[f"a{level}"] + m * old.memory[f"a{level}"],
+                   f=(1.0 - f) * load(new.t) + f * load(old.t), r_n=(1.0 - f) * new.r_n + f * surface.normal_values(r0),
+                   r_t=None if new.r_t is None else (1.0 - f) * new.r_t + f * surface.tangential_values(r0))
 
 
 @dataclass(frozen=True)

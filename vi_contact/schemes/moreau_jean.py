@@ -106,12 +106,10 @@ class MoreauJean(SingleStep):
         closed = np.asarray((middle <= ROUND_OFF * size) | surface.bilateral)  # if nothing stops them; and held points
         sliding = surface.sliding(state.t, state.t + dt)
         slip = np.zeros((surface.count, surface.tangents.shape[1])) if sliding is None else sliding / dt
-        return StepProblem(
-            A=A, b=system.product("M", state.v) + dt * force,
-            bound=np.where(closed, self._target(problem, state, dt), np.inf), surface=surface, scale=dt, guess=state.v,
-            active=closed, t=state.t + dt, k=state.k + 1,
-            friction=problem.friction, slip0=slip if problem.frictional else None, rate_factor=1.0,
-        )
+        return StepProblem(A=A, b=system.product("M", state.v) + dt * force,
+                           bound=np.where(closed, self._target(problem, state, dt), np.inf), surface=surface, scale=dt,
+                           guess=state.v, active=closed, t=state.t + dt, k=state.k + 1, friction=problem.friction,
+                           slip0=slip if problem.frictional else None, rate_factor=1.0)
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
         """Return the state with u1 = u0 + dt v_θ."""

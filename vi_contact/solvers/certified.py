@@ -30,10 +30,8 @@ ADVICE = "try a smaller dt, another solver, or check the data of this time"
 class CertifiedSolver:
     """Try a solver and the methods to escalate to, all bound to one effective matrix; nothing uncertified leaves it."""
 
-    def __init__(
-        self, problem: ContactProblem, A: EffectiveMatrix, scale: float, solvers: Sequence[Solver], tolerance: float,
-        *, surface: ContactSurface | None = None, advice: str = ADVICE,
-    ) -> None:
+    def __init__(self, problem: ContactProblem, A: EffectiveMatrix, scale: float, solvers: Sequence[Solver],
+                 tolerance: float, *, surface: ContactSurface | None = None, advice: str = ADVICE) -> None:
         for solver in solvers:
             solver.check(problem)
         self._surface, self._A, self._scale, self._advice = surface or problem.surface, A, scale, advice

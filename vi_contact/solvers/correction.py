@@ -59,13 +59,11 @@ def left_over(step: StepProblem, answer: StepResult, share: float) -> StepProble
     """Return the step for d and q of the head of this file."""
     surface, x = step.surface, answer.x
     r_n, r_t = kept(step, answer, share)
-    return replace(
-        step, b=step.b - step.A.image(x) - surface.reaction_load(r_n, len(x), r_t),
-        bound=step.bound - surface.normal_values(x) + surface.compliance * r_n / step.scale, guess=np.zeros_like(x),
-        active=answer.active,
-        friction=step.friction if step.slip0 is None or share == 1.0 else Share(step.friction, share),
-        slip0=None if step.slip0 is None else step.slip0 - surface.tangential_values(x),
-    )
+    return replace(step, b=step.b - step.A.image(x) - surface.reaction_load(r_n, len(x), r_t),
+                   bound=step.bound - surface.normal_values(x) + surface.compliance * r_n / step.scale,
+                   guess=np.zeros_like(x), active=answer.active,
+                   friction=step.friction if step.slip0 is None or share == 1.0 else Share(step.friction, share),
+                   slip0=None if step.slip0 is None else step.slip0 - surface.tangential_values(x))
 
 
 def added(step: StepProblem, answer: StepResult, found: StepResult, share: float) -> StepResult:
@@ -73,9 +71,8 @@ def added(step: StepProblem, answer: StepResult, found: StepResult, share: float
     r_n, r_t = kept(step, answer, share)
     if found.r_t is not None:
         r_t = found.r_t if r_t is None else r_t + found.r_t
-    return replace(
-        found, x=answer.x + found.x, r_n=r_n + found.r_n, r_t=r_t, iterations=answer.iterations + found.iterations
-    )
+    return replace(found, x=answer.x + found.x, r_n=r_n + found.r_n, r_t=r_t,
+                   iterations=answer.iterations + found.iterations)
 
 
 def kept(step: StepProblem, answer: StepResult, share: float) -> tuple[Array, Array | None]:
@@ -91,10 +88,8 @@ def kept(step: StepProblem, answer: StepResult, share: float) -> tuple[Array, Ar
     return (1.0 - share) * r_n, (1.0 - share) * onto[:, None] * answer.r_t
 
 
-def corrected(
-    step: StepProblem, result: StepResult, certificate: Certificate, solve: Callable[[StepProblem], StepResult],
-    goal: float,
-) -> tuple[StepResult, Certificate]:
+def corrected(step: StepProblem, result: StepResult, certificate: Certificate,
+              solve: Callable[[StepProblem], StepResult], goal: float) -> tuple[StepResult, Certificate]:
     """Return the result after corrections that brought its certificate to the goal, or as near to it as they got."""
     for _ in range(ROUNDS):
         share = share_of(certificate.worst)

@@ -99,11 +99,9 @@ class Point:
         return False
 
 
-def solve(
-    form: Any, u: Any, *, lower: Any = None, upper: Any = None, bcs: Sequence[Any] = (), J: Any = None,
-    method: Method | None = None, petsc_options: Mapping[str, object | None] | None = None,
-    prefix: str = "vi_contact_vi_", tolerance: float = 1e-9, iterations: int = 50,
-) -> Result:
+def solve(form: Any, u: Any, *, lower: Any = None, upper: Any = None, bcs: Sequence[Any] = (), J: Any = None,
+          method: Method | None = None, petsc_options: Mapping[str, object | None] | None = None,
+          prefix: str = "vi_contact_vi_", tolerance: float = 1e-9, iterations: int = 50) -> Result:
     """Solve F(u; v - u) >= 0 for all v between the bounds; u holds the first guess, and the answer.
 
     ``form``: F(u; v) of UFL, linear or not in the Function u, or (a, L) for a(u, v) - L(v). ``lower``, ``upper``:
@@ -157,10 +155,8 @@ def solve(
                   {"setup": ready - start, "solve": seconds})
 
 
-def solve_linear(
-    settings: Volume, methods: Sequence[Method], A: PetscMatrix, b: Array, lower: Array, upper: Array, start: Array,
-    comm: MpiComm,
-) -> tuple[Array, int, str]:
+def solve_linear(settings: Volume, methods: Sequence[Method], A: PetscMatrix, b: Array, lower: Array, upper: Array,
+                 start: Array, comm: MpiComm) -> tuple[Array, int, str]:
     """Return (x, iterations, name) of the first method that finds x, of those that suit A if none is given; StepFailure
     with what all said. Every unknown is the one of a contact condition. Collective."""
     numbers, tried = np.arange(A.rows), []

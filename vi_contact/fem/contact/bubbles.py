@@ -87,9 +87,7 @@ def _integrals(x: Array) -> tuple[Array, Array]:
     return areas, areas[:, :, None] * np.linalg.solve(gram, products)
 
 
-def averaged(
-    space: FemSpace, facets: Facets, nodes: Nodes, share: sp.csr_matrix | None = None
-) -> tuple[Facing, ...]:
+def averaged(space: FemSpace, facets: Facets, nodes: Nodes, share: sp.csr_matrix | None = None) -> tuple[Facing, ...]:
     """Return the bubbles that displacements of conditions contain, none but in a hierarchy: -c_ik of this rank's nodes
     with conditions or, where these face ``nodes``, the same on every rank, with ``share``, share times c_ik.
 

@@ -251,7 +251,5 @@ def tell_corners(space: FemSpace, name: str, nodes: Nodes, slots: Indices, angle
     if space.comm.rank == 0 and len(numbers):
         some = points[np.argsort(numbers)[:NAMED]]
         places = ", ".join(at(point) for point in some) + (", …" if len(numbers) > NAMED else "")
-        log.info(
-            "'%s' turns by more than %.4g degrees at %d contact nodes, which have one condition for every face: %s",
-            name, np.degrees(angle), len(numbers), places,
-        )
+        log.info("'%s' turns by more than %.4g degrees at %d contact nodes, which have one condition for every face: "
+                 "%s", name, np.degrees(angle), len(numbers), places)

@@ -143,13 +143,11 @@ def surface_of(space: NodalSpace, parts: Sequence[NodalConditions], **data: Any)
     dual = _turn(space, frames.blocks, index) if largest(comm, frames.oblique) else None
     if space.hierarchy is not None:
         turn, dual = space.hierarchy.around(turn, turn if dual is None else dual)
-    return FemSurface(
-        comm=comm, points=frames.points, normals=frames.directions, owned=index[place, column], slots=slots,
-        tangents=np.where(frames.rubs, tangents, -1), basis=turn, dual=dual,
-        nodes=frames.numbers[place],
-        coupling=_coupling(space, parts, frames, index), space=space, parts=tuple(parts),
-        **{"bilateral": np.zeros(count, dtype=bool), "compliance": np.zeros(count)} | data,
-    )
+    return FemSurface(comm=comm, points=frames.points, normals=frames.directions, owned=index[place, column],
+                      slots=slots, tangents=np.where(frames.rubs, tangents, -1), basis=turn, dual=dual,
+                      nodes=frames.numbers[place], coupling=_coupling(space, parts, frames, index), space=space,
+                      parts=tuple(parts),
+                      **{"bilateral": np.zeros(count, dtype=bool), "compliance": np.zeros(count)} | data)
 
 
 def _turn(space: NodalSpace, blocks: Array, index: Indices) -> Matrix | None:
@@ -166,9 +164,8 @@ def _turn(space: NodalSpace, blocks: Array, index: Indices) -> Matrix | None:
     return space.algebra.local(*entries, values, n)
 
 
-def _coupling(
-    space: NodalSpace, parts: Sequence[NodalConditions], frames: NodalFrames, index: Indices
-) -> Matrix | None:
+def _coupling(space: NodalSpace, parts: Sequence[NodalConditions], frames: NodalFrames,
+              index: Indices) -> Matrix | None:
     """R with û = R ǔ: to the unknowns of a node that faces others, q_c·u = ǔ_c + q_c·(sum_j P_sj u_j + sum_k P_sk e_k).
 
     At nodes with several conditions each one's own vectors only are relative to what it faces.

@@ -38,10 +38,9 @@ log = logging.getLogger(__name__)
 
 
 @stage("contact")
-def contact_pair(
-    system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *, matching: Matching | None = None,
-    points: Sequence[Sequence[float]] | None = None, feature_angle: float = FEATURE_ANGLE,
-) -> ContactSurface:
+def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *, matching: Matching | None = None,
+                 points: Sequence[Sequence[float]] | None = None,
+                 feature_angle: float = FEATURE_ANGLE) -> ContactSurface:
     """Make the contact conditions between two boundaries of deformable bodies, or two faces of a crack.
 
     They are those of the nodes of side 1: its normals, weights (times the section's thickness) and forces; r_n /
@@ -152,9 +151,8 @@ def _by_face(faces: Sequence[tuple[Side, Array]], two: Side, matching: Matching,
     nodes = joined_nodes([nodes for nodes, _ in found])
     order = np.argsort(nodes.numbers, kind="stable") if len(found) > 1 else np.arange(len(nodes.numbers))
     P = sp.csr_matrix(sp.vstack([matched.P for _, matched in found]))
-    weights, overlap = (
-        np.concatenate([getattr(matched, name) for _, matched in found]) for name in ("weights", "overlap")
-    )
+    weights, overlap = (np.concatenate([getattr(matched, name) for _, matched in found])
+                        for name in ("weights", "overlap"))
     whole = Matched(np.arange(len(order)), P, weights, overlap)
     return replace(nodes, weights=weights).pick(order), whole.pick(order)
 
@@ -184,9 +182,8 @@ def _unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Mat
         raise InputError(f"contact node {at(nodes.points[lost[0]])} of '{name}' is clamped but faces a free node of "
                          f"'{two.name}': make '{two.name}' the first side, or clamp less")
     if clamped.all():
-        raise InputError(
-            f"no contact nodes: every node of '{name}' that faces '{two.name}' is clamped or on both sides; clamp less"
-        )
+        raise InputError(f"no contact nodes: every node of '{name}' that faces '{two.name}' is clamped or on both "
+                         "sides; clamp less")
     if clamped.any() and space.comm.rank == 0:
         log.info("%d clamped nodes of '%s' are left out of the contact", clamped.sum(), name)
     return np.asarray(~clamped)

@@ -18,10 +18,8 @@ from .nodes import Nodes
 OWNER = "contact_points"
 
 
-def contact_points(
-    system: SemiDiscreteSystem, nodes: Any, normals: Any, *, weights: Any = None, gap0: Any = None,
-    obstacle: Obstacle | None = None, opposite: Any = None,
-) -> ContactSurface:
+def contact_points(system: SemiDiscreteSystem, nodes: Any, normals: Any, *, weights: Any = None, gap0: Any = None,
+                   obstacle: Obstacle | None = None, opposite: Any = None) -> ContactSurface:
     """Make one contact condition gap0 - u·n >= 0 at each listed node, in this order; also node against node.
 
     All ranks give the same. Nodes at which the normal is oblique get frames of their own, and tangents for friction.

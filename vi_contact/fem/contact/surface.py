@@ -28,10 +28,9 @@ log = logging.getLogger(__name__)
 
 
 @stage("contact")
-def contact_surface(
-    system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obstacle | None = None,
-    points: Sequence[Sequence[float]] | None = None, feature_angle: float = FEATURE_ANGLE,
-) -> ContactSurface:
+def contact_surface(system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obstacle | None = None,
+                    points: Sequence[Sequence[float]] | None = None,
+                    feature_angle: float = FEATURE_ANGLE) -> ContactSurface:
     """Make the contact conditions of a boundary part, or only of listed points of it, as in case a of the wall.
 
     Nodal weights are ∫ phi_i times the section's thickness (so that r_n / weights is in Pa), nodal normals the
@@ -214,9 +213,8 @@ def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], nam
         if nodes.held[row].all():
             raise InputError(f"contact point {at(x)} is also clamped: leave it out, or clamp less")
         if row in rows:
-            raise InputError(
-                f"contact point {at(x)} is listed twice (nearest node {nodes.numbers[row]}): list each once"
-            )
+            raise InputError(f"contact point {at(x)} is listed twice (nearest node {nodes.numbers[row]}): list each "
+                             "once")
         rows.append(row)
     if not rows:
         raise InputError(f"no contact nodes: the list of contact points on '{name}' is empty")

@@ -18,10 +18,8 @@ from ..mesh import node_numbers
 from ..space import FemSpace
 
 
-def work_beyond(
-    space: FemSpace, crossed: Mask, level: Callable[[Array], Array], motion: Callable[[Array], Array],
-    density: Array | float, load: Traction | BodyForce | None,
-) -> Array:
+def work_beyond(space: FemSpace, crossed: Mask, level: Callable[[Array], Array], motion: Callable[[Array], Array],
+                density: Array | float, load: Traction | BodyForce | None) -> Array:
     """Return (motions, owned components) ∫ density motion·phi_i over parts of cells, or of the facets of a traction.
 
     The parts of ``crossed`` cells (local mask) where the ``level`` of points (…, d) is not positive. ``motion``: points

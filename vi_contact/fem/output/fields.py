@@ -57,11 +57,9 @@ class VonMises:
         return np.asarray(self._assembled(self._form).array_r / self._volume)
 
 
-_CELLS = {
-    (1, 2): "Polyline", (2, 3): "Triangle", (2, 4): "Quadrilateral", (3, 4): "Tetrahedron", (3, 8): "Hexahedron",
-    (1, 3): "Edge_3", (2, 6): "Triangle_6", (2, 9): "Quadrilateral_9", (3, 10): "Tetrahedron_10",
-    (3, 27): "Hexahedron_27",
-}
+_CELLS = {(1, 2): "Polyline", (2, 3): "Triangle", (2, 4): "Quadrilateral", (3, 4): "Tetrahedron", (3, 8): "Hexahedron",
+          (1, 3): "Edge_3", (2, 6): "Triangle_6", (2, 9): "Quadrilateral_9", (3, 10): "Tetrahedron_10",
+          (3, 27): "Hexahedron_27"}
 """XDMF's name of a cell by its dimension and number of nodes."""
 
 _VECTORS = ("u", "v", "a")
@@ -104,9 +102,8 @@ class Cells:
 class FrameWriter:
     """Write the frames of a run, so many in an HDF5 file."""
 
-    def __init__(
-        self, problem: ContactProblem, folder: Path, kept: Mapping[int, float], per_file: int, shown: Cells
-    ) -> None:
+    def __init__(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float], per_file: int,
+                 shown: Cells) -> None:
         space: Any = problem.system.space
         self._problem, self._space, self._folder, self._per_file = problem, space, folder, per_file
         self._names = _VECTORS + (_RUBBING if problem.frictional else ())
@@ -156,10 +153,8 @@ class FrameWriter:
     def write(self, state: State, acceleration: Array, report: Report | None = None) -> None:
         """Write a frame of state, acceleration of its step (both in the rotated basis) and report. Collective."""
         problem, space = self._problem, self._space
-        moving = [
-            space.expand(problem.cartesian(x), state.t, derivative)
-            for derivative, x in enumerate((state.u, state.v, acceleration))
-        ]
+        moving = [space.expand(problem.cartesian(x), state.t, derivative)
+                  for derivative, x in enumerate((state.u, state.v, acceleration))]
         von_mises = self._von_mises
         stress = None if von_mises is None else on_first(space.comm, self._cell_numbers, von_mises(moving[0]))
         slipping = np.zeros(problem.surface.count, dtype=bool)
@@ -207,10 +202,8 @@ class FrameWriter:
     def _write_index(self) -> None:
         """fields.xdmf with all complete frames."""
         frames = "".join(self._grid(k, t) for k, t in self._times.items())
-        text = (
-            '<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>\n'
-            f'<Grid Name="frames" GridType="Collection" CollectionType="Temporal">\n{frames}</Grid>\n</Domain></Xdmf>\n'
-        )
+        text = ('<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>\n<Grid Name="frames" GridType="Collection" '
+                f'CollectionType="Temporal">\n{frames}</Grid>\n</Domain></Xdmf>\n')
         write_atomically(self._folder / FIELDS_INDEX, text.encode())
 
     def _grid(self, k: int, t: float) -> str:

@@ -46,10 +46,8 @@ def as_function(problem: ContactProblem, state: State, name: str, *, continuous:
     return _function(problem, name, nodal_contact(problem, state, np.ones(len(state.r_n)))[0][:, 0])
 
 
-def read_function(
-    problem: ContactProblem, folder: str | Path, name: str, *, t: float | None = None, frame: int | None = None,
-    continuous: bool = False,
-) -> Any:
+def read_function(problem: ContactProblem, folder: str | Path, name: str, *, t: float | None = None,
+                  frame: int | None = None, continuous: bool = False) -> Any:
     """Return a frame in the folder of a run (``fields=fem.XDMF(…)``) as ``as_function`` returns a state.
 
     ``t``: its time [s]; ``frame``: its number in the order of time, 0 for the first and -1 for the last. The run may

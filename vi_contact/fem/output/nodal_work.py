@@ -62,10 +62,8 @@ class NodalWork:
         if self._gravity.shape != (space.dimension,):
             raise InputError(f"gravity has {self._gravity.size} components: give {space.dimension}")
         self._r, self._inside = compat.function(space.V), compat.function(compat.cell_space(space.mesh))
-        self._forms = [
-            space.compiled(space.forms.against(name, self._r, self._inside))
-            if name != "C" or space.forms.damped else None for name in ("K", "C", "M")
-        ]
+        self._forms = [space.compiled(space.forms.against(name, self._r, self._inside))
+                       if name != "C" or space.forms.damped else None for name in ("K", "C", "M")]
         g, mesh, h = ufl.TestFunction(space.V), space.mesh, space.forms.section.thickness
         self._load_forms = [  # their products with nodal values of the loads are rᵀf
             None if isinstance(load, LinearForm)

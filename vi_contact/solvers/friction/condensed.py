@@ -28,9 +28,8 @@ from .slip_rate import RateIteration
 class CondensedFriction:
     """Solve the small problem with friction of one A, condensed onto normal and tangential unknowns."""
 
-    def __init__(
-        self, method: FrictionMethod, condensed: Condensation, surface: ContactSurface, *, rates: RateIteration
-    ) -> None:
+    def __init__(self, method: FrictionMethod, condensed: Condensation, surface: ContactSurface, *,
+                 rates: RateIteration) -> None:
         self._surface, self._rates, self.condensed = surface, rates, condensed
         self._name = f"condensed {type(method).__name__}"
         self.delassus, d = condensed.flexibility, 1 + surface.tangents.shape[1]

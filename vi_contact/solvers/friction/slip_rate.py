@@ -40,10 +40,8 @@ class RateIteration:
         attributes(self, positive=("tolerance",), counts=("max_iterations",))
         accelerated("RateIteration", self.extrapolation)
 
-    def solve(
-        self, step: StepProblem, rest: FrictionLaw, mu: Array, solved: Callable[[Array, Any], Any],
-        slip: Callable[[Any], Array],
-    ) -> Any:
+    def solve(self, step: StepProblem, rest: FrictionLaw, mu: Array, solved: Callable[[Array, Any], Any],
+              slip: Callable[[Any], Array]) -> Any:
         """Iterate from mu, the coefficients of all conditions under the law at ``rest``; once for one without rates.
 
         ``solved``: the problem of given coefficients, starting from the last result, None at first; ``slip``: that of a

@@ -34,10 +34,8 @@ STEPS = 150  # of Newton
 class Friction:
     """Solve steps with friction of one A. ``last``: r_n (m,), r_t and slip (m, d - 1) of the answer before."""
 
-    def __init__(
-        self, surface: ContactSurface, contact: Contact, layout: Layout, diagonal: Array, operator: Operator,
-        inverse: Inverse, *, tolerance: float, patience: int, name: str,
-    ) -> None:
+    def __init__(self, surface: ContactSurface, contact: Contact, layout: Layout, diagonal: Array, operator: Operator,
+                 inverse: Inverse, *, tolerance: float, patience: int, name: str) -> None:
         self.comm: Comm = surface.comm
         self.surface, self.contact, self.layout, self.operator = surface, contact, layout, operator
         self.inverse, self.tolerance, self.name = inverse, tolerance, name
@@ -211,10 +209,8 @@ class Newton:
         there = (of.surface.tangents >= 0) & still[:, None]
         x[of.surface.tangents[there]] = self.slip0[there]
         slip = np.where(still[:, None], 0.0, self.slip)
-        result = StepResult(
-            x=x, r_n=self.r_n, active=contact.closed.copy(), iterations=self.steps, method=of.name, r_t=r_t,
-            history=tuple(self.history), aim=of.tolerance,
-        )
+        result = StepResult(x=x, r_n=self.r_n, active=contact.closed.copy(), iterations=self.steps, method=of.name,
+                            r_t=r_t, history=tuple(self.history), aim=of.tolerance)
         return result, (self.r_n, r_t, slip)
 
     def _stopped(self, words: str, remedy: str) -> StepFailure:

@@ -79,10 +79,8 @@ class States:
     Slip that turned back since ``before`` overshot, and sticks first. ``stuck``: points that stick, whatever y says.
     """
 
-    def __init__(
-        self, tangents: Tangents, limits: Limits, y: tuple[Array, Array], slip: Array, *,
-        before: "States | None" = None, stuck: Mask | None = None,
-    ) -> None:
+    def __init__(self, tangents: Tangents, limits: Limits, y: tuple[Array, Array], slip: Array, *,
+                 before: "States | None" = None, stuck: Mask | None = None) -> None:
         self._tangents = tangents
         y_n, y_t = y
         limit, size, c = limits(y_n), np.linalg.norm(y_t, axis=1), tangents.c

@@ -151,10 +151,8 @@ class PreparedIterative:
     def _friction(self) -> Friction:
         """The solver of steps with friction."""
         settings = self._settings
-        return Friction(
-            self._surface, self._contact, self._layout, self._diagonal, self._operator, self._inverse,
-            tolerance=settings.tolerance, patience=settings.patience, name=self._name,
-        )
+        return Friction(self._surface, self._contact, self._layout, self._diagonal, self._operator, self._inverse,
+                        tolerance=settings.tolerance, patience=settings.patience, name=self._name)
 
     @property
     def _name(self) -> str:
@@ -163,10 +161,8 @@ class PreparedIterative:
     def _solve(self, step: StepProblem) -> StepResult:
         settings, contact, layout = self._settings, self._contact, self._layout
         before = self.work.linear_iterations
-        of = Search(
-            step, layout.padded(step.b), contact, operator=self._operator, masked=self._masked, inverse=self._inverse,
-            worth=self._worth, tolerance=settings.tolerance, patience=settings.patience,
-        )
+        of = Search(step, layout.padded(step.b), contact, operator=self._operator, masked=self._masked,
+                    inverse=self._inverse, worth=self._worth, tolerance=settings.tolerance, patience=settings.patience)
         x, residual, changes, reason = search(of, self._cg, layout.padded(step.guess), settings.changes)
         if reason == WRONG_SIGNS:
             self.work.fallbacks += 1
@@ -176,7 +172,5 @@ class PreparedIterative:
         if reason != SOLVED:
             raise stopped(self._name, reason, self.work.linear_iterations - before, of.history)
         self._worth.keep()
-        return StepResult(
-            x=layout.stripped(x), r_n=contact.reactions(x, residual), active=contact.closed.copy(), iterations=changes,
-            method=self._name, aim=settings.tolerance,
-        )
+        return StepResult(x=layout.stripped(x), r_n=contact.reactions(x, residual), active=contact.closed.copy(),
+                          iterations=changes, method=self._name, aim=settings.tolerance)

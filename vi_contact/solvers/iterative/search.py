@@ -28,10 +28,8 @@ FALL = 0.1  # of the residual between two looks at the signs
 class Search:
     """Search the contact set of one step. ``history``: residuals over the forces, at every look."""
 
-    def __init__(
-        self, step: StepProblem, b: Array, contact: Contact, *, operator: Operator, masked: Masked, inverse: Inverse,
-        worth: Worth, tolerance: float, patience: int,
-    ) -> None:
+    def __init__(self, step: StepProblem, b: Array, contact: Contact, *, operator: Operator, masked: Masked,
+                 inverse: Inverse, worth: Worth, tolerance: float, patience: int) -> None:
         self.contact, self.operator, self.masked, self.inverse = contact, operator, masked, inverse
         self.comm: Comm = step.surface.comm
         self.b, self.tolerance, self.patience = b, tolerance, patience

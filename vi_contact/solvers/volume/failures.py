@@ -30,10 +30,8 @@ def stopped(method: str, reasons: type, reason: int, iterations: int, worst: flo
     """Return the failure of a solver that stopped with a reason <= 0."""
     name = name_of(reasons, reason)
     words = WORDS.get(name, "no convergence")
-    return StepFailure(
-        f"{method} stopped after {iterations} iterations with relative residual {worst:.2g}, {name} ({words}): "
-        f"{ADVICE.get(name, GENERAL_ADVICE)}"
-    )
+    return StepFailure(f"{method} stopped after {iterations} iterations with relative residual {worst:.2g}, {name} "
+                       f"({words}): {ADVICE.get(name, GENERAL_ADVICE)}")
 
 
 def raised(method: str, error: Any) -> StepFailure:

@@ -83,10 +83,8 @@ class VolumeFriction:
             history.append(change)
             limit = np.maximum(following(limit, new), 0.0)
             start = self._scaled.moved(found.state, found.slip, limit[mine])
-        raise StepFailure(
-            f"{self._name} stopped after {PROBLEMS} Tresca problems with a change of {history[-1]:.1e} of the friction "
-            "thresholds: take a smaller step of time or load, or use Condensed()"
-        )
+        raise StepFailure(f"{self._name} stopped after {PROBLEMS} Tresca problems with a change of {history[-1]:.1e} "
+                          "of the friction thresholds: take a smaller step of time or load, or use Condensed()")
 
     def _first(self, step: StepProblem, limit: Array) -> tuple[FrictionUnknowns, int]:
         """The guess, sliding as predicted, and no iterations; with disks the solution without friction, whose slip

@@ -71,10 +71,8 @@ class Volume:
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for friction that the method cannot carry, without a tangent, or of wrong length."""
         if problem.frictional and not self.method.carries_friction:
-            raise InputError(
-                f"Volume({self.method}) only enforces bounds on displacements and would ignore {problem.friction}: use "
-                "Volume(ReducedNewton()), or Condensed(), the condensed route"
-            )
+            raise InputError(f"Volume({self.method}) only enforces bounds on displacements and would ignore "
+                             f"{problem.friction}: use Volume(ReducedNewton()), or Condensed(), the condensed route")
         check_laws(f"Volume({self.method})", problem, unsymmetric=not isinstance(self.method, TaoTron))
 
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> "PreparedVolume":

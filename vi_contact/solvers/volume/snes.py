@@ -38,10 +38,8 @@ class SnesDriver:
 
     reasons = PETSc.SNES.ConvergedReason
 
-    def __init__(
-        self, scaled: ScaledStep, layers: OptionLayers, jacobian: "AssembledJacobian | FrictionJacobian", *,
-        snes_type: str, check: Callable[[Any, OptionLayers], None],
-    ) -> None:
+    def __init__(self, scaled: ScaledStep, layers: OptionLayers, jacobian: "AssembledJacobian | FrictionJacobian", *,
+                 snes_type: str, check: Callable[[Any, OptionLayers], None]) -> None:
         self._scaled, self._layers, self._jacobian = scaled, layers, jacobian
         self._y, self._F = jacobian.mat.createVecs()
         self._lower, self._upper = self._y.duplicate(), self._y.duplicate()

@@ -91,10 +91,8 @@ class TaoTron:
 
     def defaults(self, ranks: int) -> Options:
         """Return the options that come before the user's; PETSc has no incomplete Cholesky for several ranks."""
-        return {
-            "tao_gatol": 0.0, "tao_grtol": 0.0, "tao_gttol": 0.0, "tao_steptol": 0.0, "tao_max_it": 200,
-            "pc_type": "icc" if ranks == 1 else "bjacobi", "sub_pc_type": "icc",
-        }
+        return {"tao_gatol": 0.0, "tao_grtol": 0.0, "tao_gttol": 0.0, "tao_steptol": 0.0, "tao_max_it": 200,
+                "pc_type": "icc" if ranks == 1 else "bjacobi", "sub_pc_type": "icc"}
 
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> TaoDriver:
         """Return the TAO object."""
