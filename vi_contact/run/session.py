@@ -8,6 +8,7 @@ from contextlib import closing, suppress
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from signal import Signals
+from timeit import repeat
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -86,14 +87,10 @@ class Session:
         """Return what was asked for, for log and summary."""
         method, problem, solver = self.method, self.method.problem, self.method.solvers[0]
         return {
-            "scheme": repr(method.scheme),
-            "mass": repr(problem.mass),
+            "scheme": repr(method.scheme), "mass": repr(problem.mass),
             "solver": repr(solver if self.cross_check is None else getattr(solver, "primary", solver)),
-            "dt": described(method.dt),
-            "tolerance": method.tolerance,
-            "ranks": self._comm.size,
-            "unknowns": problem.system.space.unknowns,
-            "contact_points": problem.surface.total,
+            "dt": described(method.dt), "tolerance": method.tolerance, "ranks": self._comm.size,
+            "unknowns": problem.system.space.unknowns, "contact_points": problem.surface.total,
             "boundaries": list(problem.system.notes),
             "sampling": sampling_warning(problem.excitations, max(pieces_of(method.dt))[0]) or "",
         }
@@ -252,21 +249,15 @@ class Session:
 
     def _facts(self, status: str, reason: str, seconds: float) -> dict[str, Any]:
         """The content of summary.json."""
-        return (
-            {"status": status, "reason": reason, "versions": versions("h5py")}
-            | self.settings()
-            | {"restarted_from_step": self.resumed_from}
-            | self.table.facts()
-            | {
-                "base_steps": self.place.base,
-                "halved_steps": self.halved,
-                "cross_check": None if self.cross_check is None else self.cross_check.report(),
-                "seconds": seconds,
-                "memory": self.memory,
-                "seconds_per_step": float(np.median(list(self.seconds))) if self.seconds else float("nan"),
-                "seconds_per_linear_step": float("nan"),
-            }
-        )
+        return {
+            "status": status, "reason": reason, "versions": versions("h5py"), **self.settings(),
+            "restarted_from_step": self.resumed_from, **self.table.facts(), "base_steps": self.place.base,
+            "halved_steps": self.halved,
+            "cross_check": None if self.cross_check is None else self.cross_check.report(),
+            "seconds": seconds, "memory": self.memory,
+            "seconds_per_step": float(np.median(list(self.seconds))) if self.seconds else float("nan"),
+            "seconds_per_linear_step": float("nan"),
+        }
 
     def _seconds_per_linear_step(self) -> float:
         """Median time of right-hand side, one back-substitution and update with the same A, from the last state [s]."""
@@ -274,14 +265,13 @@ class Session:
             return float("nan")
         problem, scheme, dt, old, A = self.method.problem, self.method.scheme, self.dt, self.last.old, self.last.step.A
         none = np.zeros(problem.surface.count)
-        found = []
-        for _ in range(LINEAR_STEPS + 1):
-            begin = time.perf_counter()
+
+        def linear_step() -> None:
             step = scheme.step(problem, old, A, dt)
-            x = A.factor.solve(step.b)
-            scheme.finish(problem, old, step, StepResult(x, none, none.astype(bool), 0, "linear"), dt)
-            found.append(time.perf_counter() - begin)
-        return float(np.median(found[1:]))  # the first is slower
+            result = StepResult(A.factor.solve(step.b), none, none.astype(bool), 0, "linear")
+            scheme.finish(problem, old, step, result, dt)
+
+        return float(np.median(repeat(linear_step, number=1, repeat=LINEAR_STEPS + 1)[1:]))  # the first is slower
 
 
 def _locked(value: T) -> T:

@@ -1,5 +1,6 @@
 """Hold what a run leaves behind: histories, the final state and a summary in figures."""
 
+import tomllib
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from ..core.step import Columns, State
 from ..ground_motion.excitation import GroundMotion
 from .files.table import LEDGER
 
+_LINES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 CREATED = 0.01  # of the largest energy: more than schemes without a fault gain at sensible time steps
 
 
@@ -99,41 +101,22 @@ def sampling_warning(excitations: Sequence[Excitation], dt: float) -> str | None
 
 def _entries(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     """(name, value) of every line of the summary; those without a name are whole lines."""
-    iterations, warning, dt = facts["iterations_per_step"], energy_warning(facts), facts["dt"]
-    length = f"({facts['base_steps']} base steps of {dt})" if isinstance(dt, str) else f"of {dt:g} s"
-    lines = [
-        ("", f"run {facts['status']}: {facts['steps']} steps {length}, "
-             f"t = {facts['t_start']:g} to {facts['t_end']:g} s, on {facts['ranks']} rank(s)"),
-        ("scheme", facts["scheme"]),
-        ("mass matrix", facts["mass"]),
-        ("solver", shorten(facts["solver"], 88, placeholder=" …")),
-        ("unknowns, contact points", f"{facts['unknowns']}, {facts['contact_points']}"),
-        ("iterations per step", f"{iterations['mean']:.2f} on average, {iterations['max']} at most"),
-        ("worst certificate", f"{facts['worst_certificate']:.2e}"),
-        ("escalated steps", str(facts["escalated_steps"])),
-    ]
-    if facts["halved_steps"]:
-        lines.append(("halved steps", str(facts["halved_steps"])))
-    if "steps_in_contact" in facts:
-        uplift = f"largest uplift {facts['largest_uplift']:.3f}"
-        lines.append(("steps in contact", f"{facts['steps_in_contact']}, {uplift}"))
-        lines.append(("smallest gap", f"{facts['smallest_gap']:.3e} m"))
-    for method, difference in (facts["cross_check"] or {}).items():
-        values = ", ".join(f"{name} {value:.2e}" for name, value in difference.items())
-        lines.append((f"cross-check {method}", values))
-    if "energy" in facts:
-        lines.append(("", "  energy ledger [J]"))
-        lines.append(("  energy at the start", f"{facts['energy']['energy_start']: .6e}"))
-        lines += [(f"  {title}", f"{facts['energy'][name]: .6e}") for name, title in LEDGER[:-1]]
-        lines.append(("  defect, relative", f"{facts['energy_defect']: .2e}"))
-    for one in filter(None, (warning, facts.get("sampling"))):
-        told = wrap(f"WARNING: {one}", 110, initial_indent="  ", subsequent_indent="  ")
-        lines += [("", text) for text in told]
-    if np.isfinite(facts["seconds_per_step"]):
-        mean, plain = facts["seconds_per_step"], facts["seconds_per_linear_step"]
-        ratio = f", plain linear step {plain:.3e} s, ratio {mean / plain:.2f}" if np.isfinite(plain) else ""
-        extra = " (with records, output and the cross-check)" if facts["cross_check"] else " (with records and output)"
-        lines.append(("wall time per step", f"{mean:.3e} s{ratio}{extra}"))
-    if facts["reason"]:
-        lines.append(("reason", facts["reason"]))
-    return lines
+    dt, mean, plain = facts["dt"], facts["seconds_per_step"], facts["seconds_per_linear_step"]
+    ratio = f", plain linear step {plain:.3e} s, ratio {mean / plain:.2f}" if np.isfinite(plain) else ""
+    told = dict(facts) | {
+        "length": f"({facts['base_steps']} base steps of {dt})" if isinstance(dt, str) else f"of {dt:g} s",
+        "solver": shorten(facts["solver"], 88, placeholder=" …"), "ratio": ratio if np.isfinite(mean) else None,
+        "and_output": ", output and the cross-check" if facts["cross_check"] else " and output",
+        "halved_steps": facts["halved_steps"] or None, "reason": facts["reason"] or None,
+    }
+
+    def lines(part: str) -> list[tuple[str, str]]:
+        return [(name, text.format_map(told)) for name, text, *needs in _LINES[part]
+                if all(told.get(one) is not None for one in needs)]
+
+    crossed = [(f"cross-check {method}", ", ".join(f"{name} {value:.2e}" for name, value in difference.items()))
+               for method, difference in (facts["cross_check"] or {}).items()]
+    ledger = [(f"  {title}", f"{facts['energy'][name]: .6e}") for name, title in LEDGER[:-1] if "energy" in facts]
+    warned = [("", text) for one in filter(None, (energy_warning(facts), facts.get("sampling")))
+              for text in wrap(f"WARNING: {one}", 110, initial_indent="  ", subsequent_indent="  ")]
+    return [*lines("run"), *crossed, *lines("energy"), *ledger, *lines("defect"), *warned, *lines("end")]

@@ -201,17 +201,13 @@ class Tally:
         steps, most = self._rows - 1, self._most
         mean = self._sums["iterations"] / steps if steps else 0.0
         facts: dict[str, Any] = {
-            "steps": steps,
-            "t_start": self._first["t"],
-            "t_end": self._last["t"],
+            "steps": steps, "t_start": self._first["t"], "t_end": self._last["t"],
             "iterations_per_step": {"mean": mean, "max": int(most.get("iterations", 0))},
-            "escalated_steps": int(self._sums["escalated"]),
-            "worst_certificate": most["certificate"],
+            "escalated_steps": int(self._sums["escalated"]), "worst_certificate": most["certificate"],
         }
-        if "uplift" in most:
-            facts["largest_uplift"] = most["uplift"]
-            facts["smallest_gap"] = -self._most["depth"]  # negative: gap drift of the scheme
-            facts["steps_in_contact"] = int(self._sums["contact"])
+        if "uplift" in most:  # a negative gap: gap drift of the scheme
+            facts |= {"largest_uplift": most["uplift"], "smallest_gap": -most["depth"],
+                      "steps_in_contact": int(self._sums["contact"])}
         return facts | (self._energy() if "defect" in most else {})
 
     def _energy(self) -> dict[str, Any]:
