@@ -9,6 +9,7 @@ row.
 import hashlib
 import math
 import time
+import tomllib
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -39,6 +40,7 @@ SECONDS = 30.0  # between two lines about the time left
 SHARES = (0.16, 0.50, 0.84)
 TABLE, COLUMNS, FIGURE, STUDY, RUNS = "ida.csv", "columns.json", "ida.png", "ida.json", "runs"
 FRAGILITY = "fragility.csv"
+_COLUMNS = tomllib.loads(Path(__file__).with_name("columns.toml").read_text(encoding="utf-8"))
 
 
 @dataclass(frozen=True)
@@ -211,17 +213,8 @@ def _tabulated(case: Case, out: Path, measure: Intensity, demands: Sequence[Dema
     None for what a run has not measured. InputError when a finished run has no such column."""
     found = [(path.parent, row) for path in out.glob(f"*/{ROW}") if (row := read_row(path)) is not None]
     found.sort(key=lambda one: (one[1]["record"], math.inf if one[1]["scale"] is None else one[1]["scale"]))
-    units: Units = {
-        "record": ("-", "name of the record"),
-        "scale": ("-", "factor on the motion of the case"),
-        measure.name: (measure.unit, f"{measure.meaning} of the scaled motion"),
-    } | {one.name: ("", one.meaning) for one in demands} | {
-        "certificate": ("-", "worst certificate of the run"),
-        "energy_created": ("-", "energy that contact and time scheme created, over the largest; with Energy() only"),
-        "steps": ("-", "steps of the run"),
-        "status": ("-", "finished or failed"),
-        "reason": ("-", "why a run failed"),
-    }
+    units: Units = _COLUMNS["first"] | {measure.name: (measure.unit, f"{measure.meaning} of the scaled motion")}
+    units |= {one.name: ("", one.meaning) for one in demands} | _COLUMNS["last"]
     rows = []
     for folder, row in found:
         measured: Row = {measure.name: None} | {one.name: None for one in demands}
