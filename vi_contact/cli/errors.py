@@ -18,10 +18,8 @@ PATIENCE = 30.0  # seconds between the first rank that has failed and the last
 PETSC_ERR_MEM = 55  # of petscsystypes.h
 _MEMORY = ("out of memory", "cannot allocate memory", "unable to allocate", "memory allocation failed", "bad_alloc")
 LIBRARIES = ("dolfinx", "ufl", "basix", "petsc4py", "mpi4py", "h5py", "gmsh", "matplotlib", "tqdm")
-OUT_OF_MEMORY = (
-    "out of memory: take a coarser mesh, fewer steps or samples, or more ranks on more machines; what a run has "
-    "written is kept, and --restart continues it"
-)
+OUT_OF_MEMORY = ("out of memory: take a coarser mesh, fewer steps or samples, or more ranks on more machines; what a "
+                 "run has written is kept, and --restart continues it")
 
 
 def check_words(arguments: Sequence[str]) -> None:

@@ -41,15 +41,11 @@ def _peaks(options: argparse.Namespace) -> str:
 
 def _spectrum(options: argparse.Namespace) -> str:
     run, periods, table = _run(options), spaced("--periods", options.periods), _table_path(options)
-    spectra = {
-        name: floor_spectrum(run.history, name, periods, damping=options.damping, relative=options.relative)
-        for name in options.columns
-    }
+    more = {"damping": options.damping, "relative": options.relative}
+    spectra = {name: floor_spectrum(run.history, name, periods, **more) for name in options.columns}
     write_csv(table, ["column", "damping", "period_s", "sd_m", "sv_m/s", "sa_m/s2", "psa_m/s2"], (
-        [name, options.damping, *(f"{x:.8g}" for x in row)]
-        for name, one in spectra.items()
-        for row in zip(one.periods, one.displacement, one.velocity, one.acceleration, one.psa, strict=True)
-    ))
+        [name, options.damping, *(f"{x:.8g}" for x in row)] for name, one in spectra.items()
+        for row in zip(one.periods, one.displacement, one.velocity, one.acceleration, one.psa, strict=True)))
     dt = {name: recorded_motion(run.history, name).dt for name in spectra}
     kind = "relative" if options.relative else "absolute"
     title = f"Response spectra of {kind} motions, {100.0 * options.damping:g} %"
@@ -60,9 +56,8 @@ def _spectrum(options: argparse.Namespace) -> str:
 def _transfer(options: argparse.Namespace) -> str:
     run, table = _run(options), _table_path(options)
     given = None if options.frequencies is None else spaced("--frequencies", options.frequencies)
-    found = transfer_function(
-        run.history, options.surface, options.base, bandwidth=options.bandwidth or None, frequencies=given
-    )
+    found = transfer_function(run.history, options.surface, options.base, bandwidth=options.bandwidth or None,
+                              frequencies=given)
     rows = zip(found.frequencies, found.amplitude, strict=True)
     write_csv(table, ["frequency_Hz", "amplitude"], ([f"{x:.8g}" for x in row] for row in rows))
     picture = plot_transfer(found, table.with_suffix(".png"), title=f"|{options.surface}| / |{options.base}|")

@@ -104,31 +104,24 @@ def channel_grid(x: Sequence[float], y: Sequence[float], size: float, *, triangl
     interface = {"left": [(x[1:2], y[1:])], "base": [(x[1:5], y[1:2])], "right": [(x[4:5], y[1:])]}
     channel_lines = {f"channel_{side}": line for side, line in interface.items()} | {
         "channel_top": [(x[1:3], y[3:]), (x[3:5], y[3:])],
-        "channel_inside": [(x[2:3], y[2:]), (x[2:4], y[2:3]), (x[3:4], y[2:])],
-    }
+        "channel_inside": [(x[2:3], y[2:]), (x[2:4], y[2:3]), (x[3:4], y[2:])]}
     soil_lines = {f"soil_{side}": line for side, line in interface.items()} | {
         "bedrock": [(x, y[:1])], "left_side": [(x[:1], y)], "right_side": [(x[5:], y)],
-        "surface": [(x[:2], y[3:]), (x[4:], y[3:])],
-    }
+        "surface": [(x[:2], y[3:]), (x[4:], y[3:])]}
     soil_corner = np.where(soil_corner < 0, -1, soil_corner + len(points))
-    facets = {
-        name: np.concatenate([_along(xs, ys, number, *line) for line in lines])
-        for number, table in ((corner, channel_lines), (soil_corner, soil_lines)) for name, lines in table.items()
-    }
+    facets = {name: np.concatenate([_along(xs, ys, number, *line) for line in lines])
+              for number, table in ((corner, channel_lines), (soil_corner, soil_lines))
+              for name, lines in table.items()}
     channel = np.arange(len(cells) + len(soil_cells)) < len(cells)
-    return MeshArrays(
-        "triangle" if triangles else "quadrilateral", np.concatenate([points, soil_points]),
-        np.concatenate([cells, soil_cells + len(points)]), {"channel": channel, "soil": ~channel}, facets,
-    )
+    cells = np.concatenate([cells, soil_cells + len(points)])
+    return MeshArrays("triangle" if triangles else "quadrilateral", np.concatenate([points, soil_points]), cells,
+                      {"channel": channel, "soil": ~channel}, facets)
 
 
 def _divided(places: Sequence[float], size: float) -> Array:
     """Divide every part between two places evenly into cells of about `size`."""
-    parts = [
-        low + (high - low) * np.arange(n) / n
-        for low, high in zip(places, places[1:], strict=False)
-        for n in [max(round((high - low) / size), 1)]
-    ]
+    parts = [low + (high - low) * np.arange(n) / n for low, high in pairwise(places)
+             for n in [max(round((high - low) / size), 1)]]
     return np.append(np.concatenate(parts), places[-1])
 
 

@@ -103,10 +103,8 @@ def welded(arrays: MeshArrays, first: str, second: str) -> MeshArrays:
     target = np.arange(len(arrays.points))
     target[two] = one[nearest]
     kept, number = np.unique(target, return_inverse=True)
-    return replace(
-        arrays, points=arrays.points[kept], cells=number[arrays.cells],
-        facet_groups={name: number[rows] for name, rows in arrays.facet_groups.items()},
-    )
+    groups = {name: number[rows] for name, rows in arrays.facet_groups.items()}
+    return replace(arrays, points=arrays.points[kept], cells=number[arrays.cells], facet_groups=groups)
 
 
 def _group(arrays: MeshArrays, name: str) -> Rows:

@@ -143,10 +143,8 @@ def _elements(model: Any, dim: int, entities: Iterable[int]) -> _Elements:
         kinds, tags, nodes = model.mesh.getElements(dim, entity)
         for kind, tag, node in zip(kinds, tags, nodes, strict=True):
             parts.setdefault(int(kind), []).append((np.asarray(node, dtype=np.int64).reshape(len(tag), -1), entity))
-    return {
-        kind: (np.concatenate([r for r, _ in found]), np.repeat([e for _, e in found], [len(r) for r, _ in found]))
-        for kind, found in parts.items()
-    }
+    return {kind: (np.concatenate([r for r, _ in found]), np.repeat([e for _, e in found], [len(r) for r, _ in found]))
+            for kind, found in parts.items()}
 
 
 def _kind(model: Any, elements: _Elements, dim: int, source: str) -> tuple[str, int, int]:

@@ -47,10 +47,8 @@ class Grid:
         number = np.arange(np.prod(shape)).reshape(shape, order="F")
         points = np.empty((number.size, d))
         points[number.reshape(-1)] = self.nodes.reshape(-1, d)
-        faces = {
-            name: _cells(np.asarray(np.take(number, end, axis=axis)), self.simplices)
-            for axis, pair in enumerate(self.sides) for name, end in zip(pair, (0, -1), strict=True)
-        }
+        faces = {name: _cells(np.asarray(np.take(number, end, axis=axis)), self.simplices)
+                 for axis, pair in enumerate(self.sides) for name, end in zip(pair, (0, -1), strict=True)}
         return points, _cells(number, self.simplices), faces
 
 

@@ -30,10 +30,8 @@ class Blocks:
 
     def grids(self) -> list[Grid]:
         """Return the grids of all bodies."""
-        return [
-            Grid(one.points(), one.simplices, name, [(f"{name}_{low}", f"{name}_{high}") for low, high in sides])
-            for name, one in self.blocks.items() for sides in [SIDES[: len(one.lengths)]]
-        ]
+        return [Grid(one.points(), one.simplices, name, [(f"{name}_{low}", f"{name}_{high}") for low, high in sides])
+                for name, one in self.blocks.items() for sides in [SIDES[: len(one.lengths)]]]
 
 
 @dataclass(frozen=True, kw_only=True)

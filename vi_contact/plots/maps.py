@@ -83,9 +83,8 @@ def coloured(axis: Any, t: Array, position: Array, values: Array, unit: str, col
     palette = colormaps["RdBu_r" if pulling else colours].with_extremes(under="white")
     low = -size if pulling else 1e-9 * size
     axis.grid(False)
-    image = axis.pcolormesh(
-        cell_edges(t), cell_edges(position[order]), shown.T, cmap=palette, vmin=low, vmax=size, rasterized=True
-    )
+    image = axis.pcolormesh(cell_edges(t), cell_edges(position[order]), shown.T, cmap=palette, vmin=low, vmax=size,
+                            rasterized=True)
     return image, prefixed, pulling
 
 

@@ -28,9 +28,8 @@ def plot_motion(record: Record, path: str | Path, *, title: str | None = None, u
     figure, axes = panels(4, (9.0, 8.0))
     velocity, displacement = integrated(record)
     _line(axes[0], record.times, record.acceleration / UNITS[units], f"acceleration [{_pretty(units)}]")
-    for axis, values, quantity, per_second in (
-        (axes[1], velocity, "velocity", "/s"), (axes[2], displacement, "displacement", "")
-    ):
+    quantities = (velocity, "velocity", "/s"), (displacement, "displacement", "")
+    for axis, (values, quantity, per_second) in zip(axes[1:3], quantities, strict=True):
         metres, unit = _size(values)
         _line(axis, record.times, values / metres, f"{quantity} [{unit}{per_second}]")
     _husid(axes[3], record)

@@ -81,11 +81,9 @@ class CrossChecked:
         """Return, by method, relative differences in u, r_n and, with friction, r_t, iterations per step: what
         summary.json shows. A name that comes again gets a number."""
         names = [one.method for one in self.found]
-        return {
-            name if names.count(name) == 1 else f"{name} #{rank}":
-            one.relative | {"iterations_per_step": one.iterations / max(one.steps, 1)}
-            for rank, (name, one) in enumerate(zip(names, self.found, strict=True), start=1)
-        }
+        return {name if names.count(name) == 1 else f"{name} #{rank}":
+                one.relative | {"iterations_per_step": one.iterations / max(one.steps, 1)}
+                for rank, (name, one) in enumerate(zip(names, self.found, strict=True), start=1)}
 
     @property
     def worst(self) -> float:

@@ -159,10 +159,8 @@ class Contact:
         closed, count, resultant, *vectors = sums
         force, place = [0.0 - one for one in vectors[:d]], vectors[d:]  # not -one: no negative zeros
         depth, highest, *farthest = self._largest(gap, pressure, *rubbing[1:])
-        values = [
-            1.0 - closed / self._weight if self._weight else 1.0, int(count), resultant, *force,
-            *[one / resultant if resultant else np.nan for one in place], -depth, highest,
-        ]
+        values = [1.0 - closed / self._weight if self._weight else 1.0, int(count), resultant, *force,
+                  *[one / resultant if resultant else np.nan for one in place], -depth, highest]
         values += [*self._friction_force(state), *farthest] if self._frictional else []
         row: dict[str, Any] = dict(zip(self._numbers, values, strict=True))
         if self.arrays:
@@ -233,12 +231,9 @@ class Probe:
             quantities["v"] = ("m/s", "velocity after the impact law")
         if self.acceleration:
             quantities["a"] = ("m/s²", "absolute acceleration, mean of the step")
-        return {
-            f"{letter}_{axis}_{label}": (unit, f"{meaning} along {axis} at point {label}")
-            for letter, (unit, meaning) in quantities.items()
-            for label, point in self.points.items()
-            for axis in AXES[: len(point)]
-        }
+        return {f"{letter}_{axis}_{label}": (unit, f"{meaning} along {axis} at point {label}")
+                for letter, (unit, meaning) in quantities.items()
+                for label, point in self.points.items() for axis in AXES[: len(point)]}
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """Find the nodes."""

@@ -82,9 +82,8 @@ class BaseMotion(GroundFrame):
             rigid = np.array([2.0 * r - surface.coupling @ r for r in rigid])
         normal = np.array([surface.normal_values(r) for r in rigid])
         tangential = np.array([surface.tangential_values(r) for r in rigid])
-        moved = surface.moving(
-            lambda t: -self.at(t)[0] @ normal, lambda t: np.tensordot(self.at(t)[0], tangential, axes=1)
-        )
+        moved = surface.moving(lambda t: -self.at(t)[0] @ normal,
+                               lambda t: np.tensordot(self.at(t)[0], tangential, axes=1))
         return replace(moved, companions=(*surface.companions, self.path))
 
 

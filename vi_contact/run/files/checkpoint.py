@@ -63,10 +63,9 @@ def write_checkpoint(folder: Path, problem: ContactProblem, place: RestartPoint,
     state = place.state
     vectors, same = _split(problem, state)
     gathered = problem.system.algebra.comm.gather((problem.system.space.ids, vectors))
-    about = json.dumps(
-        {"format": FORMAT, **of, "rows": rows, "vectors": sorted(vectors), "t": state.t, "k": state.k,
-         "t_start": place.t_start, "k_start": place.k_start, "base": place.base, "halved": place.halved}
-    )  # json keeps floats to the last bit
+    about = json.dumps({"format": FORMAT, **of, "rows": rows, "vectors": sorted(vectors), "t": state.t, "k": state.k,
+                        "t_start": place.t_start, "k_start": place.k_start, "base": place.base,
+                        "halved": place.halved})  # json keeps floats to the last bit
 
     def write() -> None:
         parts = gathered or []

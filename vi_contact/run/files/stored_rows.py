@@ -145,10 +145,8 @@ class StoredArrays:
 
     def _from_hdf5(self, first: int, n: int) -> Block:
         try:
-            return {
-                name: np.asarray(self._file[name][first : first + n]).astype(one.dtype)
-                for name, one in self._samples.items()
-            }
+            return {name: np.asarray(self._file[name][first : first + n]).astype(one.dtype)
+                    for name, one in self._samples.items()}
         except (TypeError, ValueError, OSError, RuntimeError) as error:
             raise InputError(f"'{self._path}' is damaged ({error}): restore it or start a new run") from error
 
@@ -162,10 +160,8 @@ class StoredArrays:
                              "or start a new run")
         ends = np.cumsum([one.size for one in self._samples.values()])[:-1]
         columns = np.split(np.array(part[:, 1:]), ends, axis=1)
-        return {
-            name: column.reshape(len(part), *one.shape).astype(one.dtype)
-            for (name, one), column in zip(self._samples.items(), columns, strict=True)
-        }
+        return {name: column.reshape(len(part), *one.shape).astype(one.dtype)
+                for (name, one), column in zip(self._samples.items(), columns, strict=True)}
 
 
 def times_of(folder: Path, steps: Container[int]) -> dict[int, float]:

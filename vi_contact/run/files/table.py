@@ -217,10 +217,7 @@ class Tally:
         size = max(most["energy"], most["work"])
         relative = most["defect"] / size if size > 0.0 else most["defect"]
         created = max(0.0, most["created"])
-        return {
-            "energy": {"energy_start": start, "energy_max": most["energy"]}
-            | {name: last[name] for name, _ in LEDGER[:-1]}
-            | {"energy_defect_joule": last["energy_defect"], "energy_defect": relative},
-            "energy_defect": relative,
-            "energy_created": created / size if size > 0.0 else created,
-        }
+        energy = {"energy_start": start, "energy_max": most["energy"], **{name: last[name] for name, _ in LEDGER[:-1]},
+                  "energy_defect_joule": last["energy_defect"], "energy_defect": relative}
+        created = created / size if size > 0.0 else created
+        return {"energy": energy, "energy_defect": relative, "energy_created": created}

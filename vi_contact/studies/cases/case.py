@@ -64,9 +64,8 @@ _TABLES: dict[str, Any] = {  # in the order in which they are read: type of what
     "scheme": Scheme,
     "solver": Solver,
     "escalation": Solver | Sequence[Solver],
-    "run": replace(
-        callee(simulate, only=("dt", "t_end", "steps", "tolerance", "checkpoint_every", "out")), function=dict
-    ),
+    "run": replace(callee(simulate, only=("dt", "t_end", "steps", "tolerance", "checkpoint_every", "out")),
+                   function=dict),
     "record": Recorder | Sequence[Recorder],
     "fields": FieldWriter,
     "check": Check | Sequence[Check],
@@ -142,9 +141,8 @@ class Case:
         recorders = [Steps(), *((Energy(), Contact()) if own is None else own)]
         problem, _ = with_defaults(problem, self._made("scheme"))
         state = initial_state(problem)
-        return frozenset(
-            name for one in recorders for name, value in one.start(problem, state).items() if np.ndim(value) == 0
-        )
+        return frozenset(name for one in recorders for name, value in one.start(problem, state).items()
+                         if np.ndim(value) == 0)
 
     def _recorders(self, parts: Parts) -> tuple[Recorder, ...] | None:
         """Return the recorders of [[record]]; None for those of ``simulate``."""
@@ -244,10 +242,9 @@ class Case:
         return mesh, tags
 
     def _problem(self, parts: Parts) -> ContactProblem:
-        return ContactProblem(
-            parts.system, parts.surface, friction=self._made("friction") or Frictionless(), impact=self._made("impact"),
-            excitation=() if parts.moved else self.excitations(system=parts.system), mass=self._made("mass"),
-        )
+        return ContactProblem(parts.system, parts.surface, friction=self._made("friction") or Frictionless(),
+                              impact=self._made("impact"), mass=self._made("mass"),
+                              excitation=() if parts.moved else self.excitations(system=parts.system))
 
     def _duration(self, parts: Parts) -> float:
         """Return the time until the last excitation ends [s]."""

@@ -19,14 +19,11 @@ from ...core.errors import InputError
 
 LENGTH, DEPTH, POWER = 500, 20, 100
 _WORD = re.compile(r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?|[A-Za-z]\w*|[-+*/^(),]", re.ASCII)
-_OF_ONE: Mapping[str, Callable[..., Any]] = {
-    "sqrt": np.sqrt, "sin": np.sin, "cos": np.cos, "tan": np.tan, "exp": np.exp, "log": np.log, "abs": np.abs,
-    "step": lambda a: np.heaviside(a, 1.0),
-}
-_OF_TWO: Mapping[str, Callable[..., Any]] = {
-    "Add": np.add, "Sub": np.subtract, "Mult": np.multiply, "Div": np.divide, "Pow": np.power,
-}
-_OF_MORE: Mapping[str, Callable[..., Any]] = {"min": np.minimum, "max": np.maximum}
+_Functions = Mapping[str, Callable[..., Any]]
+_OF_ONE: _Functions = {"sqrt": np.sqrt, "sin": np.sin, "cos": np.cos, "tan": np.tan, "exp": np.exp, "log": np.log,
+                       "abs": np.abs, "step": lambda a: np.heaviside(a, 1.0)}
+_OF_TWO: _Functions = {"Add": np.add, "Sub": np.subtract, "Mult": np.multiply, "Div": np.divide, "Pow": np.power}
+_OF_MORE: _Functions = {"min": np.minimum, "max": np.maximum}
 
 
 @dataclass(frozen=True)

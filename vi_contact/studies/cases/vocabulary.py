@@ -240,8 +240,6 @@ def _constructors(cls: type) -> Iterator[Any]:
 
 def words(folder: Path, allowed: Sequence[str] = ()) -> Words:
     """Return the words of a case file in this folder, where its relative paths begin; ``allowed``: others' packages."""
-    default = {
-        LinearElastic: "LinearElastic", Record: "read_record", ContactSurface: "contact_surface", Traction: "Traction",
-        Dashpots: "Dashpots", FieldWriter: "XDMF",
-    }
+    default = {LinearElastic: "LinearElastic", Record: "read_record", ContactSurface: "contact_surface",
+               Traction: "Traction", Dashpots: "Dashpots", FieldWriter: "XDMF"}
     return Words(folder, _choices(), default, (Facets, Cells), short={Record: "path"}, allowed=allowed)

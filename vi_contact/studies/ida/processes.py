@@ -29,11 +29,10 @@ _MPI = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK")  # in the environment o
 
 def command(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> list[str]:
     """Return the command of these runs, each from its checkpoint if there is one; OutOfTime without wall time left."""
-    asked = {
-        "case": str(runs[0].case.path), "allow": runs[0].case.allowed, "settings": [one.settings for one in runs],
-        "folders": [str(one.folder) for one in runs],
-        "restart": [(one.folder / CHECKPOINT).is_file() for one in runs], "wall_time": None,
-    }
+    case, folders = runs[0].case, [one.folder for one in runs]
+    asked = {"case": str(case.path), "allow": case.allowed, "settings": [one.settings for one in runs],
+             "folders": [*map(str, folders)], "restart": [(one / CHECKPOINT).is_file() for one in folders],
+             "wall_time": None}
     if end.text is not None:
         if (left := int(end.left - ASIDE)) < 1:
             raise OutOfTime(f"{end.words} {AGAIN}")

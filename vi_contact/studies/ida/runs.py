@@ -132,12 +132,10 @@ class OneRun:
         """Write the row of a run that ended with this status, having said this; failed ones leave that in a file."""
         facts = read_json(self.folder / SUMMARY) or {}
         finished = code == 0 and facts.get("status") == "finished"
-        row = {
-            "record": self.shaking.name, "files": [str(path) for path in self.shaking.files], "scale": self.factor,
-            "status": "finished" if finished else "failed", "reason": "" if finished else _sentence(said, code),
-            "certificate": facts.get("worst_certificate"), "energy_created": facts.get("energy_created"),
-            "steps": facts.get("steps"),
-        }
+        row = {"record": self.shaking.name, "files": [str(path) for path in self.shaking.files], "scale": self.factor,
+               "status": "finished" if finished else "failed", "reason": "" if finished else _sentence(said, code),
+               "certificate": facts.get("worst_certificate"), "energy_created": facts.get("energy_created"),
+               "steps": facts.get("steps")}
         self.folder.mkdir(parents=True, exist_ok=True)
         if not finished:
             write_atomically(self.folder / SAID, said.encode())
