@@ -48,13 +48,11 @@ def split_petsc(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
 
 def refuse_retired(arguments: Sequence[str]) -> None:
     """Raise InputError for a command of before, with the command or the demo in its place."""
-    if not arguments:
-        return
-    old = arguments[0]
-    library.refuse_retired([old])
-    if old in ("wall", "channel"):
-        raise InputError(f"'{old}' is a case now: give vi-contact run {old}, and for its pictures vi-contact report "
-                         f"DIR; vi-contact run --help and the table of options in CHANGELOG.md tell the rest")
+    for old in arguments[:1]:
+        library.refuse_retired([old])
+        if old in ("wall", "channel"):
+            raise InputError(f"'{old}' is a case now: give vi-contact run {old}, and for its pictures vi-contact "
+                             "report DIR; vi-contact run --help and the table of options in CHANGELOG.md tell the rest")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

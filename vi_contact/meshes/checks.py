@@ -8,23 +8,14 @@ import numpy as np
 
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
-from vi_contact.meshes.rows import Mask, Rows, cell_sides, found_in, number_alike
+from vi_contact.meshes.rows import CORNERS, Mask, Rows, cell_sides, found_in, number_alike
 
 _ROUND_OFF = 1024 * np.finfo(float).eps
-
-_CORNERS: dict[str, list[tuple[int, ...]]] = {  # a vertex and its d neighbours, right-handed in an unturned cell
-    "interval": [(0, 1)],
-    "triangle": [(0, 1, 2)],
-    "quadrilateral": [(0, 1, 3), (1, 2, 0), (2, 3, 1), (3, 0, 2)],
-    "tetrahedron": [(0, 1, 2, 3)],
-    "hexahedron": [(0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7),
-                   (4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3)],
-}
 
 
 def check_cells(points: Array, cells: Rows, cell: str, source: str) -> None:
     """Raise InputError for cells of no volume and for twisted ones (det J of both signs at the corners)."""
-    corners = np.array(_CORNERS[cell])
+    corners = np.array(CORNERS[cell])
     x = points[cells[:, corners]]  # (n_cells, n_corners, 1 + d, d)
     edges = x[:, :, 1:] - x[:, :, :1]
     det = np.linalg.det(edges)

@@ -1,5 +1,8 @@
 """Handle rows of vertices: the sides of cells, which rows have the same members, and what hangs together."""
 
+import tomllib
+from pathlib import Path
+
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import coo_matrix
@@ -7,21 +10,9 @@ from scipy.sparse import coo_matrix
 Rows = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
 
-GMSH_NUMBERS = {  # Gmsh's numbers of a cell, called by UFL's name, and of its side
-    "interval": (1, 15), "triangle": (2, 1), "quadrilateral": (3, 1), "tetrahedron": (4, 2), "hexahedron": (5, 3),
-}
-
-SECOND_ORDER = {  # the same of cells with a node in the middle of every edge, side and cell, after their vertices
-    "interval": (8, 15), "triangle": (9, 8), "quadrilateral": (10, 8), "tetrahedron": (11, 9), "hexahedron": (12, 10),
-}
-
-SIDES: dict[str, list[tuple[int, ...]]] = {  # of a cell, its corners in the order of VTK
-    "interval": [(0,), (1,)],
-    "triangle": [(0, 1), (1, 2), (2, 0)],
-    "quadrilateral": [(0, 1), (1, 2), (2, 3), (3, 0)],
-    "tetrahedron": [(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)],
-    "hexahedron": [(0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)],
-}
+_CELLS = tomllib.loads(Path(__file__).with_name("cells.toml").read_text(encoding="utf-8"))  # which says what they are
+GMSH_NUMBERS, SECOND_ORDER, SIDES, CORNERS = (
+    {name: one[key] for name, one in _CELLS.items()} for key in ("first_order", "second_order", "sides", "corners"))
 
 
 def vertex_count(cell: str) -> int:

@@ -114,8 +114,7 @@ def _check_outputs(record: Any, out: Any, restart: Any, checkpoint_every: Any, f
     owner = "simulate"
     for one in () if record is None else several(owner, "record", record, "give a list of recorders, or None"):
         provides(owner, "a recorder", one, ("columns", "start", "row"), "give Energy(), Contact(), Probe(…) or another")
-    if out is not None:
-        instance(owner, "out", out, (str, Path), "give a path, or None")
+    optional(instance, owner, "out", out, (str, Path), "give a path, or None")
     instance(owner, "restart", restart, (bool, str, Path), "give True, False or the path of a run folder")
     whole(owner, "checkpoint_every", checkpoint_every, least=1)
     for meaning, value in zip(("progress", "changed"), flags, strict=True):
@@ -124,8 +123,7 @@ def _check_outputs(record: Any, out: Any, restart: Any, checkpoint_every: Any, f
         if out is None:
             raise InputError("fields need an output folder: give out, or leave fields away")
         provides(owner, "fields", fields, ("open",), "give fem.XDMF(every=10), or None")
-    if cross_check is not None:
-        provides(owner, "cross_check", cross_check, ("report",), "give a CrossChecked solver, or None")
+    optional(provides, owner, "cross_check", cross_check, ("report",), "give a CrossChecked solver, or None")
 
 
 def _source(restart: bool | str | Path, folder: Path | None) -> Path | None:
