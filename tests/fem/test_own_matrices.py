@@ -1,6 +1,6 @@
 """Systems of scipy matrices, and contact at listed nodes: against closed forms, and against what is made by hand.
 
-Chains and bars have displacements only; Euler–Bernoulli beams and frames (tests/support/frame_elements.py) rotations
+Chains and bars have displacements only; Euler–Bernoulli beams and frames (demos/problems/frame_elements.py) rotations
 too, and their cubic elements give static forms exactly. V2 of a user who brings matrices of his own.
 """
 
@@ -15,9 +15,9 @@ import pytest
 import scipy.sparse as sp
 from bar import bar_matrices
 from chain import chain_problem
-from frame_elements import frame, line
 
 import vi_contact as vc
+from demos.problems.frame_elements import frame, line
 from vi_contact import fem, plots
 from vi_contact.core.algebra import SerialMatrix
 from vi_contact.core.errors import InputError
