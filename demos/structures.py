@@ -119,7 +119,7 @@ def thrown(comm: Any, numbers: dict[str, float], shown: Shown, quick: bool) -> N
     cases = {"beam": posed.thrown_beam(20, BEAM_GAP, BEAM_SPEED),
              "plate": posed.thrown_plate(comm, 8 if quick else 16, PLATE_GAP, PLATE_SPEED)}
     for name, (problem, touch) in cases.items():
-        parts = 25 if quick else 100
+        parts = 15 if quick else 100
         routes = vc.CrossChecked(vc.Condensed(), [vc.Volume()])
         solution = vc.simulate(
             problem, scheme=vc.MoreauJean(), solver=routes, cross_check=routes, dt=touch / parts,
