@@ -110,6 +110,7 @@ def contacts() -> Table:
     problem = bem.BoundaryProblem(bem.PoincareSteklov(blocks, 1.0), np.zeros((2, 2, 8)), contact=mesh.labels == 0)
     compliance = problem.condensed()
     contact = bem.BoundaryContact(compliance)
+    own = bem.MultiplierMesh(mesh, mesh.labels == 0, compliance)
 
     def conditions_on(compliance: Any) -> bem.Conditions:
         return bem.conditions_on(mesh, compliance, mesh.labels == 0)
@@ -130,6 +131,14 @@ def contacts() -> Table:
         (bem.SpaceTimeUzawa().solve, {"contact": contact}, {"contact": OTHER}),
         (TwoBodies, {"one": problem, "two": problem}, {
             "one": NEEDED, "two": NEEDED, "welded": MASK, "jump": JUMP, "traction": JUMP}),
+        (bem.MultiplierMesh, {"mesh": mesh, "elements": mesh.labels == 0, "compliance": compliance}, {
+            "mesh": OTHER, "elements": MASK | {"another side": mesh.labels == 1},
+            "compliance": OTHER | {"problem": problem}, "patch": COUNT | {"long": 3},
+            "interval": COUNT | {"no divisor": 3}, "degree": {"two": 2, "half": 0.5},
+            "testing": {"word": "middle"}, "sigma": but(POSITIVE, "zero")}),
+        (own.forces, {"forces": np.zeros((1, 2))}, {
+            "forces": {"text": "up", "nan": np.full((1, 2), nan), "short": np.zeros((1, 3))}}),
+        (own.averaged, {"motion": lambda t: t}, {"motion": FUNCTION}),
     ]
 
 

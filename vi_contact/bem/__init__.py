@@ -17,6 +17,7 @@ _CONTENTS = {
     "energetic": ("EnergeticBlocks", "energetic_blocks"),
     "fundamental_solution": ("TimeKernels",),
     "loads": ("traction_forces",),
+    "multiplier_mesh": ("MultiplierMesh",),
     "poincare_steklov": ("BoundaryMotion", "BoundaryProblem", "CondensedCompliance", "PoincareSteklov"),
     "quadrature": ("Orders",),
     "uzawa_space_time": ("SpaceTimeUzawa",),

@@ -14,6 +14,7 @@ from .energetic import EnergeticBlocks as EnergeticBlocks
 from .energetic import energetic_blocks as energetic_blocks
 from .fundamental_solution import TimeKernels as TimeKernels
 from .loads import traction_forces as traction_forces
+from .multiplier_mesh import MultiplierMesh as MultiplierMesh
 from .poincare_steklov import BoundaryMotion as BoundaryMotion
 from .poincare_steklov import BoundaryProblem as BoundaryProblem
 from .poincare_steklov import CondensedCompliance as CondensedCompliance
@@ -21,4 +22,4 @@ from .poincare_steklov import PoincareSteklov as PoincareSteklov
 from .quadrature import Orders as Orders
 from .uzawa_space_time import SpaceTimeUzawa as SpaceTimeUzawa
 
-__all__: list[str] = ['BoundaryContact', 'BoundaryMesh', 'BoundaryMotion', 'BoundaryProblem', 'CondensedCompliance', 'Conditions', 'ContactRun', 'EnergeticBlocks', 'Galerkin', 'OperatorMatrices', 'Orders', 'PoincareSteklov', 'SpaceTimeUzawa', 'TimeKernels', 'circle', 'conditions_on', 'energetic_blocks', 'march_contact', 'polygon', 'traction_forces']
+__all__: list[str] = ['BoundaryContact', 'BoundaryMesh', 'BoundaryMotion', 'BoundaryProblem', 'CondensedCompliance', 'Conditions', 'ContactRun', 'EnergeticBlocks', 'Galerkin', 'MultiplierMesh', 'OperatorMatrices', 'Orders', 'PoincareSteklov', 'SpaceTimeUzawa', 'TimeKernels', 'circle', 'conditions_on', 'energetic_blocks', 'march_contact', 'polygon', 'traction_forces']

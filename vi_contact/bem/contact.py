@@ -223,7 +223,7 @@ class BoundaryContact:
                                  "Poincaré-Steklov operator")
             return EffectiveMatrix(SerialMatrix(np.linalg.inv(first)), SerialAlgebra(symmetric=False))
         first = 0.5 * (first + first.T)
-        if np.linalg.eigvalsh(first)[0] <= 0.0:
+        if np.linalg.eigvalsh(first)[0] <= SUPPORTED * first.max():
             raise InputError("BoundaryContact: the compliance of one step is not positive definite; use the symmetric "
                              "Poincaré-Steklov operator, and supports along contact directions or tangents only")
         return EffectiveMatrix(SerialMatrix(np.linalg.inv(first)), SerialAlgebra())
