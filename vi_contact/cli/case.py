@@ -25,14 +25,10 @@ def add_case_commands(commands: Any) -> None:
     words = {"schemes": ", ".join(schemes.__all__), "starters": ", ".join(starters())}
     run = add_command(commands, "run", _run, "run", "short", "output", "settings", "check", words=words)
     run.set_defaults(spelling={"units": "units (--set excitation.1.record.units=UNIT)"})
-    add_command(commands, "cases", _cases)
+    add_command(commands, "cases", lambda options: "\n".join([
+        *(f"{name:<10} {title}" for name, title in builtin_cases().items()), f"the files: {FOLDER}"]))
     add_command(commands, "schema", lambda options: FOLDER.with_name("case.schema.json").read_text("utf-8").rstrip())
     add_command(commands, "new", _new, "new", words=words)
-
-
-def _cases(options: argparse.Namespace) -> str:
-    lines = [f"{name:<10} {title}" for name, title in builtin_cases().items()]
-    return "\n".join([*lines, f"the files: {FOLDER}"])
 
 
 def _new(options: argparse.Namespace) -> str:

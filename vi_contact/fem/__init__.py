@@ -28,6 +28,7 @@ _CONTENTS = {
     "contact.surface": ("contact_surface",),
     "dashpots": ("CompliantBase", "Dashpots"),
     "heterogeneous": ("Heterogeneous",),
+    "initial_strains": ("InitialStrain",),
     "linear_forms": ("LinearForm",),
     "loads": ("BodyForce", "Prescribed", "Pressure", "TangentialTraction", "Traction"),
     "mesh": ("Cells", "Facets", "Tags", "build_mesh", "node_numbers", "read_mesh"),

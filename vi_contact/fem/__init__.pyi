@@ -9,6 +9,7 @@ from .contact.surface import contact_surface as contact_surface
 from .dashpots import CompliantBase as CompliantBase
 from .dashpots import Dashpots as Dashpots
 from .heterogeneous import Heterogeneous as Heterogeneous
+from .initial_strains import InitialStrain as InitialStrain
 from .linear_forms import LinearForm as LinearForm
 from .loads import BodyForce as BodyForce
 from .loads import Prescribed as Prescribed
@@ -33,4 +34,4 @@ from .released_supports import release as release
 from .space import bodies_of as bodies_of
 from .ties import Tied as Tied
 
-__all__: list[str] = ['BodyForce', 'Cells', 'CompliantBase', 'Dashpots', 'DualMortar', 'Facets', 'Forms', 'Heterogeneous', 'LargestStrain', 'LinearForm', 'NodeToNode', 'Prescribed', 'Pressure', 'Reactions', 'SectionForces', 'Tags', 'TangentialTraction', 'Tied', 'Traction', 'XDMF', 'as_function', 'assemble', 'bodies_of', 'build_mesh', 'contact_pair', 'contact_surface', 'joined_surfaces', 'node_numbers', 'read_function', 'read_mesh', 'release', 'system_from_matrices']
+__all__: list[str] = ['BodyForce', 'Cells', 'CompliantBase', 'Dashpots', 'DualMortar', 'Facets', 'Forms', 'Heterogeneous', 'InitialStrain', 'LargestStrain', 'LinearForm', 'NodeToNode', 'Prescribed', 'Pressure', 'Reactions', 'SectionForces', 'Tags', 'TangentialTraction', 'Tied', 'Traction', 'XDMF', 'as_function', 'assemble', 'bodies_of', 'build_mesh', 'contact_pair', 'contact_surface', 'joined_surfaces', 'node_numbers', 'read_function', 'read_mesh', 'release', 'system_from_matrices']

@@ -14,7 +14,6 @@ import numpy as np
 import ufl
 
 from ..core.algebra import Array, from_each
-from ..core.checks import optional, whole
 from ..core.stages import stage
 from ..core.system import Load, SemiDiscreteSystem
 from ..laws.free_motions import floating
@@ -24,8 +23,9 @@ from .assembly_checks import check_body, check_boundaries, check_initial
 from .communicators import give_back
 from .compact import algebra_for
 from .dashpots import DashpotMatrix, Dashpots, describe_boundaries
-from .dirichlet import GivenValues, refuse_contradictions, taken, taken_space
+from .dirichlet import refuse_contradictions, taken, taken_space
 from .forms import ElasticForms, Materials, cell_materials
+from .initial_strains import InitialStrain, InitialStrains
 from .linear_forms import AnyLoad, LinearForm, Loads
 from .loads import Prescribed, as_tuple, evaluate
 from .mesh import Cells, Facets
@@ -65,8 +65,8 @@ def assemble(mesh: Any, material: Materials | None = None, *, forms: Forms | Non
             a space like it, or V.sub(i), at rest with the values they have now; where conditions meet the last counts.
         clamped: facets with u = 0; prescribed: facets that move (eq. 3) or are held in some components.
         dashpots: absorbing boundaries: Dashpots, CompliantBase, soil.FreeField. Their loss counts as damping.
-        tied: boundaries whose opposite nodes move together; loads: tractions (eqs. 4, 6), body forces, LinearForm.
-        damping: NoDamping() by default, MassProportional(c) (eq. 7), Rayleigh or KelvinVoigt.
+        tied: boundaries whose opposite nodes move together; damping: NoDamping() by default, MassProportional(c)
+            (eq. 7), Rayleigh or KelvinVoigt; loads: tractions (eqs. 4, 6), body forces, InitialStrain, LinearForm.
         base_inertia: whether a ground motion's inertia load counts the mass that elements share with prescribed nodes,
             as it must to be the motion seen from the ground; False is the load of docs/start/first_wall.md.
         integration: "full", or "selective" for nearly incompressible bodies of quadrilaterals or hexahedra: each cell
@@ -84,7 +84,8 @@ def assemble(mesh: Any, material: Materials | None = None, *, forms: Forms | Non
     check_boundaries(mesh, held, moved, as_tuple(tied), boundaries, as_tuple(loads))
     check_initial(mesh, displacement=initial_displacement, velocity=initial_velocity)
     given = (*(Prescribed(facets) for facets in held), *moved, *taken(mesh, V, as_tuple(bcs)))
-    space = _space(mesh, given, as_tuple(tied), degree, quadrature_degree, V)
+    space = FemSpace(mesh, given, as_tuple(tied), degree, V, quadrature_degree)
+    refuse_contradictions(space)
     body = _stated(space, material, forms, section, damping, boundaries, selective=integration == "selective")
     algebra = algebra_for(space.comm.mpi, space.dimension, space.unknowns, symmetric=body.symmetric)
     absorbers = [DashpotMatrix(space, body, one) for one in boundaries]
@@ -97,9 +98,8 @@ def assemble(mesh: Any, material: Materials | None = None, *, forms: Forms | Non
     mass = body.matrix("M")  # momenta, less M r: what accelerated prescribed nodes pull on the free ones
     momenta = [space.pull(PetscMatrix(mass) @ one) for one in space.translations] if base_inertia else []
     M, inertial = _reduced(mass, space, algebra, 2)
-    load = replace(load, inertial=inertial,
-                   general=(*load.general, *pull, *(one for part in acting for one in part.elastic)),
-                   viscous=(*viscous, *(one for part in acting for one in part.viscous)))
+    load = replace(load, inertial=inertial, viscous=(*viscous, *(one for part in acting for one in part.viscous)),
+                   general=(*load.general, *pull, *(one for part in acting for one in part.elastic)))
     system = floating(SemiDiscreteSystem(
         algebra=algebra, M=M, C=C, K=K, load=load, influence=rigid,
         base_mass=np.column_stack([one - M @ r for one, r in zip(momenta, rigid.T, strict=True)]) if momenta else None,
@@ -113,16 +113,6 @@ def assemble(mesh: Any, material: Materials | None = None, *, forms: Forms | Non
     del absorbers, damper, mass
     give_back(mesh.comm)
     return system
-
-
-def _space(mesh: Any, given: tuple[Prescribed | GivenValues, ...], tied: tuple[Tied, ...], degree: int,
-           quadrature_degree: int | None, V: Any) -> FemSpace:
-    """The space of the displacements."""
-    optional(whole, "assemble", "quadrature_degree", quadrature_degree)
-    space = FemSpace(mesh, given, tied, degree, V)
-    refuse_contradictions(space)
-    space.quadrature_degree = quadrature_degree
-    return space
 
 
 def _stated(space: FemSpace, material: Materials | None, forms: Forms | None, section: Section, damping: Damping,
@@ -148,18 +138,22 @@ def _damper(forms: ElasticForms, absorbers: Sequence[DashpotMatrix]) -> Any:
 def _reduced(full: Any, space: FemSpace, algebra: PetscAlgebra,
              derivative: int) -> tuple[PetscMatrix, tuple[Callable[[float], Array], ...]]:
     """(Pᵀ A P as the algebra stores it, the load of prescribed motions); the full matrix is destroyed."""
-    moves = any(condition.moves for condition in space.prescribed)
-    pull = (_prescribed_load(space, derivative, full),) if moves else ()
+    pull: tuple[Callable[[float], Array], ...] = ()
+    if any(condition.moves for condition in space.prescribed):  # a part of -Pᵀ(K U + C U' + M U'')
+        matrix, held = PetscMatrix(moved(space.held_columns(full), space.comm.mpi)), space.held.ravel()
+        pull = (lambda t: -space.pull(matrix @ space.prescribed_values(t, derivative)[held]),)
     part = space.reduced(full)
     full.destroy()
     return algebra.held(moved(part, algebra.comm.mpi)), pull
 
 
 def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...]) -> Load:
-    """Assemble f(t) on the free unknowns: tractions, body forces and linear forms."""
+    """Assemble f(t) on the free unknowns: tractions, body forces, linear forms and initial strains."""
     constant = np.zeros(len(space.ids))
     separable: list[tuple[Array, Callable[[float], float]]] = []
     general: list[Callable[[float], Array]] = []
+    if strained := [one for one in loads if isinstance(one, InitialStrain)]:
+        space.forms.initial = InitialStrains(space.forms, strained)
     for load in loads:
         at = _integrated(space, section, load)
         if load.history is not None:
@@ -173,6 +167,8 @@ def assemble_loads(space: FemSpace, section: Section, loads: tuple[Any, ...]) ->
 
 def _integrated(space: FemSpace, section: Section, load: AnyLoad) -> Callable[[float], Array]:
     """t -> Pᵀ ∫ interpolated value · v, as one product with a matrix assembled here; of a form its own."""
+    if isinstance(load, InitialStrain):
+        return lambda t: space.forms.initial.forces(t, only=load)
     if isinstance(load, LinearForm):
         full = load.full(space, section.thickness)
         return lambda t: space.pull(full(t))
@@ -185,12 +181,6 @@ def _integrated(space: FemSpace, section: Section, load: AnyLoad) -> Callable[[f
         return space.pull(section.thickness * (matrix @ values.ravel()))
 
     return at
-
-
-def _prescribed_load(space: FemSpace, derivative: int, full: Any) -> Callable[[float], Array]:
-    """A part of -Pᵀ(K U + C U' + M U''): that of a derivative and its matrix."""
-    matrix, held = PetscMatrix(moved(space.held_columns(full), space.comm.mpi)), space.held.ravel()
-    return lambda t: -space.pull(matrix @ space.prescribed_values(t, derivative)[held])
 
 
 def _initial(space: FemSpace, name: str, value: Initial) -> Array:

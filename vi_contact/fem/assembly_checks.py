@@ -18,8 +18,8 @@ from .dashpots import Dashpots
 from .form_checks import refuse_complex
 from .forms import KINDS
 from .groups import cells_of, facets_of, field_given
-from .linear_forms import LinearForm
-from .loads import BodyForce, Prescribed, Traction
+from .linear_forms import LOADS
+from .loads import Prescribed
 from .numbering import is_curved
 from .own_forms import Forms
 from .ties import Tied
@@ -132,7 +132,7 @@ def check_boundaries(mesh: Mesh, clamped: Any, prescribed: Any, tied: Any, dashp
         facets_of(OWNER, "clamped", group, mesh)
     for name, items, kinds in (
         ("prescribed", prescribed, (Prescribed,)), ("tied", tied, (Tied,)), ("dashpots", dashpots, (Dashpots,)),
-        ("loads", loads, (Traction, BodyForce, LinearForm)),
+        ("loads", loads, LOADS),
     ):
         remedy = f"give {' or '.join(f'fem.{kind.__name__}(…)' for kind in kinds)}, or a list of them"
         for item in items:

@@ -1,6 +1,6 @@
 """Check the forms that a user gives for a body: functions, bilinear, of this mesh; matrices finite, masses positive."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from inspect import signature
 from typing import Any
 
@@ -89,16 +89,11 @@ def refuse_masses(matrix: Any, space: FemSpace) -> None:
     if not is_symmetric(matrix, space):
         raise InputError("Forms: mass is not symmetric; give a form in which u and v may be exchanged")
     least = -largest(space.comm, -np.min(M.diagonal(), initial=np.inf))
-    energies = [space.comm.sum(np.array([w @ (M @ w)]))[0] for w in _motions(space)]
+    motions = [*space.translations, *(probe(_numbers(space), j) for j in range(PROBES))]
+    energies = [space.comm.sum(np.array([w @ (M @ w)]))[0] for w in motions]
     if not (least > 0.0 and min(energies) > 0.0):
         raise InputError("Forms: mass is not positive, some motion would have no kinetic energy or less; give a "
                          "density above zero everywhere")
-
-
-def _motions(space: FemSpace) -> Iterator[Any]:
-    yield from space.translations
-    for j in range(PROBES):
-        yield probe(_numbers(space), j)
 
 
 def _numbers(space: FemSpace) -> Any:

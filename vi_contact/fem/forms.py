@@ -43,6 +43,7 @@ class ElasticForms:
     """
 
     boundaries: tuple[Dashpots, ...] = ()  # of the same system
+    initial: Any = None  # InitialStrains
     densities = tells_stress = symmetric = True
     notes: tuple[str, ...] = ()
 
@@ -50,17 +51,17 @@ class ElasticForms:
         self, space: FemSpace, materials: list[tuple[Any, Material]], section: Section, damping: Damping,
         *, selective: bool = False,
     ) -> None:
-        self.space, self.section = space, section
+        self.space, self.section, space.forms = space, section, self
         self.dilatation = MeanDilatation(space.V) if selective else None
         self.u, self.v = ufl.TrialFunction(space.V), ufl.TestFunction(space.V)
         self._matrices: dict[str, WeakSet[Any]] = {name: WeakSet() for name in ("M", "C", "K")}
         self.materials = tuple(materials)
-        found = [material for _, material in materials]
-        degree = int(any(isinstance(one, Heterogeneous) and one.varies for one in found))
+        degree = int(any(isinstance(one, Heterogeneous) and one.varies for _, one in materials))
         cells = compat.lagrange(space.mesh, degree, continuous=False)
         names = ("lame", "shear", "rho", "alpha_rho", "beta", "lame_out")
         values = [_constants(cells, where, one) for where, one in materials]
-        self.viscous = _viscous(damping)
+        found = getattr(damping, "viscosities", None)
+        self.viscous = found if found and any(found) else None  # (lambda_v, mu_v) [Pa s]
         damped = self.viscous is not None or any(np.any(one) for each in values for one in damping.coefficients(each))
         self.damped = bool(largest(space.comm, damped))  # a ratio may be zero in all cells of some ranks
         self.fields = {name: compat.function(cells) for name in names} if materials else {}
@@ -72,7 +73,7 @@ class ElasticForms:
                 value = section.thickness * value if name != "beta" else value
                 self.fields[name].x.array[dofs] = value[dofs] if np.ndim(value) else value
         self._anisotropic: Any = None
-        if any(isinstance(one, Orthotropic) for one in found):
+        if any(isinstance(one, Orthotropic) for _, one in materials):
             self._anisotropic = _anisotropic(cells, degree, materials, self.fields, section, space.dimension)
 
     def cellwise(self, name: str) -> Array:
@@ -92,13 +93,30 @@ class ElasticForms:
         return "".join(name for name in names if getattr(system, name) not in (None, *self._matrices[name]))
 
     def stress(self, u: Any) -> Any:
-        """Return sigma(u) (d, d) times the thickness. With selective integration of a Function u: ``follow`` when its
-        values have changed since."""
-        eps, d = ufl.sym(ufl.grad(u)), self.space.dimension
-        if self._anisotropic is not None:
-            flat, place = self._flat_stress(eps), {pair: k for k, pair in enumerate(VOIGT[d])}
-            return ufl.as_tensor([[flat[place[min(i, j), max(i, j)]] for j in range(d)] for i in range(d)])
-        return self.fields["lame"] * self._trace(u) * ufl.Identity(d) + 2 * self.fields["shear"] * eps
+        """Return sigma(u) (d, d) times the thickness, of a Function less that of initial strains. With these, or with
+        selective integration: ``follow`` when its values or the time have changed since."""
+        return self.stresses(u)[0]
+
+    def stresses(self, u: Any) -> tuple[Any, Any]:
+        """Return the stress and sigma_zz(u) times the thickness of a body in the plane, 0 in plane stress and else."""
+        eps, trace = ufl.sym(ufl.grad(u)), self._trace(u)
+        if self.initial is None or u is self.u:
+            return self.hooke(eps, 0.0, trace)
+        own, across = self.initial.parts
+        return self.hooke(eps - own, -across, trace - ufl.tr(own))
+
+    def hooke(self, eps: Any, across: Any, trace: Any) -> tuple[Any, Any]:
+        """Return (sigma (d, d), sigma_zz) times the thickness of a strain, that across the plane, and its trace."""
+        d, fields = self.space.dimension, self.fields
+        if self._anisotropic is None:
+            sigma = fields["lame"] * trace * ufl.Identity(d) + 2 * fields["shear"] * eps
+            sigma += fields["lame_out"] * across * ufl.Identity(d)
+            return sigma, fields["lame_out"] * (trace + across) + 2 * fields["shear"] * across
+        place = {pair: k for k, pair in enumerate(VOIGT[d])}
+        strains = [eps[i, j] if i == j else 2 * eps[i, j] for i, j in place] + [across] * (d == 2)
+        flat = ufl.dot(self._anisotropic, ufl.as_vector(strains))
+        sigma = ufl.as_tensor([[flat[place[min(i, j), max(i, j)]] for j in range(d)] for i in range(d)])
+        return sigma, flat[3] if d == 2 else 0.0 * trace
 
     def _trace(self, u: Any) -> Any:
         """tr eps or, of a Function, its mean over each cell; none in bilinear forms where ``dilatation`` adds it."""
@@ -106,32 +124,23 @@ class ElasticForms:
             return ufl.tr(ufl.sym(ufl.grad(u)))
         return 0.0 if u is self.u else self.dilatation.of(u)
 
-    def follow(self, u: Any) -> None:
-        """Bring stresses of a Function up to its values. Collective."""
+    def follow(self, u: Any, t: float | None = None) -> None:
+        """Bring stresses of a Function up to its values, and initial strains up to a time. Collective."""
         if self.dilatation is not None:
             self.dilatation.update(u)
-
-    def stress_across(self, u: Any) -> Any:
-        """Return sigma_zz(u) times the thickness of a body in the plane, 0 in plane stress; elsewhere zero."""
-        eps = ufl.sym(ufl.grad(u))
-        if self._anisotropic is not None and self.space.dimension == 2:
-            return self._flat_stress(eps)[3]
-        return self.fields["lame_out"] * self._trace(u)
-
-    def _flat_stress(self, eps: Any) -> Any:
-        """Stresses in the order of VOIGT, in the plane with sigma_zz."""
-        pairs = VOIGT[self.space.dimension]
-        return ufl.dot(self._anisotropic, ufl.as_vector([eps[i, j] if i == j else 2 * eps[i, j] for i, j in pairs]))
+        if self.initial is not None and t is not None:
+            self.initial.follow(t)
 
     def bilinear(self, name: str) -> Any:
         """Return the form of M, K, or C of the materials in the trial function ``u`` and the test function ``v``."""
-        u, v = self.u, self.v
-        fields, inertia, stiffness = self.fields, ufl.inner(u, v), ufl.inner(self.stress(u), ufl.sym(ufl.grad(v)))
-        form = {
-            "M": fields["rho"] * inertia * ufl.dx, "K": stiffness * ufl.dx,
-            "C": fields["alpha_rho"] * inertia * ufl.dx + fields["beta"] * stiffness * ufl.dx,
-        }[name]
-        return form + self._viscous_form() if name == "C" and self.viscous else form
+        u, v, fields = self.u, self.v, self.fields
+        if name == "M":  # forms=… without a stress take the mass from here
+            return fields["rho"] * ufl.inner(u, v) * ufl.dx
+        stiffness = ufl.inner(self.stress(u), ufl.sym(ufl.grad(v)))
+        if name == "K":
+            return stiffness * ufl.dx
+        form = fields["alpha_rho"] * ufl.inner(u, v) * ufl.dx + fields["beta"] * stiffness * ufl.dx
+        return form + self._viscous_form() if self.viscous else form
 
     def against(self, name: str, r: Any, inside: Any) -> Any:
         """Return rᵀA of the cells inside, A = M, K or C, as a linear form: the bilinear form with r as test function.
@@ -175,12 +184,6 @@ def _constants(space: Any, cells: Any, material: Material) -> Any:
     return ElasticValues(np.nan, np.nan, material.rho) if isinstance(material, Orthotropic) else material
 
 
-def _viscous(damping: Damping) -> tuple[float, float] | None:
-    """(lambda_v, mu_v) [Pa s] of viscous stresses; None where there are none."""
-    found: tuple[float, float] | None = getattr(damping, "viscosities", None)
-    return found if found and any(found) else None
-
-
 def _fields(one: Any, section: Section, damping: Damping, dimension: int) -> tuple[Any, ...]:
     lame, shear = section.elastic_constants(one)
     alpha, beta = damping.coefficients(one)
@@ -195,25 +198,22 @@ def _anisotropic(
     """The matrix of all cells (see ``Orthotropic.matrix``) times the thickness, as a function."""
     if d == 1:
         raise InputError("Orthotropic has no meaning on a line: give a LinearElastic")
-    shape = len(VOIGT[d]) + (d == 2), len(VOIGT[d])
-    found = compat.function(compat.lagrange(cells.mesh, degree, shape, continuous=False))
-    values = found.x.array.reshape(len(fields["lame"].x.array), -1, len(VOIGT[d]))
+    n, trace = len(VOIGT[d]), np.array([float(i == j) for i, j in VOIGT[d]])
+    rows = n + (d == 2)  # the last one is that of the strain and the stress across the plane
+    found = compat.function(compat.lagrange(cells.mesh, degree, (rows, rows), continuous=False))
+    values = found.x.array.reshape(len(fields["lame"].x.array), rows, rows)
     for where, one in materials:
         dofs = np.ravel(compat.cell_blocks(cells)[where])
         if isinstance(one, Orthotropic):
-            values[dofs] = section.thickness * one.matrix(section, d)
+            told, corner = section.thickness * one.matrix(section, d), section.thickness * one.stiffness[2, 2, 2, 2]
+            whole, across = told[:n], told[n:]
         else:
             lame, shear, out = (fields[name].x.array[dofs][:, None, None] for name in ("lame", "shear", "lame_out"))
-            values[dofs] = _isotropic(lame, shear, out, d)
+            whole = lame * np.outer(trace, trace) + shear * np.diag(1.0 + trace)
+            across, corner = out * trace, out + 2.0 * shear
+        values[dofs, :n, :n], values[dofs, n:, :n] = whole, across
+        values[dofs, :n, n:], values[dofs, n:, n:] = across.swapaxes(-1, -2), corner
     return found
-
-
-def _isotropic(lame: Array, shear: Array, out: Array, d: int) -> Array:
-    """Return the same matrix for isotropic constants (k, 1, 1)."""
-    trace = np.array([float(i == j) for i, j in VOIGT[d]])
-    whole = lame * np.outer(trace, trace) + shear * np.diag(1.0 + trace)
-    across = np.broadcast_to(out * trace, (len(whole), 1, len(trace)))
-    return np.concatenate([whole, across], axis=1) if d == 2 else whole
 
 
 def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, Material]]:

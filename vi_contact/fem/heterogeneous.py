@@ -62,7 +62,8 @@ class Heterogeneous:
     @property
     def varies(self) -> bool:
         """Return whether something changes inside of cells."""
-        return any(callable(one) and not _on_cells(one) for one in (self.E, self.nu, self.rho, self.xi))
+        given = [one for one in (self.E, self.nu, self.rho, self.xi) if callable(one)]
+        return not all(_is_function(one) and one.function_space.dofmap.dof_layout.num_dofs == 1 for one in given)
 
     def at(self, space: Any, cells: Indices) -> ElasticValues:
         """Return the constants at all unknowns of a DG0 or DG1 space. InputError, on all ranks, for values on these
@@ -77,11 +78,6 @@ class Heterogeneous:
 
 def _is_function(value: Any) -> bool:
     return isinstance(value, Expr) and hasattr(value, "function_space")
-
-
-def _on_cells(value: Any) -> bool:
-    """Whether it is a Function that is constant on every cell."""
-    return _is_function(value) and int(value.function_space.dofmap.dof_layout.num_dofs) == 1
 
 
 def _values(words: str, value: Values, space: Any, comm: MpiComm) -> Array:

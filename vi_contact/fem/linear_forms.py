@@ -13,6 +13,7 @@ from ..core.checks import function, on_all, optional, refuse
 from ..core.errors import InputError
 from . import compat
 from .form_checks import form_of
+from .initial_strains import InitialStrain
 from .loads import BodyForce, Traction
 from .space import FemSpace
 
@@ -78,5 +79,6 @@ class LinearForm:
         return at
 
 
-AnyLoad = Traction | BodyForce | LinearForm
+LOADS = Traction, BodyForce, InitialStrain, LinearForm
+AnyLoad = Traction | BodyForce | InitialStrain | LinearForm
 Loads = AnyLoad | Sequence[AnyLoad]

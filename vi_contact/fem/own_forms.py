@@ -100,13 +100,13 @@ class OwnForms(ElasticForms):
             notes.append("von Mises stresses take sigma_zz as zero: give a stress of shape (3, 3)")
         return tuple(notes)
 
-    def stress(self, u: Any) -> Any:
-        sigma, d = self._stress(u), self.space.dimension
-        return self.section.thickness * ufl.as_tensor([[sigma[i, j] for j in range(d)] for i in range(d)])
+    def stresses(self, u: Any) -> tuple[Any, Any]:
+        sigma, d, h = self._stress(u), self.space.dimension, self.section.thickness
+        across = h * sigma[2, 2] if d == 2 and sigma.ufl_shape == (3, 3) else 0.0
+        return h * ufl.as_tensor([[sigma[i, j] for j in range(d)] for i in range(d)]), across
 
-    def stress_across(self, u: Any) -> Any:
-        sigma, d = self._stress(u), self.space.dimension
-        return self.section.thickness * sigma[2, 2] if d == 2 and sigma.ufl_shape == (3, 3) else 0.0
+    def hooke(self, eps: Any, across: Any, trace: Any) -> tuple[Any, Any]:
+        raise InputError("InitialStrain beside forms=…, which tell no C; give a LinearForm, and stress= less C eps_0")
 
     def _stress(self, u: Any) -> Any:
         if self._given.stress is None:

@@ -11,7 +11,7 @@ import ufl
 from petsc4py import PETSc
 
 from ..core.algebra import Array, Indices, Mask, from_each, total
-from ..core.checks import instance, refuse
+from ..core.checks import instance, optional, refuse, whole
 from ..core.errors import InputError
 from ..core.system import SemiDiscreteSystem
 from . import compat
@@ -93,7 +93,8 @@ class FemSpace(NodalSpace):
     """
 
     def __init__(self, mesh: Any, prescribed: Sequence[Prescribed | GivenValues], tied: Sequence[Tied] = (),
-                 degree: int = 1, V: Any = None) -> None:
+                 degree: int = 1, V: Any = None, quadrature_degree: int | None = None) -> None:
+        optional(whole, "assemble", "quadrature_degree", quadrature_degree)
         self.mesh, self.degree = mesh, degree
         self.V = compat.vector_space(mesh, degree) if V is None else V
         self.comm: MpiComm = MpiComm(kept(mesh.comm))
@@ -122,7 +123,7 @@ class FemSpace(NodalSpace):
         self.numbers: Indices = self._numbers(links)
         self._P = PetscMatrix(self._selection()) if tied else None
         self.forms: Any = None  # the ElasticForms of the system made on it; stress output needs them
-        self.quadrature_degree: int | None = None  # of all its forms; None: as UFL estimates it
+        self.quadrature_degree = quadrature_degree  # of all its forms; None: as UFL estimates it
         self.stands: Array | None = None  # (k, d) where supports hold nodes that an earlier stage had moved [m]
 
     def compiled(self, form: Any) -> Any:

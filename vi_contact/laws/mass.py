@@ -61,7 +61,8 @@ class Redistributed:
         if surface.total == 0:
             return system
         massless, contact = _contact_unknowns(system, surface, tangential)
-        algebra, nodal, own = system.algebra, _row_sums(system), system.M.diagonal()
+        algebra, own = system.algebra, system.M.diagonal()
+        nodal = np.asarray(sum(r * (system.M @ r) for r in system.influence.T))  # row sums, in any nodal frames
         still = (own > 0.0) & ~system.influence.any(axis=1)  # no translation moves them
         lumping = self.lumping
         if system.space.hierarchy is not None:
@@ -108,11 +109,6 @@ def _contact_unknowns(system: SemiDiscreteSystem, surface: ContactSurface, tange
         faced = system.algebra.entries(surface.coupling, np.flatnonzero(contact))  # side 2, which would ring with mass
         contact[named(system, faced.indices)] = True
     return (contact.copy() if tangential or surface.coupling is not None else massless), contact
-
-
-def _row_sums(system: SemiDiscreteSystem) -> Array:
-    """Lumped mass of every unknown, in any nodal frames: sum over directions c of r_c (M r_c)."""
-    return np.asarray(sum(r * (system.M @ r) for r in system.influence.T))
 
 
 def _inertia_correction(system: SemiDiscreteSystem, moved: Matrix, inner: Mask, body: Mask, nodal: Array) -> Matrix:

@@ -68,7 +68,7 @@ class Energy:
     """Record the energy ledger of the run, all in joules, works and losses cumulative:
 
         W_input + E(0) = E(t) + D_damping + D_contact + D_friction + D_impact + D_algorithmic - defect
-        E = ½ vᵀMv + ½ uᵀKu
+        E = ½ vᵀMv + ½ uᵀKu, with initial strains ½ vᵀMv + ½ ∫ (eps - eps_0) : C (eps - eps_0), whose rates work too
 
     D_impact = ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ with its sign; W_input is the work of loads, inertia loads -M r a_g and
     prescribed motions. The defect is the work of the residual of the equation of motion, accumulated; its size relative
@@ -85,12 +85,17 @@ class Energy:
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """Return the initial energies; works and losses are zero, or those of the run that is continued."""
         self._problem = problem
-        self._now = energies(problem.equations, state.u, state.v)
+        self._now, self._stored = energies(problem.equations, state.u, state.v), self._of_strains(state)
         self._sums = {term: 0.0 if resumed is None else float(resumed[term]) for term in self._SUMS}
         return self._row()
 
     def _row(self) -> Row:
-        return {"energy_kinetic": self._now.kinetic, "energy_strain": self._now.strain, **self._sums}
+        return {"energy_kinetic": self._now.kinetic, "energy_strain": self._now.strain + self._stored, **self._sums}
+
+    def _of_strains(self, state: State) -> float:
+        """What initial strains add to ½ uᵀKu [J]."""
+        initial = getattr(getattr(self._problem.system.space, "forms", None), "initial", None)
+        return 0.0 if initial is None else float(initial.energy(self._problem.cartesian(state.u), state.t))
 
     def row(self, report: Report) -> Row:
         system, new = self._problem.equations, report.new
@@ -103,8 +108,9 @@ class Energy:
                 momentum = system.product("M", new.v)
                 kinetic = 0.5 * system.algebra.dot(new.v, momentum)
                 self._now = Energies(momentum, free.elastic, kinetic, free.strain)
-        impact = free.kinetic - self._now.kinetic
-        losses = (step.input, step.damping, step.contact, step.friction, impact, step.algorithmic, step.defect)
+        impact, before, self._stored = free.kinetic - self._now.kinetic, self._stored, self._of_strains(new)
+        work = step.input + (self._stored - before)
+        losses = (work, step.damping, step.contact, step.friction, impact, step.algorithmic, step.defect)
         for term, loss in zip(self._SUMS, losses, strict=True):
             self._sums[term] += loss
         return self._row()

@@ -39,10 +39,9 @@ class VonMises:
         from .. import compat
         from .outline import cell_volumes
 
-        space, self._assembled = forms.space, compat.assemble_vector
+        space, self._forms, self._assembled = forms.space, forms, compat.assemble_vector
         self._u = compat.function(space.V)
-        sigma = forms.stress(self._u) / forms.section.thickness
-        across = forms.stress_across(self._u) / forms.section.thickness
+        sigma, across = (one / forms.section.thickness for one in forms.stresses(self._u))
         mean = (ufl.tr(sigma) + across) / 3
         deviator = sigma - mean * ufl.Identity(space.dimension)
         squares = ufl.inner(deviator, deviator) + (3 - space.dimension) * (across - mean) ** 2
@@ -50,10 +49,11 @@ class VonMises:
         self._form = compat.compile_form(ufl.sqrt(1.5 * squares) * cell * ufl.dx(metadata={"quadrature_degree": 2}))
         self._volume = cell_volumes(space.mesh)
 
-    def __call__(self, nodal: Array) -> Array:
-        """Return the stresses of nodal displacements (owned nodes, d); collective."""
+    def __call__(self, nodal: Array, t: float = 0.0) -> Array:
+        """Return the stresses of nodal displacements (owned nodes, d) at a time; collective."""
         self._u.x.array[: nodal.size] = nodal.ravel()
         self._u.x.scatter_forward()
+        self._forms.follow(self._u, t)
         return np.asarray(self._assembled(self._form).array_r / self._volume)
 
 
@@ -156,7 +156,7 @@ class FrameWriter:
         moving = [space.expand(problem.cartesian(x), state.t, derivative)
                   for derivative, x in enumerate((state.u, state.v, acceleration))]
         von_mises = self._von_mises
-        stress = None if von_mises is None else on_first(space.comm, self._cell_numbers, von_mises(moving[0]))
+        stress = None if von_mises is None else on_first(space.comm, self._cell_numbers, von_mises(moving[0], state.t))
         slipping = np.zeros(problem.surface.count, dtype=bool)
         if problem.frictional and report is not None:
             slipping = slipped(report)

@@ -42,8 +42,8 @@ def as_function(problem: ContactProblem, state: State, name: str, *, continuous:
     check_sizes("as_function", problem, state)
     if name != "contact_pressure":
         x, derivative = (state.v, 1) if name == "v" else (state.u, 0)
-        return _function(problem, name, space.expand(problem.cartesian(x), state.t, derivative), continuous)
-    return _function(problem, name, nodal_contact(problem, state, np.ones(len(state.r_n)))[0][:, 0])
+        return _function(problem, name, space.expand(problem.cartesian(x), state.t, derivative), state.t, continuous)
+    return _function(problem, name, nodal_contact(problem, state, np.ones(len(state.r_n)))[0][:, 0], state.t)
 
 
 def read_function(problem: ContactProblem, folder: str | Path, name: str, *, t: float | None = None,
@@ -57,11 +57,11 @@ def read_function(problem: ContactProblem, folder: str | Path, name: str, *, t: 
     optional(number, "read_function", "t", t, unit="s")
     optional(instance, "read_function", "frame", frame, int, "give its number, 0 for the first and -1 for the last")
     kind, comm, d = "u" if name == "stress" else name, space.comm, space.dimension
-    points, values = comm.bcast(on_root(comm, lambda: _stored(Path(folder), kind, t, frame)))
+    points, values, t = comm.bcast(on_root(comm, lambda: _stored(Path(folder), kind, t, frame)))
     fits = len(points) > np.max(space.nodes, initial=-1)
     fits = fits and np.max(np.abs(points[space.nodes, :d] - space.points), initial=0.0) <= SAME * space.size
     refuse(["" if fits else f"the fields in '{folder}' are of another mesh: give the problem of that run"], comm)
-    return _function(problem, name, values[space.nodes] if values.ndim == 1 else values[space.nodes, :d], continuous)
+    return _function(problem, name, values[space.nodes] if values.ndim == 1 else values[space.nodes, :d], t, continuous)
 
 
 def _checked(owner: str, problem: Any, name: Any, continuous: Any) -> FemSpace:
@@ -73,8 +73,8 @@ def _checked(owner: str, problem: Any, name: Any, continuous: Any) -> FemSpace:
     return space_of(owner, problem.system)
 
 
-def _function(problem: ContactProblem, name: str, nodal: Array, continuous: bool = False) -> Any:
-    """The Function of values at the owned nodes, (k,) or (k, d); the stress is that of displacements."""
+def _function(problem: ContactProblem, name: str, nodal: Array, t: float, continuous: bool = False) -> Any:
+    """The Function of values at the owned nodes, (k,) or (k, d), at a time; the stress is that of displacements."""
     system, space = problem.system, space_of(name, problem.system)
     V = system.cached("scalars", lambda: compat.lagrange(space.mesh, space.degree)) if nodal.ndim == 1 else space.V
     found = compat.function(V)
@@ -83,7 +83,7 @@ def _function(problem: ContactProblem, name: str, nodal: Array, continuous: bool
     found.x.scatter_forward()
     if name == "stress":
         known_matrices("stress", system, "K")
-        found = system.cached(f"stress {continuous}", lambda: Stress(space, continuous))(found)
+        found = system.cached(f"stress {continuous}", lambda: Stress(space, continuous))(found, t)
     found.name = name
     return found
 
@@ -115,10 +115,10 @@ class Stress:
         self._ksp.getPC().setType("jacobi")
         self._ksp.setTolerances(rtol=ACCURACY, atol=0.0)
 
-    def __call__(self, u: Any) -> Any:
-        """Return the stress (d, d) of displacements; collective."""
+    def __call__(self, u: Any, t: float) -> Any:
+        """Return the stress (d, d) of displacements at a time; collective."""
         self._u.x.array[:] = u.x.array
-        self._forms.follow(self._u)
+        self._forms.follow(self._u, t)
         found = compat.function(self._tensors)
         values = found.x.array.reshape(-1, self._tensors.dofmap.index_map_bs)
         loads = compat.assemble_vector(self._load).array_r.reshape(-1, values.shape[1])
@@ -130,17 +130,18 @@ class Stress:
         return found
 
 
-def _stored(folder: Path, name: str, t: float | None, frame: int | None) -> tuple[Array, Array]:
-    """Points of the mesh, and a quantity of a frame at them."""
+def _stored(folder: Path, name: str, t: float | None, frame: int | None) -> tuple[Array, Array, float]:
+    """Points of the mesh, a quantity of a frame at them, and its time."""
     if not (folder / FIELDS_INDEX).is_file():
         raise InputError(f"'{folder}' has no {FIELDS_INDEX}: run it with out and fields=fem.XDMF(every=10)")
     try:
         index: Any = ET.parse(folder / FIELDS_INDEX)
         places = sorted((float(grid.find("Time").get("Value")), grid.find(f"Attribute[@Name='{name}']/DataItem").text)
                         for grid in index.findall(".//Grid[@GridType='Uniform']"))
-        file, path = places[_chosen([time for time, _ in places], t, frame)][1].split(":")
+        time, place = places[_chosen([time for time, _ in places], t, frame)]
+        file, path = place.split(":")
         with open_hdf5(folder / FIELDS / "mesh.h5") as mesh, open_hdf5(folder / file) as fields:
-            return mesh["points"][()], fields[path][()]
+            return mesh["points"][()], fields[path][()], time
     except (ET.ParseError, OSError, KeyError, AttributeError, TypeError) as error:
         raise InputError(f"the fields in '{folder}' are incomplete or damaged ({error}): restore them") from error
 

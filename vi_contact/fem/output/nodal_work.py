@@ -22,8 +22,9 @@ from ...core.step import Balance, Report, State
 from .. import compat
 from ..contact.surface import moved_by_held
 from ..groups import facets_of
-from ..linear_forms import AnyLoad, LinearForm, Loads
-from ..loads import BodyForce, Traction, as_tuple, evaluate
+from ..initial_strains import InitialStrain
+from ..linear_forms import LOADS, LinearForm, Loads
+from ..loads import as_tuple, evaluate
 from ..space import known_matrices, space_of
 
 log = logging.getLogger(__name__)
@@ -37,7 +38,7 @@ Rigid = tuple[Mask, Array, Mask | None, Beyond | None]
 def check_actions(owner: str, loads: Any, gravity: Any) -> None:
     """Raise InputError unless these are loads, as for ``fem.assemble``, and an acceleration."""
     for load in as_tuple(loads):
-        instance(owner, "loads", load, (Traction, BodyForce, LinearForm), "give the loads of fem.assemble")
+        instance(owner, "loads", load, LOADS, "give the loads of fem.assemble")
     optional(array, owner, "gravity", gravity, (None,), unit="m/s²")
 
 
@@ -54,7 +55,8 @@ class NodalWork:
     def __init__(self, owner: str, problem: ContactProblem, loads: Loads, gravity: Sequence[float] | None) -> None:
         space = space_of("NodalWork", problem.system)
         known_matrices("reactions and section forces", problem.system, "MCK")
-        self._problem, self.space, self._loads = problem, space, as_tuple(loads)
+        self._problem, self.space = problem, space
+        self._loads: Any = [one for one in as_tuple(loads) if not isinstance(one, InitialStrain)]  # known to the body
         for facets in (getattr(load, "facets", None) for load in self._loads):
             if facets is not None:
                 facets_of("NodalWork", "the facets of loads", facets, space.mesh)
@@ -64,6 +66,8 @@ class NodalWork:
         self._r, self._inside = compat.function(space.V), compat.function(compat.cell_space(space.mesh))
         self._forms = [space.compiled(space.forms.against(name, self._r, self._inside))
                        if name != "C" or space.forms.damped else None for name in ("K", "C", "M")]
+        self._initial = [] if space.forms.initial is None else [space.forms.initial]
+        self._forms += [space.compiled(one.against(self._r, self._inside)) for one in self._initial]
         g, mesh, h = ufl.TestFunction(space.V), space.mesh, space.forms.section.thickness
         self._load_forms = [  # their products with nodal values of the loads are rᵀf
             None if isinstance(load, LinearForm)
@@ -78,7 +82,7 @@ class NodalWork:
         do not carry it. Collective."""
         system, space = self._problem.system, self.space
         theirs = space.comm.sum(system.influence.T @ system.load.constant)
-        if theirs.any() and not (self._loads or self._gravity.any()) and space.comm.rank == 0:
+        if theirs.any() and not (self._loads or self._gravity.any() or self._initial) and space.comm.rank == 0:
             text = ", ".join(f"{x:.4g}" for x in theirs)
             log.warning("%s: the system has constant loads of (%s) N in all and none were given: if they act on these "
                         "elements give the loads of fem.assemble, or the gravity of with_weight", owner, text)
@@ -100,6 +104,7 @@ class NodalWork:
         for where, centre, cells, beyond in parts:
             self._inside.x.array[:] = 1.0 if cells is None else cells
             less = [beyond and beyond(*density) for density in densities]  # type: ignore[misc]
+            less[2:2] = [None for _ in self._initial]
             straight = self.space.held & where & (cells is None or self.space.hierarchy is not None)
             for k, motion in enumerate(rigid_motions(self.space.points, centre)):
                 self._direct += [one(np.where(straight, motion, 0.0)) for one in moved]
@@ -152,14 +157,14 @@ class NodalWork:
         total, r_t = np.zeros(self._count), 0.0 if contact.r_t is None else contact.r_t
         for k, (towards, along) in enumerate(self._direct):
             total[k] = towards @ contact.r_n - np.sum(along * r_t)
-        for matrix, x in zip(self._matrices, motion, strict=False):
+        for matrix, x in zip(self._matrices, [*motion, *(at(one.follow) for one in self._initial)], strict=False):
             if matrix is not None:
                 total += matrix @ x.ravel()
         for k, load in enumerate(self._loads):
             total -= self._of_load(k, load, at)
         return self.space.comm.sum(total)
 
-    def _of_load(self, k: int, load: AnyLoad, at: Callable[[Callable[[float], Any]], Any]) -> Array:
+    def _of_load(self, k: int, load: Any, at: Callable[[Callable[[float], Any]], Any]) -> Array:
         """Return rᵀf on this rank, (count,); what does not change with time is evaluated once."""
 
         def work(t: float) -> Array:

@@ -214,7 +214,9 @@ class Case:
     def parts(self, comm: Any) -> Parts:
         """Return what the problem is made of; collective."""
         mesh, tags = self.meshed(comm)
-        system = self._made("system", mesh=mesh, tags=tags, **self._shaking())
+        early = "excitation" not in self.nodes or not needs_body(self.nodes["excitation"])  # else they need the system
+        shaking = {"excitations": self.excitations()} if early else {}
+        system = self._made("system", mesh=mesh, tags=tags, **shaking)
         system = self._made("gravity", system=system, tags=tags) if "gravity" in self.nodes else system
         none = empty_surface(system.algebra.comm, system.space.dimension)
         surfaces = self._several("contact", system=system, tags=tags) or (none,)
@@ -222,11 +224,6 @@ class Case:
         calls = [one for one in nodes_in(self.nodes["system"]) if isinstance(one, Call)]
         rising = any(one.callee.name == "upgoing" and "motion" not in one.arguments for one in calls)
         return Parts(system, surface, tags, "gravity" in self.nodes, moved=rising)
-
-    def _shaking(self) -> dict[str, Any]:
-        """Return the excitations for what is built before the system is; none where they need it themselves."""
-        early = "excitation" not in self.nodes or not needs_body(self.nodes["excitation"])
-        return {"excitations": self.excitations()} if early else {}
 
     def meshed(self, comm: Any) -> tuple[Any, Tags]:
         """Return the mesh and its groups, all those that the tables name among them."""

@@ -1,0 +1,104 @@
+"""Strain a body before it has stresses: temperature, swelling, given dislocations (boundary method, eq. 25)."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+import ufl
+
+from ..core.algebra import Array, total
+from ..core.checks import array, function, optional
+from ..laws.materials import PlaneStress
+from . import compat
+from .forms import ElasticForms
+from .groups import cells_of
+from .loads import ActingLoad, evaluate
+from .mesh import Cells
+
+
+@dataclass(frozen=True)
+class InitialStrain(ActingLoad):
+    """Apply an initial strain eps_0(x, t): sigma = C (eps(u) - eps_0), as the load ∫ C eps_0 : eps(v).
+
+    Warming by T - T_0 is alpha (T - T_0) in all directions. A dislocation, a given jump b [m] across a surface with the
+    normal n, is the tensor b⊗n / h in a layer of cells of height h (Mura, Micromechanics of Defects in Solids, 1987,
+    ch. 1). In a cell eps_0 is interpolated as ``as_function`` projects stresses, by a constant in P1 and where the
+    integration is selective: what displacements of this degree can follow leaves a free body without stress. Stresses,
+    reactions, section forces and the energy ledger go by eps(u) - eps_0, damping by the rates of u.
+
+    Args:
+        value: the strain of all directions, across the plane too, or a tensor, of which the symmetric part counts,
+            (d, d) or in the plane (3, 3); or a function of points (k, d) [m] and the time [s] -> (k,) or (k, d, d).
+        history: factor s(t) of a value that is constant in time; cells: the part of the body that is strained.
+    Raises:
+        InputError: values of other shapes, NaN; beside forms=… of the user's own, which do not tell C.
+    """
+
+    value: float | Callable[[Array, float], Array]  # type: ignore[assignment]  # what is given
+    history: Callable[[float], float] | None = None
+    cells: Cells | None = None
+
+    def __post_init__(self) -> None:
+        if not callable(self.value):
+            array("InitialStrain", "value", self.value, (None,) * np.ndim(self.value))
+        optional(function, "InitialStrain", "history", self.history, "give a function of the time [s], or None")
+        optional(cells_of, "InitialStrain", "cells", self.cells)
+
+    def at(self, points: Array, room: Array, t: float) -> Array:
+        """Return the tensors at points (k, d), less the history, in the shape (k, 9) of the room."""
+        given = np.asarray(self.value(points, t) if callable(self.value) else self.value)
+        if given.ndim < 2:
+            return np.multiply.outer(np.broadcast_to(given, len(points)), np.eye(3).ravel())
+        whole = np.zeros((len(points), 3, 3))
+        whole[:, : given.shape[-1], : given.shape[-1]] = given
+        return whole.reshape(room.shape)
+
+
+class InitialStrains:
+    """Hold the sum of the initial strains of a body at a time, as tensors (3, 3), its load and energy. Collective."""
+
+    def __init__(self, body: ElasticForms, given: Sequence[InitialStrain]) -> None:
+        self._space, self._body, self._given, mesh = body.space, body, given, body.space.mesh
+        degree = 0 if body.dilatation else self._space.degree - compat.is_simplex(mesh)
+        self.tensors = compat.lagrange(mesh, degree, (3, 3), continuous=False)
+        self._field, cell = compat.function(self.tensors), ufl.TestFunction(compat.cell_space(mesh))
+        self.parts = own, across = self._split(self._field)
+        sigma, beyond = body.hooke(own, across, ufl.tr(own))
+        self._work = self._space.compiled(ufl.inner(sigma, ufl.sym(ufl.grad(body.v))) * ufl.dx)
+        self._energy = self._space.compiled(0.5 * (ufl.inner(sigma, own) + beyond * across) * cell * ufl.dx)
+
+    def _split(self, eps: Any) -> tuple[Any, Any]:
+        """(Strain (d, d), that across the plane, none in plane stress) of tensors."""
+        d = self._space.dimension
+        free = d != 2 or isinstance(self._body.section, PlaneStress)
+        return ufl.sym(ufl.as_tensor([[eps[i, j] for j in range(d)] for i in range(d)])), 0.0 if free else eps[2, 2]
+
+    def against(self, r: Any, inside: Any) -> Any:
+        """Return -rᵀf_0 of the cells inside as a linear form, whose products are with what ``follow`` returns."""
+        own, across = self._split(ufl.TestFunction(self.tensors))
+        return -inside * ufl.inner(self._body.hooke(own, across, ufl.tr(own))[0], ufl.sym(ufl.grad(r))) * ufl.dx
+
+    def follow(self, t: float, *, only: InitialStrain | None = None) -> Array:
+        """Sum up the strains at a time, or one of them less its history; return the owned values."""
+        points, blocks = self.tensors.tabulate_dof_coordinates(), compat.cell_blocks(self.tensors)
+        values = self._field.x.array.reshape(-1, 9)
+        values[:] = 0.0
+        for one in self._given if only is None else (only,):
+            part = one.cells and cells_of("InitialStrain", "cells", one.cells, self._space.mesh)
+            where = np.ravel(blocks[part.indices] if part else blocks)
+            at = partial(one.at, points[where, : self._space.dimension])
+            found = evaluate("InitialStrain", at, np.empty((len(where), 9)), t, self._space.comm)
+            values[where] += found if only or one.history is None else one.history(t) * found
+        return values[: self.tensors.dofmap.index_map.size_local].ravel()
+
+    def forces(self, t: float, *, only: InitialStrain | None = None) -> Array:
+        """Return the load on the free unknowns, of all strains or of one less its history."""
+        self.follow(t, only=only)
+        return self._space.pull(compat.assemble_vector(self._work).array_r)
+
+    def energy(self, u: Array, t: float) -> float:
+        """Return ½ ∫ eps_0 : C eps_0 - f_0·u [J], what they add to ½ uᵀKu of the free unknowns."""
+        work = self.forces(t) @ u
+        return total(self._space.comm, compat.assemble_vector(self._energy).array_r.sum() - work)
