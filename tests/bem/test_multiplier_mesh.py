@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from functools import cache
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,6 +26,7 @@ from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial
 MATERIAL = vc.LinearElastic.from_wave_speeds(1.0, 0.5, 1.0)
+ROOT = Path(__file__).parents[2]
 SIDES = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]
 K, STEPS = 6, 24  # elements a side; steps of h/c_P, until t = 4
 LAWS = {"none": vc.Frictionless(), "Tresca": vc.Tresca(0.05), "Coulomb": vc.Coulomb(0.1)}
@@ -144,6 +148,8 @@ def test_the_weight():
     rod grows by (1 - theta)/theta an interval, theta the weighted middle, which is less than exp(2 sigma DT)."""
     patches = own(patch=2, interval=4, testing="mean", sigma=0.0)
     assert patches.weights[0].tolist() == [0.125, 0.25, 0.25, 0.25, 0.125] and patches.weights[1].tolist() == [1.0] * 4
+    start = own(patch=2, interval=4, testing="mean", sigma=1e4).weights[0]
+    assert start[0] > 0.999 and start.sum() == pytest.approx(1.0, abs=1e-15)  # a great one tests the start of intervals
     means = march_contact(BoundaryContact(patches.condensed())).r_n
     moved = []
     for sigma in (0.04, 0.02, 0.01):  # DT = 2/3
@@ -176,6 +182,23 @@ def test_an_obstacle_that_moves():
     """B15: the mean of a motion over an interval: of a constant speed the place at its middle; at the end the place."""
     middle, end = own(interval=3, testing="mean").averaged(lambda t: 2.0 * t), own(interval=3).averaged(lambda t: t**2)
     assert middle(1.0) == pytest.approx(2.0 * (1.0 - 1.5 / K), rel=1e-14) and end(0.7) == 0.7**2
+
+
+def test_the_benchmark(tmp_path):
+    """benchmarks/bem_multiplier.py, small: means swing where ends do not, the constants are good in both; H = h takes
+    Uzawa's method more iterations; its picture."""
+    spec = spec_from_file_location("bem_multiplier", ROOT / "benchmarks" / "bem_multiplier.py")
+    assert spec and spec.loader
+    benchmark = sys.modules["bem_multiplier"] = module_from_spec(spec)  # its dataclasses look for their module
+    spec.loader.exec_module(benchmark)
+    square, fine = benchmark.Square(6), benchmark.Square(8).finest("none")
+    end, mean, thin, both = (square.row("none", fine, patch=patch, interval=interval, testing=testing) for
+                             patch, interval, testing in ((2, 2, "end"), (2, 2, "mean"), (1, 1, "end"), (4, 4, "mean")))
+    assert mean["oscillation"] > 3.0 * end["oscillation"] and mean["energy_error"] > 5.0 * end["energy_error"]
+    assert min(end["inf_sup"], mean["inf_sup"]) > 0.75 and thin["inf_sup"] < 0.5
+    assert thin["uzawa"] > 1.3 * end["uzawa"] and set(benchmark.KEYS) <= set(thin) and end["impulse_error"] < 0.03
+    drawn = benchmark.plot_multiplier([end, mean, thin, both], tmp_path / "ratio.png")
+    assert drawn.stat().st_size > 20_000
 
 
 def test_bad_input():
