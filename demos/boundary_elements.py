@@ -13,10 +13,10 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
 
@@ -28,6 +28,7 @@ import vi_contact as vc
 from demos.pictures.boundary import SHEAR, Curve, Panel, Shot, plot_boundary_snapshots, plot_panels
 from demos.problems import disk, embedded, square
 from demos.problems.boundary_elements import disk_contact, disk_problem, embedded_problem, square_problem
+from demos.problems.compare_tractions import Tractions, compared
 from demos.problems.interior import interior_displacement
 from vi_contact import bem
 from vi_contact.cli import status_of
@@ -35,7 +36,7 @@ from vi_contact.cli import status_of
 # Parameters ----------------------------------------------------------------------------------------------------------
 ELEMENTS = {"square": 20, "steel": 10, "concrete": 10, "ball": 80}  # along a side, around the ball
 QUICK = {"square": 6, "steel": 5, "concrete": 4, "ball": 24}
-CELLS = {"square": 80, "steel": 20, "concrete": 10, "ball": 0.04}  # of the finite elements; size of those of the ball
+CELLS = {"square": 160, "steel": 20, "concrete": 10, "ball": 0.04}  # of the finite elements; size of those of the ball
 QUICK_CELLS = {"square": 10, "steel": 5, "concrete": 4, "ball": 0.15}
 LAWS = {
     "square": {"no friction": vc.Frictionless(), "Tresca 0.05": vc.Tresca(0.05), "Coulomb 0.5": vc.Coulomb(0.5)},
@@ -56,13 +57,14 @@ COLOURS = ("black", "tab:blue", "tab:red")
 OUT = Path("results/boundary_elements")
 
 
-class Answer(NamedTuple):
+@dataclass(frozen=True)
+class Answer:
     """Hold one law of one example by boundary elements and by finite elements (``fem``: its history)."""
 
     run: bem.ContactRun
     bodies: tuple[tuple[bem.BoundaryProblem, bem.BoundaryMotion], ...]
     fem: Any
-    x: np.ndarray  # of the contact points of the finite elements
+    surface: vc.ContactSurface  # of the finite elements, all of it
 
     @property
     def energy(self) -> np.ndarray:
@@ -72,11 +74,10 @@ class Answer(NamedTuple):
     def fem_energy(self) -> np.ndarray:
         return self.fem["energy_kinetic"] + self.fem["energy_strain"]
 
-    def fem_mean(self, name: str, t: float) -> np.ndarray:
-        """Return pressure or shear of the finite elements, mean over the boundary element step that ends at t."""
-        times, values = self.fem["t"], self.fem[name].reshape(len(self.fem["t"]), -1)
-        inside = (times[1:] > t - self.run.contact.compliance.dt * (1 + 1e-9)) & (times[1:] <= t * (1 + 1e-9))
-        return 0.5 * (values[1:] + values[:-1])[inside].mean(axis=0)
+    @cached_property
+    def tractions(self) -> tuple[Tractions, Tractions]:
+        """Return pressures and shears of both methods on the nodes of the boundary elements."""
+        return compared(self.run, self.surface, self.fem)
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
@@ -111,8 +112,7 @@ def example(name: str, size: int, cells: float, comm: Any) -> dict[str, Answer]:
         solution = vc.simulate(
             problem(friction=friction), dt=fem_dt, t_end=T_END[name], record=(vc.Energy(), vc.Contact()), progress=False
         )
-        points = problem().surface.whole().points
-        answers[law] = Answer(run, solve(run.forces), solution.history, points[:, 0])
+        answers[law] = Answer(run, solve(run.forces), solution.history, problem().surface.whole())
     return answers
 
 
@@ -186,7 +186,8 @@ def draw(answers: dict[str, dict[str, Answer]], out: Path, chosen_shots: slice) 
               ("steel", "Coulomb 0.3", (0.01, 0.015, 0.02)), ("ball", "Coulomb 2", (0.3, 0.6, 0.9)))
     columns = [tractions(name, law, answers[name][law], times) for name, law, times in chosen]
     plot_panels(list(zip(*columns, strict=True)), out / "tractions.png",
-                title="Contact tractions: boundary elements (lines), finite elements (dots)")
+                title="Contact tractions on the nodes of the boundary elements: boundary elements (lines), finite elements "
+                      "(dots)")
     pairs = (("square", "steel"), ("concrete", "ball"))
     plot_panels([[energies(name, answers[name]) for name in pair] for pair in pairs], out / "energies.png",
                 title="Energy with and without friction: boundary elements (lines), finite elements (dots)")
@@ -226,21 +227,15 @@ def points_inside(mesh: bem.BoundaryMesh, spacing: float = 0.2) -> np.ndarray:
 
 
 def tractions(name: str, law: str, answer: Answer, times: Sequence[float]) -> tuple[Panel, Panel]:
-    """Return panels of pressure and of shear (support on body, along +x) over x at some times: reactions turned
-    round."""
-    run, order = answer.run, np.argsort(answer.x)
-    here = np.argsort(run.contact.compliance.points[:, 0])
-    x = run.contact.compliance.points[here, 0]
+    """Return panels of pressure and of shear (support on body, along +x) over x in the steps that end at some times."""
     panels = []
-    for quantity, sign, mine, theirs in (("pressure", 1.0, run.pressure, "pressure"),
-                                         (SHEAR, -1.0, run.shear, "traction_t")):
+    for quantity, both in zip(("pressure", SHEAR), answer.tractions, strict=True):
         curves = []
         for t, colour in zip(times, ("black", "tab:orange", "tab:green"), strict=True):
-            k = int(np.argmin(np.abs(run.times - t)))
+            k = int(np.argmin(np.abs(both.times - t)))
             moment = f"t = {1e3 * t:g} ms" if T_END[name] < 1.0 else f"t = {t:g} s"
-            dots = answer.fem_mean(theirs, run.times[k])[order]
-            curves.append(Curve(moment, x, sign * mine[k, here], colour))
-            curves.append(Curve("", answer.x[order], sign * dots, colour, marked=True))
+            curves.append(Curve(moment, both.x, both.mine[k], colour))
+            curves.append(Curve("", both.x, both.theirs[k], colour, marked=True))
         panels.append(Panel(f"{TITLES[name]}, {law}", quantity, "Pa", tuple(curves), "x [m]"))
     return panels[0], panels[1]
 

@@ -1,0 +1,52 @@
+"""Draw squared energy errors of both forms of the boundary element operator against the length of the elements."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vi_contact.plots.histories import canvas, plain_numbers, save
+
+STYLES: dict[str, dict[str, Any]] = {
+    "symmetric": {"color": "black", "marker": "o", "ms": 5, "lw": 1.2},
+    "unsymmetric": {"color": "tab:red", "marker": "x", "ms": 7, "lw": 1.0, "ls": "--"},
+}
+
+
+def plot_errors(rows: Sequence[Mapping[str, Any]], path: str | Path) -> Path:
+    """Draw a panel per case, examples in rows: error² + e² over h of both forms, and their slopes; e² as a line."""
+    cases = list(dict.fromkeys(row["case"] for row in rows))
+    examples = {example: [case for case in cases if case.split(", ")[0] == example]
+                for example in dict.fromkeys(case.split(", ")[0] for case in cases)}
+    columns = max(len(names) for names in examples.values())
+    figure, axes = canvas(len(examples), columns, (3.3 * columns + 0.4, 3.1 * len(examples) + 0.5))
+    for line, names in zip(axes, examples.values(), strict=True):
+        for axis, case in zip_longest(line, names):
+            if case is None:
+                axis.remove()
+            else:
+                _panel(axis, case, [row for row in rows if row["case"] == case])
+    figure.suptitle("Squared energy error of both forms against the finest symmetric solution")
+    return save(figure, path)
+
+
+def _panel(axis: Any, case: str, rows: Sequence[Mapping[str, Any]]) -> None:
+    finest = max(row["k"] for row in rows)  # the unsymmetric form's has a row: no error, a difference of the forms
+    reference = rows[0]["reference_error"]
+    for form, style in STYLES.items():
+        chosen = [row for row in rows if row["form"] == form and row["k"] < finest]
+        h = np.array([1.0 / row["k"] for row in chosen])
+        errors = np.array([row["error_squared"] for row in chosen]) + reference
+        told = f"{form}: {chosen[0]['slope']:.2f}" + ("" if chosen[0]["settled"] else " (not settled)")
+        axis.loglog(h, errors, label=told, **style)
+    axis.axhline(reference, color="0.5", lw=0.9, ls=":", label=f"$e^2$, k = {finest}")
+    axis.set_title(case, fontsize=9)
+    axis.set_xlabel("h [m]", fontsize=9)
+    axis.set_ylabel("error² + e², of the energy [-]", fontsize=9)
+    axis.tick_params(labelsize=7, which="both")
+    plain_numbers(axis.xaxis)
+    axis.legend(fontsize=7.5, title="slope", title_fontsize=7.5)
