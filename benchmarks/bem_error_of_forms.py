@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Error of both forms of the Poincaré-Steklov operator: squared energy norm of the error against h, and its slope.
 
-    python3 benchmarks/bem_error_of_forms.py [--levels 5 10 20 40] [--examples square "concrete on steel"] [--supports …]
-        [--json FILE] [--figure docs/figures/bem_forms.png]
+    python3 benchmarks/bem_error_of_forms.py [--levels 5 10 20 40] [--examples square "concrete on steel"]
+        [--supports rollers clamped "Tresca 0.05"] [--json FILE] [--figure docs/figures/bem_error_of_forms.png]
 
 The pressed square under a step and the concrete box under its slow load, c_P dt / h fixed, k elements a side, the base
 on rollers, clamped, or in contact with friction; each level against the finest symmetric solution. How errors, slopes

@@ -186,8 +186,8 @@ def draw(answers: dict[str, dict[str, Answer]], out: Path, chosen_shots: slice) 
               ("steel", "Coulomb 0.3", (0.01, 0.015, 0.02)), ("ball", "Coulomb 2", (0.3, 0.6, 0.9)))
     columns = [tractions(name, law, answers[name][law], times) for name, law, times in chosen]
     plot_panels(list(zip(*columns, strict=True)), out / "tractions.png",
-                title="Contact tractions on the nodes of the boundary elements: boundary elements (lines), finite elements "
-                      "(dots)")
+                title="Contact tractions on the nodes of the boundary elements: boundary elements (lines), "
+                      "finite elements (dots)")
     pairs = (("square", "steel"), ("concrete", "ball"))
     plot_panels([[energies(name, answers[name]) for name in pair] for pair in pairs], out / "energies.png",
                 title="Energy with and without friction: boundary elements (lines), finite elements (dots)")

@@ -28,7 +28,7 @@ from demos.problems.boundary_elements import BOTTOM, square_problem
 from vi_contact.bem.contact import BoundaryContact
 from vi_contact.bem.contact_run import march_contact
 from vi_contact.bem.energetic import marched
-from vi_contact.bem.poincare_steklov import BoundaryProblem, PoincareSteklov
+from vi_contact.bem.poincare_steklov import BoundaryProblem, CondensedCompliance, PoincareSteklov
 from vi_contact.core.algebra import Array
 from vi_contact.core.protocols import FrictionLaw, Frictionless
 from vi_contact.laws.friction import Coulomb, Tresca
@@ -89,12 +89,12 @@ class Solutions:
         assert isinstance(operator, PoincareSteklov)
         for form, symmetric in FORMS.items():
             problem = replace(made, operator=replace(operator, symmetric=symmetric))
-            rubs = [name for name, support in example.supports.items() if not isinstance(support, tuple)]
-            condensed = problem.condensed() if rubs else None
+            condensed: CondensedCompliance | None = None
             for name, support in example.supports.items():
                 if isinstance(support, tuple):
                     motion = held(problem, support).solve()
                 else:
+                    condensed = condensed or problem.condensed()
                     run = march_contact(BoundaryContact(condensed, friction=support))
                     motion, self.worst = problem.solve(run.forces), max(self.worst, run.worst)
                 self.displacement[name, form, k] = motion.displacement
