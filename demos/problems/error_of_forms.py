@@ -19,7 +19,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -69,7 +69,7 @@ EXAMPLES = {
         LinearElastic.from_wave_speeds(1.0, 0.5, 1.0), lambda t: 1.0, 1.0, 4,
         HELD | {"no friction": Frictionless(), "Tresca 0.05": Tresca(0.05)}),
     "concrete on steel": Example(
-        _BOX.material, lambda t: _BOX.pressure * math.tanh((t / 0.015) ** 2), 8.0, 8,
+        _BOX.material, lambda t: _BOX.pressure * math.tanh((t / 0.015) ** 2), 4.0, 8,
         HELD | {"Coulomb 0.3": Coulomb(0.3)}),
 }
 
@@ -123,6 +123,13 @@ def prolonged(u: Array, k: int, fine: int) -> Array:
     return np.asarray((1.0 - part) * along[before] + part * along[before + 1])
 
 
+class Norm(Protocol):
+    """Measure sums of given motions."""
+
+    def square(self, weights: Array) -> float:
+        """Return |sum_i weights_i u_i|²."""
+
+
 class EnergyNorm:
     """Give products <S v, w>, summed over all times up to each and then over these, of motions of the finest space."""
 
@@ -151,7 +158,7 @@ def measure(name: str, levels: Sequence[int], *supports: str) -> list[Row]:
     for support in example.supports:
         places = [key for key in found.displacement if key[0] == support]
         norm = EnergyNorm(operator, [prolonged(found.displacement[key], key[2], fine) for key in places])
-        squares = _Differences(norm, [key[1:] for key in places])
+        squares = Differences(norm, [key[1:] for key in places])
         e2, cosine = squares.reference_error(fine)
         for form in FORMS:
             energies = {k: found.energy[support, form, k] for k in levels}
@@ -167,10 +174,10 @@ def measure(name: str, levels: Sequence[int], *supports: str) -> list[Row]:
     return rows
 
 
-class _Differences:
-    """Squared energy norms of differences of solutions, over that of the finest symmetric one."""
+class Differences:
+    """Give squared energy norms of differences of solutions, over that of the finest symmetric one."""
 
-    def __init__(self, norm: EnergyNorm, keys: list[tuple[str, int]]) -> None:
+    def __init__(self, norm: Norm, keys: list[tuple[str, int]]) -> None:
         self._norm, self._keys = norm, keys
         finest = ("symmetric", max(k for _, k in keys))
         self._unit = norm.square(self._weights(finest))
@@ -183,6 +190,7 @@ class _Differences:
         return weights
 
     def between(self, one: tuple[str, int], two: tuple[str, int]) -> float:
+        """Return the squared norm of the difference of two solutions."""
         return self._norm.square(self._weights(one, two)) / self._unit
 
     def reference_error(self, fine: int) -> tuple[float, float]:
