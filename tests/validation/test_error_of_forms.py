@@ -1,4 +1,4 @@
-"""Errors of both forms of the Poincaré-Steklov operator against the finest symmetric solution: slopes, and their means."""
+"""Errors of both forms of the Poincaré-Steklov operator against the finest symmetric solution, and their slopes."""
 
 from __future__ import annotations
 
