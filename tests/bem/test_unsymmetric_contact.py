@@ -115,6 +115,20 @@ def test_methods_and_failures():
         march_contact(spoilt(20.0))
 
 
+@pytest.mark.parametrize("form", ["symmetric", "unsymmetric"])
+def test_points_at_rest_are_certified(form):
+    """Loads that friction and pressure take up to the last point, one of them grazing: x is zero but for rounding, which
+    the motion without reactions measures, not x."""
+    compliance = replace(condensed(5, form), W=condensed(5, form).W[:1], u_free=condensed(5, form).u_free[:1])
+    for seed in range(8):
+        contact = BoundaryContact(compliance, friction=LAWS["Tresca"])
+        r = 1e-27 * np.random.default_rng(seed).uniform(0.1, 1.0, size=12)
+        r[2] = 0.0
+        held = replace(compliance, u_free=(contact.W[0] @ r @ contact.frames)[None])
+        found = march_contact(replace(contact, compliance=held))
+        assert found.worst < 1e-13 and np.append(found.r_n, found.r_t) == pytest.approx(r, rel=1e-12, abs=1e-41)
+
+
 def test_corners_and_two_bodies():
     """A box in a notch, whose corner has two conditions, and the square on its mirror image, of which one body has the
     unsymmetric form, rubbing: impulses as with the symmetric form, measured 0.16 and 0.09 % off."""

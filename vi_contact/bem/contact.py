@@ -235,8 +235,8 @@ class BoundaryContact:
         slip0 = surface.slip_origin(before, k * dt, (k + 1) * dt) if self.frictional else None
         return StepProblem(
             A=self.matrix, b=self.matrix @ past, bound=surface.gap((k + 1) * dt), surface=surface, scale=1.0,
-            guess=before, active=active, t=(k + 1) * dt, k=k + 1, friction=self.friction, slip0=slip0,
-            rate_factor=1.0 / dt,
+            guess=past,  # the size that rounding is measured by, also where contact holds all points at zero
+            active=active, t=(k + 1) * dt, k=k + 1, friction=self.friction, slip0=slip0, rate_factor=1.0 / dt,
         )
 
     def load(self, r_n: Array, r_t: Array | None) -> Array:
