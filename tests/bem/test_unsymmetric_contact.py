@@ -117,8 +117,8 @@ def test_methods_and_failures():
 
 @pytest.mark.parametrize("form", ["symmetric", "unsymmetric"])
 def test_points_at_rest_are_certified(form):
-    """Loads that friction and pressure take up to the last point, one of them grazing: x is zero but for rounding, which
-    the motion without reactions measures, not x."""
+    """Loads that friction and pressure take up to the last point, one of them grazing: x is zero but for rounding, and
+    the motion without reactions measures that, not x."""
     compliance = replace(condensed(5, form), W=condensed(5, form).W[:1], u_free=condensed(5, form).u_free[:1])
     for seed in range(8):
         contact = BoundaryContact(compliance, friction=LAWS["Tresca"])
