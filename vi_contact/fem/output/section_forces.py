@@ -1,8 +1,10 @@
 """Record section forces N, V, M of plane cuts through walls, slabs and columns, along element sides or through them."""
 
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,19 +24,7 @@ from .nodal_work import Loads, NodalWork, Rigid, check_actions, rigid_motions
 
 ON_LINE = 1e-6  # of the length of the cut: what counts as lying on it, and how far a rectangle's angles may be from 90°
 UNCOVERED = 1e-3  # of the length of a cut in the plane: what the elements on it may miss
-_QUANTITIES = {
-    "N": ("N", "normal force, tension positive"),
-    "V": ("N", "shear force, on the part right of the cut along it"),
-    "M": ("N m", "bending moment, positive with tension at the end of the cut"),
-}
-_IN_SPACE = {
-    "N": _QUANTITIES["N"],
-    "V_2": ("N", "shear force along the first side of the cut, on the part behind it"),
-    "V_3": ("N", "shear force along the second side of the cut, on the part behind it"),
-    "M_t": ("N m", "twisting moment about the normal of the cut, on the part behind it"),
-    "M_2": ("N m", "bending moment about the first side of the cut, positive with tension towards the second"),
-    "M_3": ("N m", "bending moment about the second side of the cut, negative with tension towards the first"),
-}
+_QUANTITIES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))  # unit, meaning
 
 
 @dataclass
@@ -90,7 +80,7 @@ class SectionForces:
         return {
             f"{quantity}_{label}": (unit, f"{text}, section {label}")
             for label, ends in self.cuts.items()
-            for quantity, (unit, text) in (_QUANTITIES if len(ends) == 2 else _IN_SPACE).items()
+            for quantity, (unit, text) in _QUANTITIES["plane" if len(ends) == 2 else "space"].items()
         }
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:

@@ -6,7 +6,9 @@ reaction there. To look at the signs costs no product, and to go on from a known
 solves for the correction.
 """
 
+import tomllib
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,18 +23,7 @@ from .preconditioners import Masked
 Watch = Callable[[int, Array, Callable[[], Array]], int]
 SOLVED, WRONG_SIGNS = 3, 2  # of PETSc's reasons: below an absolute, a relative tolerance
 STAGNATED, NOT_A_NUMBER, INDEFINITE = -3, -9, -10  # too many iterations; not a number; indefinite matrix
-HELD = ("check that every body is held or has mass, that A is positive definite, and that no material is a million "
-        "times stiffer than its neighbour")
-OTHER = "take another preconditioner, or Condensed() where a factor fits into memory"
-NUMBERS = "check the load, the guess and the bound of this step for NaN"
-SAID = {
-    STAGNATED: ("the residual stagnated", f"{HELD}; else {OTHER}"),
-    INDEFINITE: ("A is not positive definite", HELD),
-    NOT_A_NUMBER: ("the residual is not a number", NUMBERS),
-    WRONG_SIGNS: ("the contact set did not settle", OTHER),
-    -8: ("the preconditioner is not positive definite", OTHER),
-    -11: ("the preconditioner could not be applied", OTHER),
-}
+SAID = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))  # what happened, what helps
 SHOWN = 6  # residuals
 
 
@@ -70,7 +61,7 @@ class ConjugateGradients:
 
 def stopped(name: str, reason: int, iterations: int, history: Sequence[float]) -> StepFailure:
     """Return the failure of a solver that stopped for PETSc's ``reason``; ``history``: residuals over the forces."""
-    words, remedy = SAID.get(reason, ("conjugate gradients broke down", f"{HELD}; else {OTHER}"))
+    words, remedy = SAID.get(str(reason), SAID["cg"])
     return StepFailure(f"{name} stopped after {iterations} linear iterations, {words} (residuals {told(history)}): "
                        f"{remedy}")
 

@@ -13,7 +13,7 @@ from ...core.errors import StepFailure
 from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
 from ...laws.friction import project
-from .conjugate_gradients import NOT_A_NUMBER, OTHER, SAID, told
+from .conjugate_gradients import NOT_A_NUMBER, SAID, told
 from .contact import Contact
 from .friction_krylov import Gmres, Turned
 from .friction_laws import LawOfStep
@@ -141,7 +141,7 @@ class Newton:
         force = self.scales.force
         self.history.append(self.error / force if 0.0 < force < np.inf else self.error)
         if not np.isfinite(self.error):
-            raise self._stopped(*SAID[NOT_A_NUMBER])
+            raise self._stopped(*SAID[str(NOT_A_NUMBER)])
         self.goal = of.worth.goal(self.error, self.scales, self.x, self.r_n, self.r_t, begin=self.steps == 0)
         if self.law.settled and self.error <= self.goal and not any_wrong:
             return True
@@ -177,7 +177,7 @@ class Newton:
         share = min(SHARE, AHEAD * last[1] / last[0]) if last[0] > 0.0 and len(last) > 1 else SHARE
         dx, left, reason = of.gmres.solve(residual, share, 0.5 * self.goal)
         if reason < 0:
-            raise self._stopped(*SAID.get(reason, ("GMRES broke down", OTHER)))
+            raise self._stopped(*SAID.get(str(reason), SAID["gmres"]))
         of.operator.work.newton_steps += 1
         self.steps += 1
         self.x += dx

@@ -45,9 +45,6 @@ class Tangents:
         """Return the entries of a table (m, d - 1) for ``rows``."""
         return np.asarray(table[self._free])
 
-    def rows_of(self, points: Mask) -> Indices:
-        """Return the rows of the tangents of these points."""
-        return self.rows[(self._free & points[:, None])[self._free]]
 
 
 @dataclass(frozen=True)
@@ -104,7 +101,8 @@ class States:
     @property
     def held(self) -> Indices:
         """Return the rows of the tangents that stick."""
-        return self._tangents.rows_of(self.stick)
+        sticks = np.repeat(self.stick[:, None], self.direction.shape[1], axis=1)
+        return self._tangents.rows[self._tangents.flat(sticks)]
 
     def turned(self, p: Array) -> Array:
         """Return kappa (p - n n·p) + rise n n·p of tangential values p (m, d - 1)."""

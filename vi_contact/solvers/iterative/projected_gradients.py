@@ -50,10 +50,6 @@ class Projected:
         """Return the inner product over all ranks."""
         return total(self.of.comm, x @ y)
 
-    def least(self, values: Array) -> float:
-        """Return the smallest value on all ranks."""
-        return -largest(self.of.comm, -np.min(values, initial=np.inf))
-
     def precondition(self, phi: Array, free: Mask) -> Array:
         """Return D^½ w M⁻¹ w D^½ phi."""
         masked = self.of.masked
@@ -126,7 +122,8 @@ class Face:
         image, curvature = self._curvature(p)
         length = self._problem.dot(self.gradient, p) / curvature
         blocking = p > 0.0
-        feasible = self._problem.least((self.r - lower)[blocking] / p[blocking])
+        steps = (self.r - lower)[blocking] / p[blocking]
+        feasible = -largest(self._problem.of.comm, -np.min(steps, initial=np.inf))
         if length <= feasible:
             self._place(np.maximum(self.r - length * p, lower), self.gradient - length * image)
             z = self._problem.precondition(self.phi, self.free)

@@ -28,7 +28,7 @@ class FrictionJacobian:
         self._order = places.data.astype(np.int64) - 1  # of the entries of all parts, none of which is given twice
         self._values = {name: values for name, (_, _, values) in parts.items()}
         self._A, self._inverse = parts["A"][2], 1.0 / self._system.stiffness[self._system.line]
-        self.mat = aij(places, self._system.comm)
+        self.mat = aij(places, self._system.body.comm)
         self._csr = places.indptr.astype(PETSc.IntType), places.indices.astype(PETSc.IntType)
 
     def _entries(self) -> tuple[int, dict[str, Entries]]:

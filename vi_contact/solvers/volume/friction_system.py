@@ -23,7 +23,6 @@ whose signs after a projection say how far the unknown had gone beyond: the rule
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -55,11 +54,6 @@ class FrictionSystem:
         self.size = self.first_gamma + len(self.pairs)
         self.any_disk = bool(body.max(float(len(self.pairs)))[0])
         self.stiffness = body.A.matrix.diagonal()[self.tangent]
-
-    @property
-    def comm(self) -> Any:
-        """Return the PETSc communicator."""
-        return self.body.comm
 
     def split(self, y: Array) -> tuple[Array, Array, Array]:
         """Return (z, lambda, gamma)."""

@@ -5,8 +5,10 @@ PETSC_OPTIONS). SNES VI reads its options again whenever the active set changes,
 as long as a solve runs and are taken out afterwards: two solvers with one prefix do not meet.
 """
 
+import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from petsc4py import PETSc
@@ -64,13 +66,8 @@ def refuse(combination: str, reason: str, remedy: str) -> None:
 
 
 NOT_EXACT = "one application of it does not solve the system"
-NEEDS_MODES = "it is built on the whole displacement field, and the reduced matrix has lost its blocks and rigid modes"
-REDUCED_PC = {
-    "gamg": f"{NEEDS_MODES} (PETSc 3.18 stops with error 60 as soon as the active set changes)",
-    "mg": f"{NEEDS_MODES}, so its grid transfers no longer fit",
-    "fieldsplit": "its field numbers belong to the whole field and select wrong rows of the reduced matrix",
-}
-SYMMETRIC_KSP = ("cg", "pipecg", "groppcg", "cgne", "cr", "minres", "symmlq", "nash", "stcg", "gltr", "chebyshev")
+TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+REDUCED_PC = TABLES["reduced_pc"]
 
 
 def check_reduced(snes: Any, layers: OptionLayers) -> None:
@@ -100,7 +97,7 @@ def check_friction(snes: Any, layers: OptionLayers) -> None:
 def _check_unsymmetric(snes: Any, layers: OptionLayers, wanted: str, what: str, matrix: str) -> None:
     _check_type(snes, wanted, layers)
     pc, ksp = snes.ksp.pc.getType(), snes.ksp.getType()
-    for kind, name, symmetric in (("pc", pc, ("cholesky", "icc")), ("ksp", ksp, SYMMETRIC_KSP)):
+    for kind, name, symmetric in (("pc", pc, ("cholesky", "icc")), ("ksp", ksp, TABLES["symmetric_ksp"])):
         if name in symmetric:
             refuse(f"{kind}_type {name} with {what}", f"{matrix} is not symmetric", "use lu with preonly")
     if ksp == "preonly" and pc != "lu":

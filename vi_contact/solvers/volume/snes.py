@@ -17,20 +17,10 @@ from ...core.algebra import Array
 from .bounded_system import BoundedSystem
 from .friction_jacobian import FrictionJacobian
 from .friction_system import ScaledFrictionStep
-from .options import OptionLayers, Options, check_friction, check_reduced, check_semismooth
+from .options import TABLES, OptionLayers, Options, check_friction, check_reduced, check_semismooth
 from .scaled_step import ScaledStep
 
-# Line search: `bt` throttles changes of the active set, 16 to 50 iterations instead of 5 to 7.
-# Tolerances: ours decide (ScaledStep.verdict); one of these set by the user stops earlier, relative to |b|.
-NEWTON_OPTIONS: Options = {
-    "snes_linesearch_type": "none", "snes_vi_zero_tolerance": 0.0, "snes_max_it": 100,
-    "snes_rtol": 0.0, "snes_atol": 0.0, "snes_stol": 0.0,
-}
-MUMPS_OPTIONS: Options = {
-    "ksp_type": "preonly",
-    "pc_factor_mat_solver_type": "mumps",
-    "mat_mumps_icntl_20": 0,  # distributed right-hand sides crash
-}
+NEWTON: Options = TABLES["newton"] | TABLES["mumps"]
 
 
 class SnesDriver:
@@ -171,7 +161,7 @@ class ReducedNewton:
 
     def defaults(self, ranks: int) -> Options:
         """Return the options that come before the user's."""
-        return {**NEWTON_OPTIONS, **MUMPS_OPTIONS, "pc_type": "cholesky"}
+        return {**NEWTON, "pc_type": "cholesky"}
 
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> SnesDriver:
         """Return the SNES object."""
@@ -181,7 +171,7 @@ class ReducedNewton:
     def friction_defaults(self) -> Options:
         """Return options before the user's: LU, the system with friction is not symmetric. Its zeros on the diagonal
         delay pivots, for which MUMPS on several ranks needs more room than usual, or stops with INFOG(1) = -9."""
-        return {**NEWTON_OPTIONS, **MUMPS_OPTIONS, "pc_type": "lu", "mat_mumps_icntl_14": 200}
+        return {**NEWTON, "pc_type": "lu", "mat_mumps_icntl_14": 200}
 
     def friction_driver(self, scaled: ScaledFrictionStep, layers: OptionLayers) -> SnesDriver:
         """Return the SNES object of a step with friction."""
@@ -200,7 +190,7 @@ class SemismoothNewton:
 
     def defaults(self, ranks: int) -> Options:
         """Return the options that come before the user's."""
-        return {**NEWTON_OPTIONS, **MUMPS_OPTIONS, "snes_linesearch_type": "bt", "pc_type": "lu"}
+        return {**NEWTON, "snes_linesearch_type": "bt", "pc_type": "lu"}
 
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> SnesDriver:
         """Return the SNES object."""

@@ -10,7 +10,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ...core.algebra import Array
-from .options import REDUCED_PC, OptionLayers, Options, refuse
+from .options import REDUCED_PC, TABLES, OptionLayers, Options, refuse
 from .scaled_step import ScaledStep
 from .snes import AssembledJacobian, weakly, write_bounds
 
@@ -91,8 +91,7 @@ class TaoTron:
 
     def defaults(self, ranks: int) -> Options:
         """Return the options that come before the user's; PETSc has no incomplete Cholesky for several ranks."""
-        return {"tao_gatol": 0.0, "tao_grtol": 0.0, "tao_gttol": 0.0, "tao_steptol": 0.0, "tao_max_it": 200,
-                "pc_type": "icc" if ranks == 1 else "bjacobi", "sub_pc_type": "icc"}
+        return {**TABLES["tron"], "pc_type": "icc" if ranks == 1 else "bjacobi"}
 
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> TaoDriver:
         """Return the TAO object."""
