@@ -12,6 +12,8 @@ from .errors import InputError
 from .surfaces import ContactSurface
 from .system import SemiDiscreteSystem
 
+EXCITATION = ("acceleration", "direction", "duration")  # what is asked of one
+
 
 class Excitation(Protocol):
     """Shake the ground in one direction, or give any motion its history: the contract of every excitation."""

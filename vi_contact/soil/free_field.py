@@ -20,8 +20,7 @@ from ..core.algebra import Array, total
 from ..core.checks import provides
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
-from ..core.problem_checks import EXCITATION
-from ..core.protocols import Excitation
+from ..core.protocols import EXCITATION, Excitation
 from ..fem import compat
 from ..fem.dashpots import BoundaryLoads, CompliantBase, DashpotMatrix, Dashpots, impedances
 from ..fem.petsc_algebra import PetscMatrix

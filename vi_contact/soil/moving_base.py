@@ -22,8 +22,7 @@ import scipy.sparse as sp
 from ..core.algebra import Array
 from ..core.checks import provides
 from ..core.errors import InputError
-from ..core.problem_checks import EXCITATION
-from ..core.protocols import Excitation
+from ..core.protocols import EXCITATION, Excitation
 from ..core.surfaces import ContactSurface
 from ..core.system import Load, SemiDiscreteSystem
 from .companion import CompanionRun, linear_problem

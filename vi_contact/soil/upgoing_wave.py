@@ -12,8 +12,7 @@ import numpy as np
 from ..core.algebra import Array
 from ..core.checks import flag, number, provides
 from ..core.errors import InputError
-from ..core.problem_checks import EXCITATION
-from ..core.protocols import Excitation
+from ..core.protocols import EXCITATION, Excitation
 from ..ground_motion.excitation import GroundMotion
 from ..ground_motion.record import Record
 
