@@ -86,13 +86,10 @@ def _sentence(error: Exception) -> str | None:
 
 def _of_memory(error: BaseException) -> bool:
     """Whether an error, or one it came from, says that there is no memory: Python's, numpy's, HDF5's, PETSc's."""
-    return any(
-        isinstance(one, MemoryError)
-        or getattr(one, "errno", None) == errno.ENOMEM
-        or getattr(one, "ierr", None) == PETSC_ERR_MEM
-        or (not isinstance(one, ViContactError) and any(word in str(one).lower() for word in _MEMORY))
-        for one in _chain(error)
-    )
+    return any(isinstance(one, MemoryError) or getattr(one, "errno", None) == errno.ENOMEM
+               or getattr(one, "ierr", None) == PETSC_ERR_MEM
+               or (not isinstance(one, ViContactError) and any(word in str(one).lower() for word in _MEMORY))
+               for one in _chain(error))
 
 
 def _chain(error: BaseException | None) -> Iterator[BaseException]:

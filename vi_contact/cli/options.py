@@ -5,7 +5,6 @@ import math
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,21 +15,21 @@ from ..core.errors import InputError
 
 MOST_SPACED = 100_000  # periods or frequencies of a spectrum
 PICTURES = (".png", ".pdf", ".svg")
-_NONE: Mapping[str, Any] = {}
+_TOLD = tomllib.loads(Path(__file__).with_name("options.toml").read_text(encoding="utf-8"))
 
 
 def add_command(commands: Any, name: str, run: Callable[[argparse.Namespace], str], *parts: str,
-                words: Mapping[str, Any] = _NONE) -> argparse.ArgumentParser:
+                words: Mapping[str, Any] | None = None) -> argparse.ArgumentParser:
     """Add a command, or an action of one such as "motion info", with these parts of options.toml; return its parser.
 
     run: what it calls. words: what the texts there, and the names of types, are looked up in.
     """
-    known, command = {"float": float, "int": int} | dict(words), _told()[name]
+    known, command = {"float": float, "int": int} | dict(words or {}), _TOLD[name]
     told = command["help"]
     about = command.get("description", f"{told[0].upper()}{told[1:]}.")
     parser: argparse.ArgumentParser = commands.add_parser(name.split()[-1], help=told, description=about)
     for part in parts:
-        table = _told()[part]
+        table = _TOLD[part]
         titled = parser.add_argument_group(table["title"], table.get("about")) if "title" in table else parser
         _add(titled, table, known)
     parser.set_defaults(run=run)
@@ -39,13 +38,8 @@ def add_command(commands: Any, name: str, run: Callable[[argparse.Namespace], st
 
 def add_actions(commands: Any, name: str) -> Any:
     """Add a command that has actions, and return what they are added to."""
-    actions = commands.add_parser(name, help=_told()[name]["help"])
+    actions = commands.add_parser(name, help=_TOLD[name]["help"])
     return actions.add_subparsers(dest="action", required=True, metavar="ACTION")
-
-
-@cache
-def _told() -> dict[str, Any]:
-    return tomllib.loads(Path(__file__).with_name("options.toml").read_text("utf-8"))
 
 
 def _add(place: Any, table: Mapping[str, Any], known: Mapping[str, Any]) -> None:

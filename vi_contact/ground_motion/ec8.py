@@ -1,7 +1,9 @@
 """Give the elastic response spectra of Eurocode 8, EN 1998-1:2004, 3.2.2.2 (horizontal) and 3.2.2.3 (vertical)."""
 
 import math
+import tomllib
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -9,15 +11,8 @@ from ..core.algebra import Array
 from ..core.checks import attributes, real
 from ..core.errors import InputError
 
-GROUNDS = {  # S, T_B, T_C, T_D [s] by spectrum type and ground type: tables 3.2 and 3.3, the recommended values
-    1: {"A": (1.0, 0.15, 0.4, 2.0), "B": (1.2, 0.15, 0.5, 2.0), "C": (1.15, 0.20, 0.6, 2.0),
-        "D": (1.35, 0.20, 0.8, 2.0), "E": (1.4, 0.15, 0.5, 2.0)},
-    2: {"A": (1.0, 0.05, 0.25, 1.2), "B": (1.35, 0.05, 0.25, 1.2), "C": (1.5, 0.10, 0.25, 1.2),
-        "D": (1.8, 0.10, 0.30, 1.2), "E": (1.6, 0.05, 0.25, 1.2)},
-}
-
-VERTICAL = {1: (0.90, 0.05, 0.15, 1.0), 2: (0.45, 0.05, 0.15, 1.0)}
-"""a_vg / a_g, T_B, T_C, T_D [s] by spectrum type: table 3.4."""
+_TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+TYPES = dict(enumerate(_TABLES["type"], start=1))  # of spectra: 1, or 2 for weak near earthquakes
 
 
 @dataclass(frozen=True)
@@ -47,16 +42,17 @@ class EC8Spectrum:
     @classmethod
     def on_ground(cls, ground: str, *, ag: float, kind: int = 1, damping: float = 0.05) -> "EC8Spectrum":
         """Return the horizontal spectrum of type `kind` (1, or 2 for weak near earthquakes) on ground "A" to "E"."""
-        if kind not in GROUNDS or ground not in GROUNDS[kind]:
+        if kind not in TYPES or ground not in TYPES[kind]["ground"]:
             raise InputError(f"EC8Spectrum: ground {ground!r}, type {kind!r}; give A, B, C, D or E and type 1 or 2")
-        return cls(ag, *GROUNDS[kind][ground], damping=damping)
+        s, tb, tc, td = TYPES[kind]["ground"][ground]
+        return cls(ag, s, tb, tc, td, damping=damping)
 
     @classmethod
     def vertical(cls, *, ag: float, kind: int = 1, damping: float = 0.05) -> "EC8Spectrum":
         """Return the vertical spectrum S_ve(T), eqs. 3.8 to 3.11, for every ground; ag is the horizontal one."""
-        if kind not in VERTICAL:
+        if kind not in TYPES:
             raise InputError(f"EC8Spectrum: type {kind!r}; give 1 or 2")
-        ratio, tb, tc, td = VERTICAL[kind]
+        ratio, tb, tc, td = TYPES[kind]["vertical"]
         return cls(ratio * ag, 1.0, tb, tc, td, damping=damping, plateau=3.0)
 
     @property

@@ -20,9 +20,8 @@ from .charts import Chart
 from .histories import LEDGER, scaled
 from .maps import Drawing, maps_of
 
-with open(Path(__file__).parent / "web" / "words.toml", "rb") as _file:
-    WORDS = tomllib.load(_file)
-SAY = WORDS["sentences"]
+WORDS = tomllib.loads((Path(__file__).parent / "web" / "words.toml").read_text(encoding="utf-8"))
+SAY, HEADERS = WORDS["sentences"], WORDS["headers"]
 
 
 @dataclass(frozen=True)
@@ -103,8 +102,7 @@ def _motion(run: RunFolder, model: Mapping[str, Any]) -> Section:
 def _results(run: RunFolder) -> Section:
     rows = [row for title, starts in WORDS["results"].items() for row in _result_rows(run, title, tuple(starts))]
     safe = list(_safety(run))
-    tables = [Table(("result", "column", "unit", "largest in size", "at t [s]", "at the start", "at the end"), rows),
-              Table(("part", "factor of safety against sliding, smallest", "at t [s]", "at the end"), safe)]
+    tables = [Table(HEADERS["results"], rows), Table(HEADERS["safety"], safe)]
     return Section("Base shear, thrust, uplift and sliding", [SAY["safety"]] if safe else [],
                    [one for one in tables if one.rows])
 
@@ -161,7 +159,7 @@ def _certificate(run: RunFolder) -> Section:
         ends = {name: float(history[name][-1]) for name, *_ in LEDGER if name in history}
         most = float(np.max(history["energy_kinetic"] + history["energy_strain"]))
         rows = [[label, number(ends[name]), number(ends[name] / most)] for name, label, *_ in LEDGER if ends.get(name)]
-        tables.append(Table(("term at the end of the run", "[J]", "over the largest energy"), rows))
+        tables.append(Table(HEADERS["energies"], rows))
         defect = float(np.max(np.abs(history["energy_defect"]))) / most
         said.append(SAY["ledger"].format(defect=defect, most=most))
     said += [f"Warning: {one}." for one in (energy_warning(facts), facts.get("sampling")) if one]
@@ -172,8 +170,7 @@ def _certificate(run: RunFolder) -> Section:
 def _peaks(run: RunFolder) -> Section:
     rows = [[one.name, one.quantity, one.unit, *map(number, (one.max, one.t_max, one.min, one.t_min))]
             for one in peaks(run.history, run.columns)]
-    header = ("column", "quantity", "unit", "max", "at t [s]", "min", "at t [s]")
-    return Section("Peak values of all columns", tables=[Table(header, rows, sortable=True)])
+    return Section("Peak values of all columns", tables=[Table(HEADERS["peaks"], rows, sortable=True)])
 
 
 def header_facts(run: RunFolder) -> list[tuple[str, str]]:

@@ -86,14 +86,12 @@ class Session:
     def settings(self) -> dict[str, Any]:
         """Return what was asked for, for log and summary."""
         method, problem, solver = self.method, self.method.problem, self.method.solvers[0]
-        return {
-            "scheme": repr(method.scheme), "mass": repr(problem.mass),
-            "solver": repr(solver if self.cross_check is None else getattr(solver, "primary", solver)),
-            "dt": described(method.dt), "tolerance": method.tolerance, "ranks": self._comm.size,
-            "unknowns": problem.system.space.unknowns, "contact_points": problem.surface.total,
-            "boundaries": list(problem.system.notes),
-            "sampling": sampling_warning(problem.excitations, max(pieces_of(method.dt))[0]) or "",
-        }
+        return {"scheme": repr(method.scheme), "mass": repr(problem.mass),
+                "solver": repr(solver if self.cross_check is None else getattr(solver, "primary", solver)),
+                "dt": described(method.dt), "tolerance": method.tolerance, "ranks": self._comm.size,
+                "unknowns": problem.system.space.unknowns, "contact_points": problem.surface.total,
+                "boundaries": list(problem.system.notes),
+                "sampling": sampling_warning(problem.excitations, max(pieces_of(method.dt))[0]) or ""}
 
     @property
     def left(self) -> int:
@@ -249,15 +247,13 @@ class Session:
 
     def _facts(self, status: str, reason: str, seconds: float) -> dict[str, Any]:
         """The content of summary.json."""
-        return {
-            "status": status, "reason": reason, "versions": versions("h5py"), **self.settings(),
-            "restarted_from_step": self.resumed_from, **self.table.facts(), "base_steps": self.place.base,
-            "halved_steps": self.halved,
-            "cross_check": None if self.cross_check is None else self.cross_check.report(),
-            "seconds": seconds, "memory": self.memory,
-            "seconds_per_step": float(np.median(list(self.seconds))) if self.seconds else float("nan"),
-            "seconds_per_linear_step": float("nan"),
-        }
+        return {"status": status, "reason": reason, "versions": versions("h5py"), **self.settings(),
+                "restarted_from_step": self.resumed_from, **self.table.facts(),
+                "base_steps": self.place.base, "halved_steps": self.halved,
+                "cross_check": None if self.cross_check is None else self.cross_check.report(),
+                "seconds": seconds, "memory": self.memory,
+                "seconds_per_step": float(np.median(list(self.seconds))) if self.seconds else float("nan"),
+                "seconds_per_linear_step": float("nan")}
 
     def _seconds_per_linear_step(self) -> float:
         """Median time of right-hand side, one back-substitution and update with the same A, from the last state [s]."""

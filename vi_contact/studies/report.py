@@ -12,7 +12,7 @@ from ..engineering.checks.comparison import Check, Comparison
 from ..engineering.peak_values import peaks, write_peaks
 from ..plots.bodies import draw_run
 from ..plots.pages import write_pages
-from ..plots.sections import Section, Table, header_facts, number, sections_of
+from ..plots.sections import HEADERS, Section, Table, header_facts, number, sections_of
 from ..plots.sketch import sketch
 from ..plots.web_page import can_write, write_web_page
 from ..run.files.folder import MODEL
@@ -84,5 +84,4 @@ def _checks(folder: Path) -> Section:
              one.inputs.items()), number(one.expected), number(one.found), one.unit,
              f"does not apply: {one.applies}" if one.applies else number(one.ratio), one.source]
             for one in comparisons(folder)]
-    header = ("check", "formula", "inputs", "expected", "found", "unit", "found / expected", "source")
-    return Section("Checks against formulas", tables=[Table(header, rows)] if rows else [])
+    return Section("Checks against formulas", tables=[Table(HEADERS["checks"], rows)] if rows else [])

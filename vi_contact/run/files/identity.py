@@ -49,21 +49,15 @@ def identity(problem: ContactProblem, scheme: Scheme, dt: TimeSteps, *, start: f
     early = [start + first * i / EARLY for i in range(EARLY + 1)]
     times = start + (end - start) * (np.arange(SAMPLES) + probe(np.arange(SAMPLES), 0) + 0.5) / SAMPLES
     return {
-        "unknowns": system.space.unknowns,
-        "contact points": surface.total,
-        "dt": described(dt),
-        "scheme": text_of(scheme),
-        "mass": text_of(problem.mass),
-        "impact law": text_of(problem.impact),
+        "unknowns": system.space.unknowns, "contact points": surface.total, "dt": described(dt),
+        "scheme": text_of(scheme), "mass": text_of(problem.mass), "impact law": text_of(problem.impact),
         "friction law": text_of(with_values(problem.friction, surface, partial(_of_all_points, surface))),
         "stiffness": [_dot(system, w, system.K @ x) for w, x in pairs],
         "mass matrix": [_dot(system, w, system.M @ x) for w, x in pairs],
         "damping": [] if system.C is None else [_dot(system, w, system.C @ x) for w, x in pairs],
         "geometry": [_dot(system, probes[0], x) for x in system.space.coordinates.T],
-        "load": _loads(system, probes, early, times),
-        "excitation": _excitation(problem, times),
-        "contact surface or obstacle": _contact(surface, early),
-        "friction": _friction(problem),
+        "load": _loads(system, probes, early, times), "excitation": _excitation(problem, times),
+        "contact surface or obstacle": _contact(surface, early), "friction": _friction(problem),
     }
 
 

@@ -200,11 +200,10 @@ class Tally:
         """Return the numbers for summary.json."""
         steps, most = self._rows - 1, self._most
         mean = self._sums["iterations"] / steps if steps else 0.0
-        facts: dict[str, Any] = {
-            "steps": steps, "t_start": self._first["t"], "t_end": self._last["t"],
-            "iterations_per_step": {"mean": mean, "max": int(most.get("iterations", 0))},
-            "escalated_steps": int(self._sums["escalated"]), "worst_certificate": most["certificate"],
-        }
+        iterations = {"mean": mean, "max": int(most.get("iterations", 0))}
+        facts: dict[str, Any] = {"steps": steps, "t_start": self._first["t"], "t_end": self._last["t"],
+                                 "iterations_per_step": iterations, "escalated_steps": int(self._sums["escalated"]),
+                                 "worst_certificate": most["certificate"]}
         if "uplift" in most:  # a negative gap: gap drift of the scheme
             facts |= {"largest_uplift": most["uplift"], "smallest_gap": -most["depth"],
                       "steps_in_contact": int(self._sums["contact"])}
