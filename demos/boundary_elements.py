@@ -13,10 +13,10 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
 
@@ -57,8 +57,7 @@ COLOURS = ("black", "tab:blue", "tab:red")
 OUT = Path("results/boundary_elements")
 
 
-@dataclass(frozen=True)
-class Answer:
+class Answer(NamedTuple):
     """Hold one law of one example by boundary elements and by finite elements (``fem``: its history)."""
 
     run: bem.ContactRun
@@ -74,7 +73,7 @@ class Answer:
     def fem_energy(self) -> np.ndarray:
         return self.fem["energy_kinetic"] + self.fem["energy_strain"]
 
-    @cached_property
+    @property
     def tractions(self) -> tuple[Tractions, Tractions]:
         """Return pressures and shears of both methods on the nodes of the boundary elements."""
         return compared(self.run, self.surface, self.fem)
