@@ -77,7 +77,6 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "run/test_proximal.py": "laws.free_motions run.rigid_bodies",
     "run/test_restart_refused.py": "run.files.identity",
     "run/test_simulate.py": "core.version run.files.log",
-    "schemes/test_massless_contact.py": "solvers.beside_steps",
     "schemes/test_trapezoidal.py": "schemes.base",
     "soil/test_free_field.py": "soil.companion soil.upgoing_wave",
     "solvers/test_condensed_on_finite_elements.py": "core.condensation fem.copied_factor fem.petsc_rows",
@@ -90,7 +89,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
         "solvers.iterative.contact solvers.iterative.layout solvers.iterative.projected_gradients "
         "solvers.iterative.route solvers.iterative.search",
     "solvers/test_iterative_friction.py":
-        "solvers.iterative.friction solvers.iterative.friction_krylov solvers.iterative.friction_laws "
+        "solvers.iterative.friction solvers.iterative.friction_krylov "
         "solvers.iterative.friction_states",
     "solvers/test_iterative_on_finite_elements.py":
         "solvers.iterative.conjugate_gradients solvers.iterative.measures "

@@ -55,8 +55,7 @@ def total(comm: Comm, value: SupportsFloat) -> float:
 
 def from_each(comm: Comm, value: Any) -> list[Any]:
     """Return the values of all ranks, in their order, on every rank."""
-    found: list[Any] = comm.bcast(comm.gather(value))
-    return found
+    return comm.bcast(comm.gather(value))
 
 
 def on_first(comm: Comm, numbers: Indices, rows: Any) -> Any:

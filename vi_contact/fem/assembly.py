@@ -38,10 +38,8 @@ from .ties import Tied
 Field = tuple[float, ...] | Callable[[Array], Array]
 Initial = Field | Sequence[tuple[Cells, Field]] | None
 
-LIGHTER = (
-    "inertia load of the ground motion: the convention of the catalogue's reference numbers, which leave out the mass "
-    "that elements share with the base"
-)
+LIGHTER = ("inertia load of the ground motion: the convention of the catalogue's reference numbers, which leave out "
+           "the mass that elements share with the base")
 
 
 @stage("assembling")

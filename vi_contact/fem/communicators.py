@@ -35,8 +35,7 @@ class MpiComm:
         return self.mpi.bcast(value, root=0)
 
     def gather(self, value: Any) -> list[Any] | None:
-        gathered: list[Any] | None = self.mpi.gather(value, root=0)
-        return gathered
+        return self.mpi.gather(value, root=0)
 
 
 def kept(comm: Any) -> Any:

@@ -77,9 +77,8 @@ class OwnForms(ElasticForms):
         dampers += [] if given.damping is None else [self._own("C")]
         if dampers:
             self._forms["C"] = sum(dampers[1:], dampers[0])
-        self._full = {
-            name: matrix_of(ROLES[name], space, partial(space.compiled, form)) for name, form in self._forms.items()
-        }
+        self._full = {name: matrix_of(ROLES[name], space, partial(space.compiled, form))
+                      for name, form in self._forms.items()}
         refuse_masses(self._full["M"], space)
         self.symmetric = all(is_symmetric(one, space) for one in self._full.values())
         self.notes = self._notes(bool(materials))

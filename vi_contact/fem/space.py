@@ -151,15 +151,12 @@ class FemSpace(NodalSpace):
         blocks = compat.facet_dofs(self.V, facets)
         return np.asarray(blocks[blocks < len(self.nodes)], dtype=np.int64)
 
-    def nodes_of_facets(self, facets: Any) -> Indices:
-        """Return the numbers (k, n) of the nodes on each of these local facets, ghosts' too. Collective."""
+    def corners_of_facets(self, facets: Any) -> Indices:
+        """Return the numbers (k, n) of the nodes on each of these local facets, ghosts' too, that may have contact
+        conditions: all, in a hierarchy the vertices. Collective."""
         if self.degree == 1:
             return node_numbers(self.mesh)[compat.entities_to_geometry(self.mesh, self.mesh.topology.dim - 1, facets)]
-        return self.node_of_block[facet_rows(self.V, facets)]
-
-    def corners_of_facets(self, facets: Any) -> Indices:
-        """Return the numbers (k, n) of those of them that may have contact conditions: in a hierarchy the vertices."""
-        return self.nodes_of_facets(facets)[:, : None if self.hierarchy is None else self.dimension]
+        return self.node_of_block[facet_rows(self.V, facets)][:, : None if self.hierarchy is None else self.dimension]
 
     @cached_property
     def hierarchy(self) -> Hierarchy | None:

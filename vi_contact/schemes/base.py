@@ -83,7 +83,7 @@ def check_balance(name: str, problem: ContactProblem) -> None:
     if massless and problem.impact is not None:
         raise InputError(f"the impact law {problem.impact} acts on the mass of contact nodes and this problem has none "
                          "there: leave the law out, or give the problem mass=ConsistentMass()")
-    if massless or not surface.some(~surface.bilateral & (surface.compliance == 0.0)):
+    if massless or not surface.some(~surface.bilateral & surface.rigid):
         return
     told = problem.equations.cached(f"told of {name}", list)
     if not told and surface.comm.rank == 0:

@@ -28,7 +28,7 @@ from ..core.problem import ContactProblem
 from ..core.sizes import small
 from ..core.step import PreparedSolver, State, StepProblem
 from ..core.surfaces import ContactSurface
-from ..solvers.beside_steps import solver_beside_steps
+from ..solvers.automatic import solver_beside_steps
 from ..solvers.certified import TOLERANCE, CertifiedSolver
 
 ROUND_OFF = 1e-12  # of the largest displacement or velocity: smaller gaps and velocities are zero
@@ -51,7 +51,7 @@ def consistent_acceleration(problem: ContactProblem, state: State, dt: float) ->
 
 def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float) -> tuple[Array, Array]:
     """Solve the small problem of points that rest on their support."""
-    surface, rigid = problem.surface, problem.surface.compliance == 0.0
+    surface, rigid = problem.surface, problem.surface.rigid
     compression = surface.normal_values(state.u) - surface.gap(state.t)
     pressed = np.divide(compression, surface.compliance, out=np.zeros(surface.count), where=~rigid)
     pressed = np.where(surface.bilateral, pressed, np.maximum(pressed, 0.0))  # only bilateral springs pull
@@ -66,9 +66,8 @@ def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float
     step = StepProblem(A=mass_matrix(problem), b=force - springs, bound=np.where(resting, 0.0, np.inf),
                        surface=rigid_part(surface), scale=1.0, guess=np.zeros_like(force), active=resting, t=state.t,
                        k=state.k, friction=problem.friction, slip0=None if rate is None else -rate / dt, rate_factor=dt)
-    solver: PreparedSolver = problem.equations.cached(
-        "resting contacts", lambda: solver_beside_steps(step.A, step.surface).prepare(step.A, step.surface, 1.0)
-    )
+    solver: PreparedSolver = problem.equations.cached("resting contacts", lambda: solver_beside_steps(
+        step.A, step.surface).prepare(step.A, step.surface, 1.0))
     result = solver.solve(step)
     return result.x, springs + surface.reaction_load(result.r_n, len(force), result.r_t)
 
@@ -81,14 +80,12 @@ def mass_matrix(problem: ContactProblem) -> EffectiveMatrix:
         M = system.M if massless is None else system.algebra.with_identity_rows(system.M, massless)
         return EffectiveMatrix(M, system.algebra)
 
-    matrix: EffectiveMatrix = system.cached("mass", made)
-    return matrix
+    return system.cached("mass", made)
 
 
 def rigid_part(surface: ContactSurface) -> ContactSurface:
     """Return the surface without springs: they are loads here, not bounds."""
-    rigid = surface.compliance == 0.0
-    return replace(surface, compliance=np.zeros(surface.count), bilateral=surface.bilateral & rigid)
+    return replace(surface, compliance=np.zeros(surface.count), bilateral=surface.bilateral & surface.rigid)
 
 
 def equilibrated(problem: ContactProblem, state: State) -> State:

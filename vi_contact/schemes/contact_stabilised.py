@@ -31,7 +31,7 @@ from ..core.errors import StepFailure
 from ..core.problem import ContactProblem
 from ..core.protocols import Frictionless
 from ..core.step import Balance, State, StepProblem, StepResult
-from ..solvers.beside_steps import solver_beside_steps
+from ..solvers.automatic import solver_beside_steps
 from ..solvers.certified import TOLERANCE, CertifiedSolver
 from .base import SingleStep, means, position_step, stepped
 from .consistent_data import mass_matrix, rigid_part
@@ -81,8 +81,7 @@ def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tu
     in the way. Springs give way: their points are not projected. Normal directions only; friction has no part in it.
     StepFailure when the projection cannot be certified.
     """
-    surface, system = problem.surface, problem.equations
-    rigid = surface.compliance == 0.0
+    surface, system, rigid = problem.surface, problem.equations, problem.surface.rigid
     gap = np.where(rigid, surface.gap(state.t + dt) - surface.normal_values(u), np.inf)
     closed = (gap < 0.0) | (surface.bilateral & rigid)
     if surface.some(np.isnan(gap)) or not surface.some(closed & (gap != 0.0)):

@@ -9,12 +9,14 @@ docs/guide/solvers.md.
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from typing import Any
 
 from ..core.algebra import EffectiveMatrix, Matrix, SerialMatrix, total
 from ..core.checks import provides
 from ..core.compiled import library
 from ..core.problem import ContactProblem
+from ..core.sizes import small
 from ..core.step import PreparedSolver, Solver, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
 from .condensed import Condensed
@@ -23,6 +25,7 @@ log = logging.getLogger(__name__)
 IN_SPACE = 20_000  # unknowns in three dimensions from which on a few hundred steps are faster without a factor
 ALONE_IN_SPACE = 50_000  # the same on one rank, where CHOLMOD factorises
 DENSE = {3: 4_000, 2: 5_000, 1: 5_000}  # rows of the small problem, by dimension: 5000 take 200 MB on every rank
+TOLERANCE = 1e-12  # of conjugate gradients beside the steps: what starts a run should not be seen in it
 
 
 @dataclass(frozen=True)
@@ -90,3 +93,21 @@ class Chosen:
                 log.info("Automatic: %s for %d contact points", type(route).__name__, step.surface.total)
             self._prepared = route.prepare(*self._given)
         return self._prepared
+
+
+def solver_beside_steps(A: EffectiveMatrix, surface: ContactSurface) -> Solver:
+    """Return what solves the contact problems that schemes pose beside the steps, at the start or of a predictor.
+
+    Condensed() for a problem that is small (``core.sizes``), else conjugate gradients, which factorise nothing: these
+    matrices, of mass or of a layer of nodes, are well-conditioned. Volume() for systems that are not symmetric.
+    Collective.
+    """
+    if not A.algebra.symmetric:
+        from .volume import Volume
+
+        return Volume()
+    if small(surface.comm, A.matrix.rows, surface.count) or find_spec("petsc4py") is None:
+        return Condensed()
+    from .iterative import Iterative
+
+    return Iterative("jacobi", tolerance=TOLERANCE)

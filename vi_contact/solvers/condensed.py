@@ -88,7 +88,7 @@ class PreparedCondensed:
 
     def __init__(self, settings: Condensed, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
         self._settings, self._A, self._surface, self._scale = settings, A, surface, scale
-        self._rigid = surface.everywhere(surface.compliance == 0.0)
+        self._rigid = surface.everywhere(surface.rigid)
         self._name = f"condensed {type(settings.method).__name__}" if surface.total else "linear"
         if surface.tangents.shape[1] == 0:
             self._normal  # noqa: B018  nothing rubs in one dimension

@@ -77,11 +77,8 @@ class SectionForces:
 
     def columns(self) -> Columns:
         """Return the columns N_<label>, V_<label>, M_<label>, or in space N, V_2, V_3, M_t, M_2, M_3."""
-        return {
-            f"{quantity}_{label}": (unit, f"{text}, section {label}")
-            for label, ends in self.cuts.items()
-            for quantity, (unit, text) in _QUANTITIES["plane" if len(ends) == 2 else "space"].items()
-        }
+        return {f"{quantity}_{label}": (unit, f"{text}, section {label}") for label, ends in self.cuts.items()
+                for quantity, (unit, text) in _QUANTITIES["plane" if len(ends) == 2 else "space"].items()}
 
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """Find the cuts; return the row of the state at rest, of a static stage for example. Collective."""

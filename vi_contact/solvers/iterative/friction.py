@@ -16,8 +16,7 @@ from ...laws.friction import project
 from .conjugate_gradients import NOT_A_NUMBER, SAID, told
 from .contact import Contact
 from .friction_krylov import Gmres, Turned
-from .friction_laws import LawOfStep
-from .friction_states import Limits, States, Tangents
+from .friction_states import LawOfStep, Limits, States, Tangents
 from .layout import Layout
 from .measures import Measured, Worth
 from .operator import Operator

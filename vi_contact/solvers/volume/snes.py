@@ -175,8 +175,7 @@ class ReducedNewton:
 
     def friction_driver(self, scaled: ScaledFrictionStep, layers: OptionLayers) -> SnesDriver:
         """Return the SNES object of a step with friction."""
-        jacobian = FrictionJacobian(scaled)
-        return SnesDriver(scaled, layers, jacobian, snes_type="vinewtonrsls", check=check_friction)
+        return SnesDriver(scaled, layers, FrictionJacobian(scaled), snes_type="vinewtonrsls", check=check_friction)
 
 
 @dataclass(frozen=True)
