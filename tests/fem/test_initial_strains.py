@@ -1,4 +1,4 @@
-"""Initial strains: free bodies expand without stress; held ones press; warmed bars send waves; given dislocations."""
+"""Initial strains (V8.10): free bodies expand without stress; held ones press; warmed bars send waves; dislocations."""
 
 from __future__ import annotations
 

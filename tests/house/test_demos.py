@@ -63,6 +63,9 @@ def test_the_wall_demo(comm: Any, shared_tmp: Path) -> None:
     comm.Barrier()  # rank 0 draws
     assert numbers["frequency"] == pytest.approx(13.9983, abs=5e-5)
     assert numbers["dt"] == pytest.approx(1.785929e-3, abs=5e-10)
+    assert numbers["decomposition"] < 1e-13  # u = u_1 + u_2, eq. (36)
+    for name in ("data.png", "decomposition.png"):
+        assert comm.rank or (shared_tmp / name).stat().st_size > 20_000
     for case, expected in {"a": (-58.38955, -1.74828, -9.18182), "b": (-58.38955, -1.74828, 0.0)}.items():
         assert 0.0 < numbers[f"{case}_certificate"] <= 1e-9
         assert 0.0 < numbers[f"{case}_cross_check"] <= 1e-9
