@@ -90,14 +90,10 @@ def _judged(step: StepProblem, result: StepResult, maxima: list[float]) -> Certi
     x_ref, r_ref = max(x_max, guess_max), max(b_max, r_max)
     cone, dissipation = _friction_residuals(step, result, x_ref, r_ref)
     away, loose = _over(apart, x_ref), _over(open_force, r_ref)
-    return Certificate(
-        equilibrium=_over(residual_max, max(b_max, Ax_max, ROUNDED * step.A.largest * x_max)),
-        penetration=_over(behind, x_ref),
-        tension=_over(pull, r_ref),
-        complementarity=away if away >= loose or np.isnan(away) else loose,  # keeps NaN
-        cone=cone,
-        dissipation=dissipation,
-    )
+    return Certificate(equilibrium=_over(residual_max, max(b_max, Ax_max, ROUNDED * step.A.largest * x_max)),
+                       penetration=_over(behind, x_ref), tension=_over(pull, r_ref),
+                       complementarity=away if away >= loose or np.isnan(away) else loose,  # keeps NaN
+                       cone=cone, dissipation=dissipation)
 
 
 def _maxima(step: StepProblem, *arrays: Array) -> list[float]:
@@ -197,8 +193,7 @@ def energy_balance(problem: ContactProblem, old: State, new: State, balance: Bal
         system, (du, balance.f), (du, system.product("M", balance.a)),
         (0.5 * (old.v + new.v), after.momentum - before.momentum),
         (balance.u - 0.5 * (old.u + new.u), after.elastic - before.elastic), (balance.r_n, surface.normal_values(du)),
-        sums=(rubbing, pushed, dragged, 0.0 if system.C is None else float(du.dot(system.product("C", balance.v)))),
-    )
+        sums=(rubbing, pushed, dragged, 0.0 if system.C is None else float(du.dot(system.product("C", balance.v)))))
     rubbing, pushed, dragged, damping = local
     return StepEnergy(change=after.total - before.total, input=work + pushed + dragged, damping=damping,
                       contact=lost + pushed, friction=rubbing + dragged, algorithmic=inertia - kinetic + stiffness)

@@ -105,8 +105,7 @@ def assemble(mesh: Any, material: Materials | None = None, *, forms: Forms | Non
         v0=_initial(space, "initial velocity", initial_velocity),
         space=space, tied=space.tied_unknowns, absolute=any(one.lets_waves_in for one in boundaries),
         notes=describe_boundaries(boundaries, mesh.comm.rank, body.notes if base_inertia else (*body.notes, LIGHTER)),
-        companions=tuple(one for part in (*moved, *acting) for one in part.companions),
-    ))
+        companions=tuple(one for part in (*moved, *acting) for one in part.companions)))
     body.own(system)
     del absorbers, damper, mass
     give_back(mesh.comm)

@@ -91,8 +91,7 @@ def own_system(owner: str, algebra: Algebra, unsymmetric: Algebra, matrices: Map
         algebra=algebra, M=M, C=matrices.get("C"), K=K, load=load, influence=influence[free], u0=u0[free],
         v0=v0[free], space=space, base_mass=np.column_stack(momenta),
         massless=massless if largest(comm, massless.any()) else None,
-        notes=tuple(f"{name} not symmetric: for Volume() and Condensed(Lemke()); no energy ½ uᵀKu" for name in skew),
-    ))
+        notes=tuple(f"{name} not symmetric: for Volume() and Condensed(Lemke()); no energy ½ uᵀKu" for name in skew)))
 
 
 def _meaning(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Array, Indices, Indices, Mask]:

@@ -17,10 +17,8 @@ from .copied_factor import contact_last, product_of_rows
 from .petsc_rows import aij_of, rows_of
 
 PREFIX = "vi_contact_factor_"
-OWN_FACTOR = {
-    "ksp_type": "preonly", "pc_type": "cholesky", "pc_factor_mat_solver_type": "petsc",
-    "pc_factor_mat_ordering_type": "amd",
-}
+OWN_FACTOR = {"ksp_type": "preonly", "pc_type": "cholesky", "pc_factor_mat_solver_type": "petsc",
+              "pc_factor_mat_ordering_type": "amd"}
 DEFAULTS = ("redundant_", "mat_mumps_icntl_20")  # options that are set here
 FULL_ROW = 40.0  # entries of a row: 2D meshes have fewer, 3D meshes more
 FEW_ROWS = 10_000  # with full rows: beyond, MUMPS' dense blocks pay

@@ -91,10 +91,8 @@ def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tu
         lambda: replace(problem, surface=rigid_part(surface), friction=Frictionless()),
     )
     M = mass_matrix(problem)
-    solver: CertifiedSolver = system.cached(
-        "admissible predictor",
-        lambda: CertifiedSolver(bounds, M, 1.0, [solver_beside_steps(M, bounds.surface)], TOLERANCE),
-    )
+    solver: CertifiedSolver = system.cached("admissible predictor", lambda: CertifiedSolver(
+        bounds, M, 1.0, [solver_beside_steps(M, bounds.surface)], TOLERANCE))
     step = StepProblem(A=M, b=np.zeros_like(u), bound=gap, surface=bounds.surface, scale=1.0, guess=np.zeros_like(u),
                        active=closed, t=state.t + dt, k=state.k + 1)
     try:

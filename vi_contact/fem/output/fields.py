@@ -225,8 +225,7 @@ class FrameWriter:
             f'<Topology TopologyType="{self._type}" NumberOfElements="{cells}" NodesPerElement="{corners}">'
             f'{_item((cells, corners), f"{mesh}:/cells", "Int")}</Topology>\n'
             f'<Geometry GeometryType="XYZ">{_item((nodes, 3), f"{mesh}:/points")}</Geometry>\n'
-            f'{"".join(attributes)}</Grid>\n'
-        )
+            f'{"".join(attributes)}</Grid>\n')
 
 
 def nodal_contact(problem: ContactProblem, state: State, status: Array) -> tuple[Array, Array]:

@@ -76,13 +76,9 @@ class FrictionJacobian:
         pairs, still, gamma = self._scaled.disks(y)
         c, over = self._scaled.disk_stiffness, self._scaled.disk_inverse
         by_reaction = (c[:, None] * (still + gamma[:, None] * pairs) - 2.0 * pairs) * over[:, None]
-        self._values |= {
-            "disk lambda": np.tile(gamma, 2),
-            "disk gamma": pairs.T.ravel(),
-            "gamma lambda": by_reaction.T.ravel(),
-            "gamma x": -((c * over)[:, None] * pairs).T.ravel(),
-            "gamma gamma": c * over * np.sum(pairs**2, axis=1),
-        }
+        self._values |= {"disk lambda": np.tile(gamma, 2), "disk gamma": pairs.T.ravel(),
+                         "gamma lambda": by_reaction.T.ravel(), "gamma x": -((c * over)[:, None] * pairs).T.ravel(),
+                         "gamma gamma": c * over * np.sum(pairs**2, axis=1)}
 
     def _write(self) -> None:
         self.mat.setValuesCSR(*self._csr, np.concatenate(list(self._values.values()))[self._order])

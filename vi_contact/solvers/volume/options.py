@@ -33,9 +33,8 @@ class OptionLayers:
             try:
                 solver.setFromOptions()
             except PETSc.Error as error:
-                raise InputError(
-                    f"PETSc does not accept the options under {self.prefix} ({last_line(error)}): correct or drop them"
-                ) from error
+                raise InputError(f"PETSc does not accept the options under {self.prefix} ({last_line(error)}): correct "
+                                 "or drop them") from error
             check(solver, self)
 
     @contextmanager
