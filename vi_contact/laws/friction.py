@@ -180,8 +180,7 @@ def project(r_t: Array, limit: Array) -> Array:
         raise InputError(f"project: r_t has shape {r_t.shape} and limit {limit.shape}; "
                          "give one row of tangential components and one limit per node")
     size = np.abs(r_t[:, 0]) if r_t.shape[1] == 1 else np.linalg.norm(r_t, axis=1)
-    factor = np.ones(len(size))
-    np.divide(limit, size, out=factor, where=size > limit)
+    factor = np.divide(limit, size, out=np.ones(len(size)), where=size > limit)
     return r_t * factor[:, np.newaxis]
 
 

@@ -40,8 +40,7 @@ class States:
         back = np.zeros(m, dtype=bool) if before is None else np.sum(before.direction * y[:, 1:], axis=1) < 0.0
         self.stick: Mask = ((size <= limit) | back) & (limit > 0.0)
         slip = ~self.stick & (limit > 0.0)
-        self.direction: Array = np.zeros((m, d - 1))
-        np.divide(y[:, 1:], size[:, None], out=self.direction, where=slip[:, None])
+        self.direction: Array = np.divide(y[:, 1:], size[:, None], out=np.zeros((m, d - 1)), where=slip[:, None])
         self.growth = np.where(slip & (y[:, 0] > 0.0), step.slope, 0.0)
         self.turns: Mask = slip if d == 3 else np.zeros(m, dtype=bool)
         self.exact = not self.turns.any()

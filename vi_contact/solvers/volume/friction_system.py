@@ -187,12 +187,8 @@ class ScaledFrictionStep(ScaledStep):
     def moved(self, state: FrictionUnknowns, slip: Array, limit: Array) -> FrictionUnknowns:
         """Return the state with reactions in new disks (m,): sliding points on their edge, along their slip (L,)."""
         friction, s = self.friction, limit
-        way = friction.by_point(slip)
+        way, inside = friction.by_point(slip), project(friction.by_point(state.reaction), s)
         speed = np.linalg.norm(way, axis=1)
-        edge = np.zeros_like(way)
-        np.divide(way * s[:, None], speed[:, None], out=edge, where=speed[:, None] > 0.0)
-        inside = project(friction.by_point(state.reaction), s)
-        table = np.where(speed[:, None] > 0.0, edge, inside)
-        gamma = np.zeros_like(s)
-        np.divide(speed, s, out=gamma, where=s > 0.0)
+        table = np.divide(way * s[:, None], speed[:, None], out=inside, where=speed[:, None] > 0.0)
+        gamma = np.divide(speed, s, out=np.zeros_like(s), where=s > 0.0)
         return FrictionUnknowns(state.z, table[friction.point, friction.component], gamma[friction.disk])
