@@ -46,7 +46,7 @@ def geometric_stiffness(problem: ContactProblem, state: State) -> SemiDiscreteSy
     check_sizes("geometric_stiffness", problem, state)
     known_matrices("geometric_stiffness", system, "K")
     u0 = problem.cartesian(state.u)
-    full = initial_stress_matrix(space, space.expand(u0, state.t))
+    full = initial_stress_matrix(space, space.expand(u0, state.t), state.t)
     reduced = PetscMatrix(space.reduced(full))
     load = replace(system.load, constant=system.load.constant + reduced @ u0)
     if any(condition.moves for condition in space.prescribed):
@@ -58,8 +58,8 @@ def geometric_stiffness(problem: ContactProblem, state: State) -> SemiDiscreteSy
     return stiffer
 
 
-def initial_stress_matrix(space: FemSpace, nodal: Array) -> Any:
-    """Assemble K_G (PETSc, all unknowns) [N/m] of the stresses of nodal displacements (owned nodes, d) [m].
+def initial_stress_matrix(space: FemSpace, nodal: Array, t: float = 0.0) -> Any:
+    """Assemble K_G (PETSc, all unknowns) [N/m] of the stresses of nodal displacements (owned nodes, d) [m] at a time.
 
     Of a rotation the integrand is tr sigma0, a polynomial once multiplied by the Jacobian: exact on all cells.
     """
@@ -69,6 +69,7 @@ def initial_stress_matrix(space: FemSpace, nodal: Array) -> Any:
     u0.x.scatter_forward()
     u, v = ufl.TrialFunction(space.V), ufl.TestFunction(space.V)
     sigma = forms.stress(u0)
+    forms.follow(u0, t)  # with the initial strains of this time
     form = ufl.inner(ufl.dot(ufl.grad(u), sigma), ufl.grad(v)) * ufl.dx
     return compat.assemble_matrix(space.compiled(form))
 

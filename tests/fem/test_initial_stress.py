@@ -21,6 +21,7 @@ from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import State
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.contact.surface import contact_surface
+from vi_contact.fem.initial_strains import InitialStrain
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.petsc_algebra import PetscMatrix
 from vi_contact.run.march import march
@@ -165,6 +166,17 @@ def test_held_sides_keep_the_unknowns():
     second = geometric_stiffness(linear(system), static_equilibrium(linear(system), solver=Condensed()))
     assert second.rows == system.rows and second.K.rows == system.K.rows
     assert second.C is None and second.M is system.M
+
+
+def test_warming_of_a_held_block_is_a_pressure():
+    """Nothing moves, sigma = -E alpha dT s(t) along x: uᵀ K_G u of u = (0, x) is that times the area."""
+    mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 3))
+    warm = InitialStrain(np.diag([3e-4, 0.0]), history=lambda t: t)
+    system = assemble(mesh, COLUMN, clamped=tags["left"], loads=warm)
+    space = system.space
+    full = PetscMatrix(initial_stress_matrix(space, np.zeros_like(space.points), 2.0))
+    up = np.column_stack([0.0 * space.points[:, 0], space.points[:, 0]]).ravel()
+    assert space.comm.sum(np.array([up @ (full @ up)])) == pytest.approx([-2.0e10 * 6e-4 * 2.0], rel=1e-12)
 
 
 @pytest.mark.serial
