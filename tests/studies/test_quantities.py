@@ -130,6 +130,16 @@ value = ["0", "-1 kPa"]
 facets = "right"
 value = ["1e3*t*y", "2 kPa"]
 
+[[system.loads]]
+type = "InitialStrain"
+value = "1e-5*(10 + y)*t"
+
+[[system.loads]]
+type = "InitialStrain"
+value = "0.03 %"
+history = "t^2"
+cells = "block"
+
 [[contact]]
 facets = "right"
 obstacle = {type = "AnalyticGap", function = "0.01 + 0.001*y^2"}
@@ -155,6 +165,8 @@ def test_expressions_are_the_functions_of_the_interface(tmp_path_factory: Any) -
         fem.Pressure(tags["left"], lambda p, t: 9810.0 * np.maximum(0.0, 5.0 - p[:, 1]), lambda t: min(1.0, 0.5 * t)),
         fem.Traction(tags["top"], (0.0, -1e3)),
         fem.Traction(tags["right"], lambda p, t: np.column_stack([1e3 * t * p[:, 1], np.full(len(p), 2e3)])),
+        fem.InitialStrain(lambda p, t: 1e-5 * (10.0 + p[:, 1]) * t),
+        fem.InitialStrain(3e-4, lambda t: t**2, tags["block"]),
     ]
     system = fem.assemble(
         mesh, fem.Heterogeneous(lambda x: 30e6 + 2e6 * x[1], 0.3, 1800.0), clamped=tags["bottom"], loads=loads,
