@@ -2,12 +2,21 @@
 """Boundary elements: accuracy and cost against the numbers of elements and steps; boundedness over long times.
 
     python3 benchmarks/bem.py [--sides 5 10 20 40] [--steps 60 120 240] [--long] [--thin]
+    python3 benchmarks/bem.py --json [--k 40 80] [--n 240 480]
 
 Unit square, c_P = 1, c_S = 1/2, rho = 1, k elements a side, c_P dt = h, symmetric form; one thread; a row is a process
 of its own, seconds are processor time. Errors are relative L2 norms over all nodes and steps: oblique plane pulses of
 duration 2 up to T = 4 without supports; top of a rod between rollers under a step and a sin² load up to T = 6. --steps
 adds rows with k = 10 and other numbers of steps; --long the rod up to T = 60 for c_P dt / h from 0.1 to 4;
 --thin a rod of widths down to h/20, the sin² load, with c_P dt = h and h/2 and by Radau IIA, c_P dt = h.
+
+--json prints seconds and memory of two ways to keep blocks and to condense: "direct" (dense blocks, a march with all
+columns), "compressed" (tails interpolated, a circle of frequencies). Rows: k, steps, way, assembly_s, condensation_s,
+march_s (the motion of the rod, by the way's own method; left out beyond k = 40), total_s (assembly and condensation),
+peak_mb, blocks_mb, ratio_to_direct (total_s over that of the direct way, measured in the same run at k = 20, 120 steps;
+for larger k over the direct cost that follows from it: assembly like N n², condensation like N² n² (k + 1)),
+error_against_exact (relative L2, rod under the sin² load). growth: exponents of total_s in N at k = 10 between the two
+largest numbers of steps, before (direct) and after (compressed). --k, --n: sizes of the compressed rows.
 """
 
 from __future__ import annotations
@@ -34,6 +43,8 @@ from test_energetic import echoes, rod, smooth_integral, smooth_load  # noqa: E4
 
 from vi_contact import bem  # noqa: E402
 
+DIRECT = (20, 120)  # k and steps of the row that ratios refer to
+GROWTH = (10, (120, 240, 480))  # k and numbers of steps
 COLUMNS = ("k", "steps", "assembly", "march", "condense", "blocks MB", "peak MB")
 ERRORS = ("pulse P", "pulse S", "step", "sin²", "base", "max base")
 
@@ -52,8 +63,63 @@ def row(k: int, steps: int, *, errors: bool) -> dict[str, float]:
     start = time.process_time()
     problem.condensed()
     result["condense"] = time.process_time() - start
-    result["blocks MB"] = sum(part.nbytes for part in (blocks.single, blocks.double, blocks.hyper)) / 1e6
+    parts = [part.values for part in blocks.stretches] if isinstance(blocks, bem.CompressedBlocks) else [
+        blocks.single, blocks.double, blocks.hyper]
+    result["blocks MB"] = sum(part.nbytes for part in parts) / 1e6
     return result | {"peak MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0 * 1.048576}
+
+
+def cost(k: int, steps: int, way: str) -> dict[str, float | str]:
+    """Seconds and memory of one size with dense ("direct") or compressed blocks."""
+    start = time.process_time()
+    blocks = bem.energetic_blocks(bem.polygon(SQUARE, 1.0 / k), MATERIAL, dt=1.0 / k, steps=steps,
+                                  compressed=way == "compressed")
+    result: dict[str, float | str] = {"k": k, "steps": steps, "way": way, "assembly_s": time.process_time() - start}
+    problem = rod(blocks, smooth_load)
+    start = time.process_time()
+    problem.condensed()
+    result["condensation_s"] = time.process_time() - start
+    result["total_s"] = result["assembly_s"] + result["condensation_s"]
+    if isinstance(blocks, bem.CompressedBlocks):
+        result["blocks_mb"] = sum(part.values.nbytes for part in blocks.stretches) / 1e6
+        result["errors"] = [float(value) for value in blocks.errors]
+    else:
+        result["blocks_mb"] = sum(part.nbytes for part in (blocks.single, blocks.double, blocks.hyper)) / 1e6
+    if k <= 40:
+        start = time.process_time()
+        motion = problem.solve()
+        result["march_s"] = time.process_time() - start
+        exact = echoes(motion.times, smooth_integral)[:, None]
+        top = motion.displacement[:, 1][:, blocks.mesh.nodes_of(blocks.mesh.labels == 2)]
+        result["error_against_exact"] = float(
+            np.linalg.norm(top - exact) / np.linalg.norm(np.broadcast_to(exact, top.shape)))
+    result["peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0 * 1.048576
+    return result
+
+
+def measured(*arguments: object) -> dict:
+    """What this script prints as JSON in a process of its own."""
+    command = [sys.executable, __file__, *map(str, arguments)]
+    return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+
+
+def costs(sides: list[int], steps: list[int]) -> dict:
+    """All rows of --json, and the growth in the number of steps."""
+    direct = measured("--cost", *DIRECT, "direct")
+    rows = [direct, measured("--cost", *DIRECT, "compressed")]
+    rows += [measured("--cost", k, n, "compressed") for k, n in zip(sides, steps, strict=True)]
+    for row in rows:
+        in_n, in_k = row["steps"] / direct["steps"], row["k"] / direct["k"]
+        before = in_n * in_k**2 * direct["assembly_s"] + (
+            in_n**2 * in_k**2 * (row["k"] + 1) / (direct["k"] + 1) * direct["condensation_s"])
+        row["ratio_to_direct"] = row["total_s"] / before
+    growth = {}
+    for name, way in (("before", "direct"), ("after", "compressed")):
+        last = [measured("--cost", GROWTH[0], n, way) for n in GROWTH[1]]
+        rows += last
+        growth[name] = {part: float(np.log2(last[-1][part] / last[-2][part]))
+                        for part in ("assembly_s", "condensation_s", "total_s")}
+    return {"rows": rows, "growth_in_steps": growth}
 
 
 def wave_errors(blocks: bem.EnergeticBlocks, k: int) -> dict[str, float]:
@@ -116,10 +182,20 @@ def main() -> None:
     parser.add_argument("--steps", type=int, nargs="*", default=[60, 120, 240])
     parser.add_argument("--long", action="store_true")
     parser.add_argument("--thin", action="store_true")
+    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--k", type=int, nargs="*", default=[40])
+    parser.add_argument("--n", type=int, nargs="*")
+    parser.add_argument("--cost", nargs=3, help=argparse.SUPPRESS)
     parser.add_argument("--one", type=int, nargs=3, help=argparse.SUPPRESS)
     chosen = parser.parse_args()
     if chosen.one:
         print(json.dumps(row(chosen.one[0], chosen.one[1], errors=bool(chosen.one[2]))))
+        return
+    if chosen.cost:
+        print(json.dumps(cost(int(chosen.cost[0]), int(chosen.cost[1]), chosen.cost[2])))
+        return
+    if chosen.json:
+        print(json.dumps(costs(chosen.k, chosen.n or [6 * k for k in chosen.k]), indent=1))
         return
     sizes = [(k, 6 * k, 1) for k in chosen.sides] + [(10, steps, 0) for steps in chosen.steps]
     print(*(f"{name:>9}" for name in COLUMNS + ERRORS))

@@ -136,8 +136,11 @@ class EnergyNorm:
     def __init__(self, operator: PoincareSteklov, motions: Sequence[Array]) -> None:
         u = np.stack([motion.reshape(len(motion), -1) for motion in motions], axis=2)
         fixed = np.ones(u.shape[1], bool)
-        assert isinstance(operator.blocks, EnergeticBlocks)
-        forces = operator.rho * marched(operator.blocks, fixed, np.zeros_like(u), u)[2]
+        if isinstance(operator.blocks, EnergeticBlocks):
+            forces = operator.rho * marched(operator.blocks, fixed, np.zeros_like(u), u)[2]
+        else:
+            nothing = np.zeros_like(u[:, None, :, 0])
+            forces = np.stack([operator.motion(nothing, fixed, one)[2] for one in np.moveaxis(u, 2, 0)], axis=2)
         work = np.matmul(forces.swapaxes(1, 2), np.diff(u, axis=0, prepend=0.0))
         self._products = np.cumsum(work, axis=0).sum(axis=0)
 

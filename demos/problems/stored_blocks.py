@@ -33,7 +33,8 @@ def stored_blocks(
         check_body(mesh, material, Orders())
         steps = checks.whole(owner, "steps", steps, least=1)
         return _read(target, mesh, material, checks.number(owner, "dt", dt, positive=True, unit="s"), steps)
-    blocks = energetic_blocks(mesh, material, dt=dt, steps=steps)
+    blocks = energetic_blocks(mesh, material, dt=dt, steps=steps, compressed=False)
+    assert isinstance(blocks, EnergeticBlocks)
 
     def fill(file: Any) -> None:
         file.attrs.update(format=FORMAT, c_p=blocks.c_p, c_s=blocks.c_s, dt=dt, exterior=mesh.exterior)

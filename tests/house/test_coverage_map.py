@@ -17,6 +17,7 @@ TESTS = Path(__file__).parents[1]
 
 COVERS = {  # test file -> modules without a test file of their own; tests reach some of them through their users
     "bem/test_boundary_operators.py": "bem.loops",
+    "bem/test_compressed_blocks.py": "bem.compressed bem.frequency_circle bem.tails",
     "bem/test_contact.py": "bem.contact_run bem.uzawa_space_time",
     "bem/test_energetic.py": "bem.loads bem.poincare_steklov",
     "bem/test_fundamental_solution.py": "bem.rules",

@@ -12,6 +12,7 @@ from ..core.lazy import lazy
 _CONTENTS = {
     "boundary_mesh": ("BoundaryMesh", "circle", "polygon"),
     "boundary_operators": ("Galerkin", "OperatorMatrices"),
+    "compressed": ("CompressedBlocks",),
     "contact": ("BoundaryContact", "Conditions", "conditions_on"),
     "contact_run": ("ContactRun", "march_contact"),
     "energetic": ("EnergeticBlocks", "energetic_blocks"),

@@ -5,6 +5,7 @@ from .boundary_mesh import circle as circle
 from .boundary_mesh import polygon as polygon
 from .boundary_operators import Galerkin as Galerkin
 from .boundary_operators import OperatorMatrices as OperatorMatrices
+from .compressed import CompressedBlocks as CompressedBlocks
 from .contact import BoundaryContact as BoundaryContact
 from .contact import Conditions as Conditions
 from .contact import conditions_on as conditions_on
@@ -22,4 +23,4 @@ from .poincare_steklov import PoincareSteklov as PoincareSteklov
 from .quadrature import Orders as Orders
 from .uzawa_space_time import SpaceTimeUzawa as SpaceTimeUzawa
 
-__all__: list[str] = ['BoundaryContact', 'BoundaryMesh', 'BoundaryMotion', 'BoundaryProblem', 'CondensedCompliance', 'Conditions', 'ContactRun', 'EnergeticBlocks', 'Galerkin', 'MultiplierMesh', 'OperatorMatrices', 'Orders', 'PoincareSteklov', 'SpaceTimeUzawa', 'TimeKernels', 'circle', 'conditions_on', 'energetic_blocks', 'march_contact', 'polygon', 'traction_forces']
+__all__: list[str] = ['BoundaryContact', 'BoundaryMesh', 'BoundaryMotion', 'BoundaryProblem', 'CompressedBlocks', 'CondensedCompliance', 'Conditions', 'ContactRun', 'EnergeticBlocks', 'Galerkin', 'MultiplierMesh', 'OperatorMatrices', 'Orders', 'PoincareSteklov', 'SpaceTimeUzawa', 'TimeKernels', 'circle', 'conditions_on', 'energetic_blocks', 'march_contact', 'polygon', 'traction_forces']

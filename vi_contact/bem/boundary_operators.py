@@ -79,14 +79,14 @@ class Galerkin:
 
     def _single(self, moments: NDArray) -> NDArray:
         n, e, f = len(self.mesh), self.pairs.first, self.pairs.second
-        matrix, values = np.empty((2, n, 2, 2, n, 2), moments.dtype), tensor(moments)
+        matrix, values = np.zeros((2, n, 2, 2, n, 2), moments.dtype), tensor(moments)
         matrix[:, e, :, :, f] = values.transpose(2, 0, 3, 1, 4)
         matrix[:, f, :, :, e] = values.transpose(2, 0, 4, 1, 3)
         return matrix.reshape(4 * n, 4 * n)
 
     def _double(self, moments: NDArray) -> NDArray:
         n, e, f = len(self.mesh), self.pairs.first, self.pairs.second
-        local = np.empty((2, n, 2, 2, n, 2), moments.dtype)
+        local = np.zeros((2, n, 2, 2, n, 2), moments.dtype)
         swapped = moments.swapaxes(2, 3) * np.array([-1, -1, -1, -1, 1, 1, 1, 1])[:, None, None, None]
         for x, y, m in ((e, f, moments), (f, e, swapped)):
             local[:, x, :, :, y] = double_local(self.mesh, self.shear, m, y).transpose(2, 0, 3, 1, 4)
@@ -94,7 +94,7 @@ class Galerkin:
 
     def _hyper(self, moments: NDArray) -> NDArray:
         n, e, f = len(self.mesh), self.pairs.first, self.pairs.second
-        local, values = np.empty((2, n, 2, 2, n, 2), moments.dtype), self._hyper_local(moments)
+        local, values = np.zeros((2, n, 2, 2, n, 2), moments.dtype), self._hyper_local(moments)
         for c in range(2):
             for k in range(2):
                 local[c, e, :, k, f, :] = values[c, k]

@@ -1,8 +1,10 @@
 """Pair boundary elements, each pair once, with the distances that decide how they are integrated."""
 
+from copy import copy
+
 import numpy as np
 
-from ..core.algebra import Array, Indices
+from ..core.algebra import Array, Indices, Mask
 from ..core.checks import at, instance
 from ..core.errors import InputError
 from .boundary_mesh import BoundaryMesh
@@ -63,6 +65,12 @@ class ElementPairs:
         raise InputError(f"boundary elements: the boundary {near} at {at(mesh.points[second])}, where elements "
                          f"{first} and {second} are {apart:.3g} m apart, less than 1/20 of the {h:.3g} m of the longer "
                          f"one; {remedy}")
+
+    def where(self, chosen: Mask) -> "ElementPairs":
+        """Return the chosen pairs (p,)."""
+        part = copy(self)
+        part.__dict__.update({name: values[..., chosen] for name, values in self.__dict__.items()})
+        return part
 
     def __len__(self) -> int:
         return len(self.first)

@@ -13,22 +13,26 @@ F_k is the nodal force [N/m], the mean over step k. In the symmetric form the wo
 quadratic form of the history of u: the energy of the body, from boundary data alone.
 """
 
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, lu_factor, lu_solve
 
-from ..core.algebra import Array
-from ..core.checks import counted, number, whole
+from ..core.algebra import Array, Mask
+from ..core.checks import counted, flag, number, whole
 from ..core.errors import InputError
 from ..laws.materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
-from .boundary_operators import Galerkin, check_body
+from .boundary_operators import Galerkin, OperatorMatrices, check_body
+from .compressed import NUMBERS, CompressedBlocks, compressed_blocks
 from .fundamental_solution import TimeKernels
 from .quadrature import Orders
 
-NUMBERS = 4_000_000_000  # in the blocks of a body: 32 GB
+DENSE = 50_000_000  # numbers of all blocks beyond which they are compressed
 SMALLEST_RATIO, GREATEST_RATIO = 0.05, 8.0  # limits of c_P dt / h
 
 
@@ -64,27 +68,46 @@ def check_time_step(mesh: BoundaryMesh, c_p: float, dt: float) -> None:
 
 
 def energetic_blocks(
-    mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: int, orders: Orders = Orders()
-) -> EnergeticBlocks:
-    """Assemble the blocks of `steps` time steps of dt [s]; memory 224 steps n² bytes.
+    mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: int, orders: Orders = Orders(),
+    compressed: bool | None = None, threads: int = 1,
+) -> EnergeticBlocks | CompressedBlocks:
+    """Assemble the blocks of `steps` time steps of dt [s]; dense ones take 224 steps n² bytes.
 
-    Raises InputError for a time step far too small or large for the mesh, and for a body too thin or sharp for it.
+    compressed: whether to keep CompressedBlocks and solve on a circle of frequencies; None does so where dense blocks
+    would take 400 MB. threads: how many integrate; answers do not depend on it. Raises InputError for a time step far
+    too small or large for the mesh, and for a body too thin or sharp for it.
     """
+    owner = "boundary elements"
     check_body(mesh, material, orders)
-    steps = whole("boundary elements", "the number of time steps", steps, least=1)
-    counted("boundary elements", f"{steps} steps of {len(mesh)} elements", 28 * steps * len(mesh) ** 2, "numbers",
-            most=NUMBERS)
+    steps = whole(owner, "the number of time steps", steps, least=1)
+    whole(owner, "the number of threads", threads, least=1)
+    numbers = 28 * steps * len(mesh) ** 2
+    small = numbers <= DENSE if compressed is None else not flag(owner, "compressed", compressed)
+    counted(owner, f"{steps} steps of {len(mesh)} elements", numbers, "numbers", most=NUMBERS * (1 if small else 10))
     check_time_step(mesh, material.c_p, dt)
-    galerkin, n, c_p, c_s = Galerkin(mesh, material.c_s, orders), len(mesh), material.c_p, material.c_s
-    single, double, hyper = (np.empty((steps, rows, columns)) for rows, columns in (
-        (4 * n, 4 * n), (4 * n, 2 * n), (2 * n, 2 * n)))
-    a, b, c, change = (np.zeros_like(blocks[0]) for blocks in (single, double, hyper, hyper))
-    for j in range(steps):
-        t = (j + 1) * dt
-        now = galerkin.assemble(TimeKernels(t, c_p, c_s), (c_s * t, c_p * t))
-        single[j], double[j], hyper[j] = now.single - a, (now.double - b) / dt, (now.hyper - c - change) / dt**2
-        a, b, c, change = now.single, now.double, now.hyper, now.hyper - c
-    return EnergeticBlocks(mesh, c_p, c_s, dt, single, double, hyper)
+    galerkin, n, speeds = Galerkin(mesh, material.c_s, orders), len(mesh), (material.c_p, material.c_s)
+
+    def assembled(among: Callable[[int], Mask] | None = None) -> Iterator[tuple[Array, Array, Array]]:
+        """Return V^j, K^j, D^j, right where pairs are ``among`` those of the times j - 1, j and j + 1, all if None."""
+
+        def at(i: int) -> OperatorMatrices:
+            some, t = copy(galerkin), i * dt
+            some.pairs = galerkin.pairs if among is None else galerkin.pairs.where(among(i))
+            return some.assemble(TimeKernels(t, *speeds), (speeds[1] * t, speeds[0] * t))
+
+        a, b, c, change = (np.zeros(1) for _ in range(4))
+        with ThreadPoolExecutor(threads) as pool:
+            for start in range(1, steps + 1, threads):
+                for now in pool.map(at, range(start, min(start + threads, steps + 1))):  # each at a time of its own
+                    yield now.single - a, (now.double - b) / dt, (now.hyper - c - change) / dt**2
+                    a, b, c, change = now.single, now.double, now.hyper, now.hyper - c
+
+    if not small:
+        return compressed_blocks(mesh, galerkin.pairs, speeds, dt, steps, assembled)
+    single, double, hyper = (np.empty((steps, a * n, b * n)) for a, b in ((4, 4), (4, 2), (2, 2)))
+    for j, blocks in enumerate(assembled()):
+        single[j], double[j], hyper[j] = blocks
+    return EnergeticBlocks(mesh, *speeds, dt, single, double, hyper)
 
 
 def marched(

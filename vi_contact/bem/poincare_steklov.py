@@ -15,7 +15,9 @@ from ..core.algebra import Array, Indices, Mask
 from ..core.checks import array, flag, instance, integers, mask, number, optional, provides, shape_of
 from ..core.errors import InputError
 from .boundary_mesh import BoundaryMesh
+from .compressed import CompressedBlocks
 from .energetic import EnergeticBlocks, marched, summed
+from .frequency_circle import on_circle
 
 
 class BodyOperator(Protocol):
@@ -42,12 +44,12 @@ class BodyOperator(Protocol):
 class PoincareSteklov:
     """Hold S of a body of density rho [kg/m³], from blocks of density 1."""
 
-    blocks: EnergeticBlocks
+    blocks: EnergeticBlocks | CompressedBlocks
     rho: float
     symmetric: bool = True
 
     def __post_init__(self) -> None:
-        instance("PoincareSteklov", "blocks", self.blocks, EnergeticBlocks, "give those of energetic_blocks")
+        instance("PoincareSteklov", "blocks", self.blocks, (EnergeticBlocks, CompressedBlocks), "use energetic_blocks")
         number("PoincareSteklov", "the mass density rho", self.rho, positive=True, unit="kg/m³")
         flag("PoincareSteklov", "symmetric", self.symmetric)
 
@@ -66,21 +68,23 @@ class PoincareSteklov:
         return None, 2, len(self.mesh)
 
     def motion(self, forces: Array, fixed: Mask, prescribed: Array | None) -> tuple[Array, Array, Array]:
-        """Return the motion by one march; forces: (steps, 1, 2n)."""
+        """Return the motion by one march, or on a circle of frequencies; forces: (steps, 1, 2n)."""
+        if isinstance(self.blocks, CompressedBlocks):
+            found = on_circle(self.blocks, fixed, forces[:, 0] / self.rho, prescribed, np.arange(0), self.symmetric)
+            return found[1], self.rho * found[2], self.rho * found[3]
         given = None if prescribed is None else prescribed[:, :, None]
-        loads = forces.swapaxes(1, 2) / self.rho
-        u, p, total = marched(self.blocks, fixed, loads, given, symmetric=self.symmetric)
+        u, p, total = marched(self.blocks, fixed, forces.swapaxes(1, 2) / self.rho, given, symmetric=self.symmetric)
         return u[:, :, 0], self.rho * p[:, :, 0], self.rho * total[:, :, 0]
 
     def condense(self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: Indices) -> tuple[Array, Array]:
-        """Return W and u_free of CondensedCompliance for these unknowns, in one march with 2m + 1 columns."""
+        """Return W and u_free of CondensedCompliance for these unknowns, in one march with 2m + 1 columns, or so."""
+        if isinstance(self.blocks, CompressedBlocks):
+            W, moved, *_ = on_circle(self.blocks, fixed, forces[:, 0] / self.rho, prescribed, unknowns, self.symmetric)
+            return W / self.rho, moved[:, unknowns]
         columns = np.zeros((len(forces), 2 * len(self.mesh), len(unknowns) + 1))
         columns[0, unknowns, np.arange(len(unknowns))] = 1.0 / self.rho
         columns[:, :, -1] = forces[:, 0] / self.rho
-        given = None
-        if prescribed is not None:
-            given = np.zeros_like(columns)
-            given[:, :, -1] = prescribed
+        given = None if prescribed is None else np.concatenate([0.0 * columns[..., 1:], prescribed[..., None]], axis=2)
         u = marched(self.blocks, fixed, columns, given, symmetric=self.symmetric)[0][:, unknowns]
         return np.ascontiguousarray(u[:, :, :-1]), np.ascontiguousarray(u[:, :, -1])
 

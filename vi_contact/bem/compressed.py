@@ -1,0 +1,122 @@
+"""Keep the blocks of the energetic method in little memory: nothing ahead of waves, few steps behind the last one.
+
+Element i starts at node i; entries at nodes come from the element before as well. With r_min and r_max the least and
+greatest distance between the elements of an entry, and h the longest, the blocks of step j (times t_(j-1) to t_(j+1))
+
+    vanish while c_P t_(j+1) <= r_min,    are smooth in time once c_S t_(j-1) >= r_max + h,
+
+for then the points of the integrals stay where they are (quadrature.py). All steps between are integrated and kept, and
+of the tail those from which the others are interpolated (tails.py); of symmetric matrices, one half.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.algebra import Array, Indices, Mask
+from ..core.checks import counted
+from .boundary_mesh import BoundaryMesh
+from .element_pairs import ElementPairs
+from .tails import tail
+
+NUMBERS = 4_000_000_000  # in the blocks of a body: 32 GB
+MULTIPLE = 3  # steps, at whose multiples windows begin and end: more pairs have the same
+BlockSteps = Callable[[Callable[[int], Mask]], Iterable[tuple[Array, Array, Array]]]
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Hold entries of the same window: their places (numbers,) in the matrices of a step, one behind the other, and
+    values (kept steps, numbers): all steps from `first` to `smooth`, then the steps `tail`, with weights that give all
+    steps behind `smooth` and bounds of errors (tails.py)."""
+
+    first: int
+    smooth: int
+    tail: Indices
+    weights: Array
+    errors: Array
+    places: Indices
+    values: Array
+
+
+@dataclass(frozen=True, eq=False)
+class CompressedBlocks:
+    """Hold the blocks of density 1, as EnergeticBlocks does, compressed in time.
+
+    places: (28 n²,) of each entry of the matrices of a step, one behind the other, among the numbers of all stretches.
+    """
+
+    mesh: BoundaryMesh
+    c_p: float
+    c_s: float
+    dt: float
+    steps: int
+    stretches: tuple[Stretch, ...]
+    places: Indices
+
+    @property
+    def errors(self) -> Array:
+        """Return (3,) bounds of what interpolation changes of entries of single, double and hyper."""
+        return np.asarray(np.max([part.errors for part in self.stretches], axis=0))
+
+    def combined(self, weights: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+        """Return complex sums (f, ...) of single, double and hyper over all steps with weights (f, steps)."""
+        f, n, found = len(weights), len(self.mesh), []
+        for part in self.stretches:
+            kept = np.hstack([weights[:, part.first : part.smooth], weights[:, part.smooth :] @ part.weights])
+            real, imag = np.split(np.concatenate([kept.real, kept.imag]) @ part.values, 2)
+            found.append(real + 1j * imag)
+        numbers = np.concatenate(found, axis=1)[:, self.places]
+        single, double, hyper = np.split(numbers, [16 * n**2, 24 * n**2], axis=1)
+        return single.reshape(f, 4 * n, -1), double.reshape(f, 4 * n, -1), hyper.reshape(f, 2 * n, -1)
+
+
+def compressed_blocks(
+    mesh: BoundaryMesh, pairs: ElementPairs, speeds: tuple[float, float], dt: float, steps: int, assembled: BlockSteps
+) -> CompressedBlocks:
+    """Keep the blocks of `steps` steps; speeds: (c_P, c_S) [m/s]; assembled: gives the blocks of all steps from a
+    function of i that returns the pairs (p,) of elements to integrate at time i dt."""
+    n, h, stretches, needed = len(mesh), float(mesh.lengths.max()), [], []
+    entries = np.arange(28 * n**2)
+    single, double, hyper = np.split(entries, [16 * n**2, 24 * n**2])
+    mirrored = np.concatenate([single.reshape(4 * n, -1).T.ravel(), double, hyper.reshape(2 * n, -1).T.ravel()])
+    single, double, hyper = single.reshape(2, n, 2, 2, n, 2), double.reshape(2, n, 2, 2, n), hyper.reshape(2, n, 2, n)
+    full = np.empty((2, n, n))  # minus the least distance, the greatest
+    full[:, pairs.first, pairs.second] = full[:, pairs.second, pairs.first] = -pairs.r_min, pairs.r_max
+    for axis in (1, 2):
+        full = np.maximum(full, np.take(full, np.argsort(mesh.after), axis))
+    first = (-full[0] / (speeds[0] * dt)).astype(int)
+    smooth = ((full[1] + h) / (speeds[1] * dt) + 2.5).astype(int)  # half a step late or more: rounding does not matter
+    spans = np.minimum([first - first % MULTIPLE, smooth + -smooth % MULTIPLE], steps)
+    above = np.stack(np.triu_indices(n))
+    windows, group = np.unique(spans[:, above[0], above[1]], axis=1, return_inverse=True)
+    for number, (begin, end) in enumerate(windows.T):
+        (a, b), behind = above[:, np.ravel(group) == number], tail(int(end), steps, dt, speeds, h)
+        parts = single[:, a, :, :, b], double[:, a, :, :, b], double[:, b, :, :, a], hyper[:, a, :, b]
+        places = np.concatenate([part.ravel() for part in parts])
+        kept = np.append(np.arange(begin, end), behind[0])
+        stretches.append(Stretch(int(begin), int(end), *behind, places, np.empty((len(kept), len(places)))))
+        needed.append((a, b, np.isin(np.arange(-1, steps + 1), np.add.outer(kept, (-1, 0, 1)))))
+    total = sum(part.values.size for part in stretches)  # nothing is written yet
+    counted("boundary elements", f"{steps} steps of {n} elements", total, "numbers", most=NUMBERS)
+
+    def among(i: int) -> Mask:
+        wanted = np.zeros((n, n), bool)
+        for a, b, times in needed:
+            wanted[a, b] = times[i + 1]
+        wanted |= wanted[mesh.after]
+        wanted |= wanted[:, mesh.after]
+        wanted[0, 0] = True  # never nothing
+        return wanted[pairs.first, pairs.second] | wanted[pairs.second, pairs.first]
+
+    for j, blocks in enumerate(assembled(among)):
+        numbers = np.concatenate([block.ravel() for block in blocks])
+        for part in stretches:
+            if part.first <= j < part.smooth:
+                part.values[j - part.first] = numbers[part.places]
+            part.values[part.smooth - part.first :][part.tail == j] = numbers[part.places]
+    places, order = np.empty_like(entries), np.concatenate([part.places for part in stretches])
+    places[mirrored[order]] = places[order] = np.arange(len(order))
+    return CompressedBlocks(mesh, *speeds, dt, steps, tuple(stretches), places)
