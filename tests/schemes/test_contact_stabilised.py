@@ -37,15 +37,17 @@ def chain(n: int = 6, **more: Any) -> ContactProblem:
 
 @pytest.mark.parametrize("other", [ZienkiewiczWoodTaylor(0.5), SS22()])
 def test_kanes_form_is_the_midpoint_rule(other):
-    """1.7 (ii): without the projection it equals Zienkiewicz-Wood-Taylor(½) and SS22(½, ½) to 1e-10 in every step of
-    the thrown bar; with the former even the end of the run does."""
+    """1.7 (ii): without the projection it equals Zienkiewicz-Wood-Taylor(½) and SS22(½, ½) to 1e-10 in every third
+    step of the thrown bar; with the former even the end of the run does."""
     problem, closed = thrown(**MASS), 0
     for report in run(problem, ContactStabilisedNewmark(False), dt=1 / 300, steps=450):
+        closed += int(report.new.active[0])
+        if report.new.k % 3:
+            continue
         new = next(run(problem, other, dt=1 / 300, steps=1, state=report.old)).new
         assert np.abs(new.u - report.new.u).max() <= 1e-10 * 5.0
         assert np.abs(new.v - report.new.v).max() <= 1e-10 * 10.0
         assert abs(new.r_n[0] - report.new.r_n[0]) <= 1e-10 * 300.0
-        closed += int(new.active[0])
     assert 150 < closed < 250
     if isinstance(other, ZienkiewiczWoodTaylor):
         *_, last = run(problem, other, dt=1 / 300, steps=450)
@@ -53,17 +55,19 @@ def test_kanes_form_is_the_midpoint_rule(other):
 
 
 def test_kanes_form_with_damping_base_motion_and_springs():
-    """The same step by step with everything in the equations; springs are not projected, so both forms agree there."""
+    """The same, every second step, with everything in the equations; springs are not projected, so both forms agree there."""
     problem = chain(gap=0.01, damping=1e-3, constant=30.0, excitation=SHAKEN, v0=np.ones(6), consistent=True)
     soft = replace(problem, surface=problem.surface.on_springs(4.0e3))
     for body, projected in ((problem, False), (soft, False), (soft, True)):
         closed = 0
         for report in run(body, ZienkiewiczWoodTaylor(), dt=5e-3, steps=200):
+            closed += int(report.new.active[0])
+            if report.new.k % 2:
+                continue
             other = next(run(body, ContactStabilisedNewmark(projected), dt=5e-3, steps=1, state=report.old))
             assert np.abs(other.new.u - report.new.u).max() <= 1e-10 * np.abs(report.new.u).max()
             assert np.abs(other.new.v - report.new.v).max() <= 1e-10 * np.abs(report.new.v).max()
             assert abs(other.new.r_n[0] - report.new.r_n[0]) <= 1e-10 * max(report.new.r_n[0], 30.0)
-            closed += int(report.new.active[0])
         assert 5 < closed < 195
 
 
