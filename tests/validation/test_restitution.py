@@ -25,7 +25,7 @@ from vi_contact.schemes.moreau_jean import MoreauJean
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 
 SPEED, MASS = 10.0, 10.0  # V1.1: of the approach [m/s], of the bar [kg] for a unit area
-MESHES, RESTITUTIONS = (1, 5, 20, 80, 160), (0.0, 0.5, 1.0)
+MESHES, RESTITUTIONS = (1, 10, 160), (0.0, 0.5, 1.0)
 COURANT, END = 0.45, 1.3  # the gap closes well inside a step: no tie that round-off decides; contact ends at 7/6 s
 LAWS = {
     "reset": lambda e: (ZienkiewiczWoodTaylor(), Newton(e)),
@@ -72,12 +72,12 @@ def test_the_rebound_of_a_bar_tends_to_one_for_every_restitution(law: str) -> No
 @pytest.mark.serial
 @pytest.mark.parametrize("reading", [ComponentReset, ImpulseUpdate])
 def test_inelastic_and_elastic_are_the_ends_of_the_range(reading: Any) -> None:
-    """V1.1, 80 elements: Inelastic (every closed point, in every step) and Elastic rebound as Newton's 0 and 1 do."""
+    """V1.1, 20 elements: Inelastic (every closed point, in every step) and Elastic rebound as Newton's 0 and 1 do."""
     scheme = ZienkiewiczWoodTaylor()
     for named, e in ((Inelastic(reading()), 0.0), (Elastic(reading()), 1.0)):
-        found = rebound(80, scheme, named)
-        assert 0.98 < found < 1.0
-        assert found == pytest.approx(rebound(80, scheme, Newton(e, reading())), rel=1e-9)
+        found = rebound(20, scheme, named)
+        assert 0.9 < found < 1.0
+        assert found == pytest.approx(rebound(20, scheme, Newton(e, reading())), rel=1e-9)
 
 
 @pytest.mark.serial
