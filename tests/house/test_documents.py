@@ -60,42 +60,38 @@ def test_reading_examples_run_on_its_output(first: tuple[Path, str]) -> None:
     assert picture == "" and (first[0] / "frame.png").stat().st_size > 5000
 
 
+def together(codes: list[str], folder: Path) -> list[str]:
+    """What each of them prints, one after the other in one process: they start with names of their own."""
+    names = [f"page_{number}.py" for number in range(len(codes))]
+    for name, code in zip(names, codes, strict=True):
+        (folder / name).write_text(code, encoding="utf-8")
+    return run(f"import runpy\nfor name in {names}: runpy.run_path(name); print('---')\n", folder).split("---\n")[:-1]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("document", ["guide/records.md", "guide/solvers.md"])
-def test_other_examples_run_on_its_problem(tmp_path: Path, document: str) -> None:
-    """They continue README's example where its problem is ready."""
+def test_other_examples_run_on_its_problem(tmp_path: Path) -> None:
+    """Those of records and solvers continue README's example where its problem is ready."""
     (code,) = blocks(ROOT / "README.md", "python")
     ready = code[: code.index("solution = ")]
     samples = "\n".join(f"{0.3 * (-1) ** k:.3f}" for k in range(50))
     (tmp_path / "elcentro.at2").write_text(f"A motion\nunits of g\nNPTS= 50, DT= .02000 SEC\n{samples}")
-    (example,) = blocks(ROOT / "docs" / document, "python")
-    run(ready + example, tmp_path)
+    examples = [blocks(ROOT / "docs" / "guide" / name, "python") for name in ("records.md", "solvers.md")]
+    together([ready + example for (example,) in examples], tmp_path)
 
 
 @pytest.mark.slow
-def test_soil_in_space_prints_what_its_page_says(tmp_path: Path) -> None:
-    page = ROOT / "docs" / "guide" / "soil.md"
-    (printed,) = blocks(page, "text")
-    assert run(blocks(page, "python")[-1], tmp_path) == printed
-
-
-def test_bounds_print_what_their_page_says(tmp_path: Path) -> None:
-    page = ROOT / "docs" / "guide" / "bounds.md"
-    (printed,), (code,) = blocks(page, "text"), blocks(page, "python")
-    assert run(code, tmp_path) == printed
-
-
-@pytest.mark.slow
-def test_bring_your_own_prints_what_its_page_says(tmp_path: Path) -> None:
-    """All snippets as one program; before DOLFINx 0.7 with the names that spaces have there."""
+def test_programs_print_what_their_pages_say(tmp_path: Path) -> None:
+    """Soil in space, bounds, and all snippets of bring_your_own as one program; before DOLFINx 0.7 with the names that
+    spaces have there."""
     from vi_contact.fem import compat
 
-    page = ROOT / "docs" / "guide" / "bring_your_own.md"
-    code, (printed,) = "".join(blocks(page, "python")), blocks(page, "text")
+    soil, bounds, own = (ROOT / "docs" / "guide" / f"{name}.md" for name in ("soil", "bounds", "bring_your_own"))
+    code = "".join(blocks(own, "python"))
     if compat.VERSION < (0, 7):
         code = code.replace('functionspace(mesh, ("Lagrange", 1, (2,)))', 'VectorFunctionSpace(mesh, ("Lagrange", 1))')
         code = code.replace("fem.functionspace(", "fem.FunctionSpace(")
-    assert run(code, tmp_path) == printed
+    found = together([blocks(soil, "python")[-1], *blocks(bounds, "python"), code], tmp_path)
+    assert found == [text for page in (soil, bounds, own) for text in blocks(page, "text")]
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
