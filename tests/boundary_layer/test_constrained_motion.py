@@ -38,13 +38,13 @@ def collide(layer: Layer, **more) -> LayerContact:
 
 
 def test_particle():
-    """V5.1, all pairs in closed form: table to its digits; every second one by integration: closed form to 1e-9, times
+    """V5.1, all pairs in closed form: table to its digits; every fourth one by integration: closed form to 1e-9, times
     of the events too."""
     for i, k in enumerate(K):
         for j, c in enumerate(C):
             layer = Layer(1.0, k=k, c=c)
             impact = ParticleImpact(layer, 1.0, 1.0)
-            for found in (impact, collide(layer)) if (i + j) % 2 == 0 else (impact,):
+            for found in (impact, collide(layer)) if (i + j) % 4 == 0 else (impact,):
                 assert found.restitution == pytest.approx(RESTITUTION[i][j], abs=1e-6)
                 assert found.duration == pytest.approx(DURATION[i][j], abs=1e-6)
                 assert found.deepest == pytest.approx(DEEPEST.get((k, c), impact.deepest), abs=1e-6)
