@@ -120,18 +120,18 @@ def test_oscillator_slides_to_rest() -> None:
         way = solve_ivp(motion, (0.0, 1.0), [x, 0.0], events=turned, method="DOP853", rtol=1e-10, atol=1e-13)
         x = float(way.y[0, -1])
         turns.append(x)
-    run = reports(rubbing_mass(u0=0.45e-3, friction=SlipRateCoulomb(mu), mass=ConsistentMass()), 2e-4, 0.18)
+    run = reports(rubbing_mass(u0=0.45e-3, friction=SlipRateCoulomb(mu), mass=ConsistentMass()), 2.5e-4, 0.15)
     u = np.array([r.new.u[0] for r in run])
     peaks = u[1:-1][(np.diff(u)[:-1] * np.diff(u)[1:] <= 0.0) & (np.diff(u)[:-1] != 0.0)]
     assert len(turns) >= 3 and peaks == pytest.approx(turns, rel=0.0, abs=2e-4 * 0.45e-3)
-    assert u[-1] == u[-200] == peaks[-1]
+    assert u[-1] == u[-80] == peaks[-1]
 
 
 @pytest.mark.slow
 def test_steady_sliding() -> None:
     """mu = 0.2 + v damps: the mass comes to rest at x = mu(V) N/k, the belt slides on under mu(V) N."""
     for scheme in (MIDPOINT, vc.MoreauJean(), vc.Newmark()):
-        last = reports(belted(lambda v: 0.2 + v, lambda t: 0.2 * t), 0.04, 6.0, scheme=scheme)[-1]
+        last = reports(belted(lambda v: 0.2 + v, lambda t: 0.2 * t), 0.05, 6.0, scheme=scheme)[-1]
         assert last.new.u[0] == pytest.approx(0.4 * 10.0 / 100.0, rel=1e-9)
         assert last.new.r_t[0, 0] == pytest.approx(-4.0, rel=1e-9) and rate(last) == pytest.approx(0.2, rel=1e-9)
 
@@ -154,7 +154,7 @@ def test_slow_slip_stays_inside_the_cone(law: str, scheme: Any) -> None:
     """A belt whose speed grows from 1e-6 to 1 m/s: |r_t| <= mu(|v|) r_n in every step, equal where it slips, with the
     exact law at the rate of the step; mu_s where it sticks. Rates over five decades occur under growing friction."""
     growth, mu = np.log(1e6) / 6.0, LAWS[law]
-    run = reports(belted(mu, lambda t: 1e-6 * np.expm1(growth * t) / growth), 2e-2, 6.0, scheme=scheme)
+    run = reports(belted(mu, lambda t: 1e-6 * np.expm1(growth * t) / growth), 4e-2, 6.0, scheme=scheme)
     speeds = np.array([rate(r)[0] for r in run])
     friction = np.array([abs(r.result.r_t[0, 0]) for r in run])
     limit = np.array([mu(rate(r))[0] * r.result.r_n[0] for r in run])
@@ -204,7 +204,7 @@ def test_static_and_kinetic_coefficients() -> None:
 def rubbed() -> list[Report]:
     """The block of the next test by the default method."""
     law = SlipRateCoulomb(ExponentialDecay((0.5, 0.6, 0.7), 0.2, 0.1))
-    return reports(rubbing_block(law), 0.1, 15.0, scheme=BACKWARD)
+    return reports(rubbing_block(law), 0.1, 9.0, scheme=BACKWARD)
 
 
 @pytest.mark.slow
@@ -215,7 +215,7 @@ def test_several_points_with_every_method(method: Any, rubbed: list[Report]) -> 
     """A block that rubs along a wall with three points: certified with the exact law, the same with all methods; few
     outer iterations, logged with every step."""
     law = SlipRateCoulomb(ExponentialDecay((0.5, 0.6, 0.7), 0.2, 0.1))
-    run = reports(rubbing_block(law), 0.1, 15.0, scheme=BACKWARD, friction_method=method)
+    run = reports(rubbing_block(law), 0.1, 9.0, scheme=BACKWARD, friction_method=method)
     assert np.allclose(run[-1].new.u, rubbed[-1].new.u, rtol=0.0, atol=1e-8)
     touching = [r for r in run if r.new.r_n.any()]
     assert len(touching) > 20 and max(r.certificate.worst for r in run) <= 1e-10
@@ -225,8 +225,8 @@ def test_several_points_with_every_method(method: Any, rubbed: list[Report]) -> 
 
 def test_a_constant_function_is_coulombs_law() -> None:
     """The same motion to the last bit, in one outer iteration."""
-    one = reports(rubbing_block(Coulomb(0.3)), 0.1, 15.0)
-    other = reports(rubbing_block(SlipRateCoulomb(lambda v: 0.3)), 0.1, 15.0)
+    one = reports(rubbing_block(Coulomb(0.3)), 0.1, 6.0)
+    other = reports(rubbing_block(SlipRateCoulomb(lambda v: 0.3)), 0.1, 6.0)
     assert np.array_equal(one[-1].new.u, other[-1].new.u)
     assert all(len(r.result.history) == 1 for r in other)
 
