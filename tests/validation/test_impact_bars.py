@@ -114,9 +114,9 @@ def test_bouncing_strip(body: str, courant: float, periods: float, floor: float)
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("courant, periods, floor", [(1.0, 10, 0.88), (0.5, 2, 0.992), (0.1, 0.5, 0.9999)])
+@pytest.mark.parametrize("courant, periods, floor", [(1.0, 10, 0.88), (0.5, 2, 0.992), (0.2, 0.5, 0.9999)])
 def test_bouncing_bar_for_ten_periods(courant: float, periods: int, floor: float) -> None:
-    """V1.2: energy >= 0.88 of the first after ten periods, 0.992 after two, 0.9999 after half of one (8000 steps), at
+    """V1.2: energy >= 0.88 of the first after ten periods, 0.992 after two, 0.9999 after half of one (4000 steps), at
     most 1.001 of it; the foot as the exact bar's in the first period, 1.5 % rms of the height (measured 1.4, 1.1 and
     0.9 %)."""
     exact, dt = BouncingBar(), courant / 300.0
@@ -170,9 +170,10 @@ def test_code_aster_sdnv100(body: str) -> None:
 @pytest.mark.parametrize("courant", COURANTS)
 @pytest.mark.parametrize("scheme", [Midpoint(), ContactStabilisedNewmark(), MoreauJean()], ids=repr)
 def test_dissipative_schemes_never_gain(scheme: Any, courant: float) -> None:
-    """No step of V1.3 raises the energy by more than 1e-11 of its start."""
+    """No step of V1.3 raises the energy by more than 1e-11 of its start: two periods, at Courant number 0.1 the
+    first contact."""
     problem = period_three(100, mass=ConsistentMass())
-    last, periods = 0.125, 4 if courant > 0.1 else 1
+    last, periods = 0.125, 2.0 if courant > 0.1 else 0.7
     for report in serial_run(problem, scheme, dt=courant / 100.0, steps=round(300 * periods / courant)):
         now = energy(problem, report.new)
         assert now - last <= 1e-11 * 0.125
