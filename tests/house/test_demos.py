@@ -198,6 +198,7 @@ def test_the_bouncing_bar_demo(comm: Any, shared_tmp: Path, capsys: pytest.Captu
 
 
 @pytest.mark.slow
+@pytest.mark.serial
 def test_the_hertz_impact_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """V3.3 with 4 cells in the contact radius: within 5 % of the theory, certified, rebound with full speed."""
     numbers = demo("hertz_impact").main(quick=True, out=shared_tmp, progress=False)

@@ -50,6 +50,10 @@ PROBLEMS: dict[str, Callable[[Any], ContactProblem]] = {
     "inclined box of tetrahedra": partial(thrown_box, simplices=True, angle=0.5),
 }
 problems = pytest.mark.parametrize("name", PROBLEMS)
+ON_RANKS = ("turned wall", "points and gap", "stiff springs", "inclined box of tetrahedra")  # a kind of each
+many_routes = pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in ON_RANKS else pytest.mark.serial) for name in PROBLEMS]
+)
 
 
 def timing(name: str) -> tuple[float, int]:
@@ -60,7 +64,7 @@ def timing(name: str) -> tuple[float, int]:
 # Routes ---------------------------------------------------------------------------------------------------------------
 
 @pytest.mark.slow
-@problems
+@many_routes
 def test_all_routes_agree_at_every_step(name):
     """Every method against the active set on the condensed problem, from the same states: u and r_n to 1e-9.
 
@@ -92,7 +96,7 @@ def busiest_step(problem: ContactProblem, dt: float, steps: int) -> StepProblem:
 
 
 @pytest.mark.slow
-@problems
+@many_routes
 def test_warm_start_at_the_solution_costs_nothing(name):
     """A step begun at its own solution: no change of the contact set, no Newton step, no TAO iteration.
 

@@ -46,7 +46,10 @@ def run(model: WallModel, case: str, name: str, *, refined: int = 1, steps: int 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "case"), zip(SCHEMES, "ab" * 6, strict=True))
+@pytest.mark.parametrize(("name", "case"), [  # on two ranks one of either kind of mass: they solve the same equations
+    pytest.param(name, case, marks=() if name in ("trapezoidal", "zwt", "moreau-jean") else pytest.mark.serial)
+    for name, case in zip(SCHEMES, "ab" * 6, strict=True)
+])
 def test_every_scheme_is_certified_and_closes_its_ledger(name: str, case: str) -> None:
     """V9.7 over the seed's 400 steps, in either case by turns; position-level schemes never penetrate."""
     solution = run(wall(), case, name)
