@@ -18,6 +18,7 @@ from kept_figures import keep_figures
 pytest.importorskip("dolfinx")
 pytest.importorskip("matplotlib")
 from mpi4py import MPI
+from plain_pictures import plain_pictures
 from two_bodies import SOFT, two_blocks
 
 import vi_contact as vc
@@ -229,7 +230,8 @@ def test_all_pictures_of_a_run(
     run = runs["hexahedra"]
     drawn = bodies.draw_run(run, tmp_path, title="Blocks")
     assert [path.name for path in drawn] == ["deformed.png", "faces.png"]
-    film(run, tmp_path / "film.gif", times=[0.012, 0.021, 0.03], title="Blocks")
+    with plain_pictures():
+        film(run, tmp_path / "film.gif", times=[0.012, 0.021, 0.03], title="Blocks")
     shown = sorted(set(moments(run.history)))
     assert [axis.get_title() for axis in figures[1].axes[: len(shown)]] == [
         f"face towards -y, t = {t:.4g} s" for t in shown
@@ -246,7 +248,8 @@ def test_all_pictures_of_a_run(
 def test_films_and_what_is_no_film(runs: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A film of bodies whose contact was not recorded; other files, columns and damaged folders in one sentence."""
     run = runs["tetrahedra"]
-    assert film(replace(run, contact=None), tmp_path / "film.gif", times=[0.03]).stat().st_size > 5000
+    with plain_pictures():
+        assert film(replace(run, contact=None), tmp_path / "film.gif", times=[0.03]).stat().st_size > 5000
     with pytest.raises(InputError, match=r"name 'film\.avi'"):
         film(run, tmp_path / "film.avi")
     monkeypatch.setattr("matplotlib.animation.FFMpegWriter.isAvailable", lambda: False)
