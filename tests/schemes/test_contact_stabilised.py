@@ -55,7 +55,7 @@ def test_kanes_form_is_the_midpoint_rule(other):
 
 
 def test_kanes_form_with_damping_base_motion_and_springs():
-    """The same, every second step, with everything in the equations; springs are not projected, so both forms agree there."""
+    """The same, every second step, with everything in the equations; springs are not projected: both forms agree."""
     problem = chain(gap=0.01, damping=1e-3, constant=30.0, excitation=SHAKEN, v0=np.ones(6), consistent=True)
     soft = replace(problem, surface=problem.surface.on_springs(4.0e3))
     for body, projected in ((problem, False), (soft, False), (soft, True)):
