@@ -84,7 +84,7 @@ class PoincareSteklov:
         columns = np.zeros((len(forces), 2 * len(self.mesh), len(unknowns) + 1))
         columns[0, unknowns, np.arange(len(unknowns))] = 1.0 / self.rho
         columns[:, :, -1] = forces[:, 0] / self.rho
-        given = None if prescribed is None else np.concatenate([0.0 * columns[..., 1:], prescribed[..., None]], axis=2)
+        given = None if prescribed is None else np.concatenate([0.0 * columns[..., :-1], prescribed[..., None]], axis=2)
         u = marched(self.blocks, fixed, columns, given, symmetric=self.symmetric)[0][:, unknowns]
         return np.ascontiguousarray(u[:, :, :-1]), np.ascontiguousarray(u[:, :, -1])
 
