@@ -120,7 +120,7 @@ class Rocked:
 def rocked(model: Model, state: State, t_end: float) -> Rocked:
     rows = []
     for new, report in vc.march(
-        model.problem, scheme=vc.MoreauJean(), solver=vc.Condensed(), dt=vc.HalvedAtImpact(5e-4, 4), t_end=t_end,
+        model.problem, scheme=vc.MoreauJean(), solver=vc.Condensed(), dt=vc.HalvedAtImpact(1e-3, 5), t_end=t_end,
         state=state,
     ):
         assert report.certificate.worst <= 1e-9
