@@ -231,9 +231,8 @@ def linear_error(scheme: Any, dt: float) -> float:
 )
 def test_order_with_a_change_in_mid_run(scheme, order):
     """Against the modes in closed form: the order of the scheme, as without changes (V8.5 without a mesh)."""
-    errors = [linear_error(scheme, dt) for dt in (5e-3, 2.5e-3, 1.25e-3)]
-    for coarse, fine in pairwise(errors):
-        assert np.log2(coarse / fine) == pytest.approx(order, abs=0.1)
+    coarse, fine = (linear_error(scheme, dt) for dt in (5e-3, 2.5e-3))
+    assert np.log2(coarse / fine) == pytest.approx(order, abs=0.1)
 
 
 # one matrix for every dt

@@ -108,8 +108,8 @@ def test_incline_slides_alike_in_every_unit(comm: Any) -> None:
 @pytest.mark.slow
 @pytest.mark.serial
 def test_friction_force_does_not_depend_on_the_number_of_points(comm: Any) -> None:
-    """4, 8 and 16 elements along the base in full sliding: mu times the normal weight, 1e-6 asked, 1e-9 found."""
-    for cells in (4, 8, 16):
+    """4 and 10 elements along the base in full sliding: mu times the normal weight, 1e-6 asked, 1e-9 found."""
+    for cells in (4, 10):
         assert slid(comm, 1.0, cells=cells)[1] == pytest.approx(0.5 * cos(SLOPE), rel=1e-9)
 
 
