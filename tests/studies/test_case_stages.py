@@ -102,7 +102,7 @@ system = {clamped = ["lower_bottom", "upper_top"]}
 """
 
 
-@pytest.mark.parametrize("extra", [False, True])
+@pytest.mark.parametrize("extra", [pytest.param(False, marks=pytest.mark.serial), True])
 def test_nothing_moves_without_motion(shared_tmp: Path, extra: bool) -> None:
     """V8.9: gravity, perhaps a prop on the roof that then holds it where it is, then the compliant base for a second
     without motion: still to 1e-11 of the settlement."""
@@ -150,6 +150,7 @@ def test_a_support_that_carries_load_is_not_forgotten(shared_tmp: Path) -> None:
     assert said in f"{told.value}"
 
 
+@pytest.mark.serial  # the stages above go from one to the next on two ranks
 def test_after_the_shock_the_house_rests_where_it_has_slid(shared_tmp: Path) -> None:
     """A static stage after the motion, on the same dashpots: the slip stays but for the 3 % by which points slide on as
     the swinging load leaves them; the house carries its weight."""
