@@ -24,10 +24,11 @@ from typing import Any, Protocol
 import numpy as np
 
 from demos.problems import square
-from demos.problems.boundary_elements import BOTTOM, square_problem
+from demos.problems.boundary_elements import BOTTOM, TOP, pressed
+from vi_contact.bem.boundary_mesh import polygon
 from vi_contact.bem.contact import BoundaryContact
 from vi_contact.bem.contact_run import march_contact
-from vi_contact.bem.energetic import EnergeticBlocks, marched
+from vi_contact.bem.energetic import EnergeticBlocks, energetic_blocks, marched
 from vi_contact.bem.poincare_steklov import BoundaryProblem, CondensedCompliance, PoincareSteklov
 from vi_contact.core.algebra import Array
 from vi_contact.core.protocols import FrictionLaw, Frictionless
@@ -55,7 +56,10 @@ class Example:
     def problem(self, k: int) -> BoundaryProblem:
         """Set up the square with k elements per side, its base in contact, symmetric form."""
         dt = self.ratio / (k * self.material.c_p)
-        return square_problem(k, self.material, dt=dt, steps=self.count * k, pressure=self.pressure)
+        mesh = polygon([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)], 1.0 / k)
+        blocks = energetic_blocks(mesh, self.material, dt=dt, steps=self.count * k, compressed=False)  # for the norm
+        operator = PoincareSteklov(blocks, self.material.rho)
+        return pressed(operator, pressure=self.pressure, top=TOP, contact=mesh.labels == BOTTOM)
 
     def only(self, *supports: str) -> "Example":
         """Return the example with these supports alone."""
