@@ -74,7 +74,7 @@ def assigned(where: Module, name: str) -> ast.expr | None:
 
 
 def homes(where: Module) -> dict[str, str]:
-    """Return name -> module of what a package hands on: its ``_CONTENTS``, and what it imports from the package."""
+    """Return name -> module of what a package hands on: by its stub, and what it imports from the package."""
     found = {}
     for node in where.tree.body:
         if isinstance(node, ast.ImportFrom) and node.level:
@@ -86,21 +86,28 @@ def homes(where: Module) -> dict[str, str]:
     return found
 
 
+def stub_of(where: Module) -> Path:
+    """Return the stub beside a module, the list of a package's public names; other modules have none."""
+    return file_of(where.path).with_suffix(".pyi")
+
+
+@cache
 def contents(where: Module) -> dict[str, list[str]]:
-    """Return module -> names of the ``_CONTENTS`` of a package; ``part.__all__`` stands for those of the part."""
-    listed = assigned(where, "_CONTENTS")
-    found = {}
-    for key, names in zip(listed.keys, listed.values, strict=True) if isinstance(listed, ast.Dict) else ():
-        part = ast.literal_eval(key)
-        inner = isinstance(names, ast.Attribute)
-        found[part] = public(module(f"{where.path}.{part}".lstrip("."))) if inner else ast.literal_eval(names)
+    """Return module -> names of the imports in the stub of a package; ``*`` stands for all public names of the part."""
+    stub = stub_of(where)
+    found: dict[str, list[str]] = {}
+    for node in ast.parse(stub.read_text(encoding="utf-8")).body if stub.is_file() else ():
+        if isinstance(node, ast.ImportFrom) and node.module:
+            names = [one.name for one in node.names]
+            part = public(module(f"{where.path}.{node.module}".lstrip("."))) if names == ["*"] else names
+            found.setdefault(node.module, []).extend(part)
     return found
 
 
 def public(where: Module) -> list[str]:
     """Return the public names of a package, or of a module without ``__all__``: what it defines and documents."""
-    if assigned(where, "_CONTENTS") is not None:
-        names = {name for part in contents(where).values() for name in part}
+    if handed_on := contents(where):
+        names = {name for part in handed_on.values() for name in part}
     elif (listed := assigned(where, "__all__")) is not None:
         names = set(ast.literal_eval(listed))
     else:

@@ -3,8 +3,8 @@
     python3 docs/make_api.py            # write the page
     python3 docs/make_api.py --check    # status 1 and one sentence when the page is not what the docstrings say
 
-It also writes ``__init__.pyi`` beside every list of public names: they are imported when they are first used, which
-checkers of types and editors do not see, so that for them every name of ``vc.`` could be anything.
+It also puts the lines of every stub ``__init__.pyi``, the list of a room's public names, in order, and writes its
+``__all__``: the names are imported when they are first used, which checkers of types and editors see in the stub only.
 """
 
 from __future__ import annotations
@@ -20,9 +20,7 @@ from api_source import (
     ROOT,
     Def,
     Module,
-    assigned,
     constructor,
-    contents,
     definition,
     documentation,
     function,
@@ -30,6 +28,7 @@ from api_source import (
     methods,
     module,
     public,
+    stub_of,
 )
 
 PAGE = ROOT / "docs" / "reference" / "api.md"
@@ -58,6 +57,10 @@ of your own needs these methods and no base class: [extend](../guide/extend.md) 
 the names of `import vi_contact as vc`, and each room with all its public names. Names are imported when they are first
 used, so that `import vi_contact` needs numpy and scipy only; `vi_contact.fem` needs DOLFINx, and `Volume` needs PETSc.
 """
+STUB = (
+    "# ruff: noqa",
+    "# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes __all__.",
+)
 
 
 def whole(node: Def) -> str:
@@ -140,11 +143,9 @@ def page() -> str:
 
 
 def stub(where: Module) -> str:
-    """Return the public names of a package as imports that a checker of types follows."""
-    lines = ["# ruff: noqa", "# Made from __init__.py by docs/make_api.py, for checkers of types and editors."]
-    for part, names in contents(where).items():
-        lines += [f"from .{part} import {name} as {name}" for name in names]
-    return "\n".join([*lines, "", f"__all__: list[str] = {sorted(public(where))}", ""])
+    """Return the stub of a package as it should be: its imports in order, and ``__all__`` of what they name."""
+    imports = [line for line in stub_of(where).read_text(encoding="utf-8").splitlines() if line.startswith("from ")]
+    return "\n".join([*STUB, *sorted(imports), "", f"__all__: list[str] = {sorted(public(where))}", ""])
 
 
 def files() -> Iterator[tuple[Path, str]]:
@@ -152,8 +153,8 @@ def files() -> Iterator[tuple[Path, str]]:
     yield PAGE, page()
     for path in sorted(PACKAGE.rglob("__init__.py")):
         where = module(path.parent.relative_to(PACKAGE).as_posix().replace("/", ".").strip("."))
-        if assigned(where, "_CONTENTS") is not None:
-            yield path.with_suffix(".pyi"), stub(where)
+        if stub_of(where).is_file():
+            yield stub_of(where), stub(where)
 
 
 def main(arguments: list[str]) -> int:

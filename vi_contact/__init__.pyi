@@ -1,6 +1,5 @@
 # ruff: noqa
-# Made from __init__.py by docs/make_api.py, for checkers of types and editors.
-from .core.version import __version__ as __version__
+# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes __all__.
 from .core import AnalyticGap as AnalyticGap
 from .core import Certificate as Certificate
 from .core import ContactProblem as ContactProblem
@@ -17,6 +16,11 @@ from .core import StepProblem as StepProblem
 from .core import StepResult as StepResult
 from .core import Touching as Touching
 from .core import ViContactError as ViContactError
+from .core.version import __version__ as __version__
+from .fem.contact.points import contact_points as contact_points
+from .fem.own_matrices import system_from_arrays as system_from_arrays
+from .ground_motion import GroundMotion as GroundMotion
+from .ground_motion import read_record as read_record
 from .laws import ComponentReset as ComponentReset
 from .laws import ConsistentMass as ConsistentMass
 from .laws import Coulomb as Coulomb
@@ -46,25 +50,6 @@ from .laws import StaticKinetic as StaticKinetic
 from .laws import Tabulated as Tabulated
 from .laws import Tresca as Tresca
 from .laws import with_weight as with_weight
-from .ground_motion import GroundMotion as GroundMotion
-from .ground_motion import read_record as read_record
-from .fem.own_matrices import system_from_arrays as system_from_arrays
-from .fem.contact.points import contact_points as contact_points
-from .schemes import ContactStabilisedNewmark as ContactStabilisedNewmark
-from .schemes import GeneralisedAlpha as GeneralisedAlpha
-from .schemes import HHT as HHT
-from .schemes import Houbolt as Houbolt
-from .schemes import LinearMultistep as LinearMultistep
-from .schemes import Midpoint as Midpoint
-from .schemes import MoreauJean as MoreauJean
-from .schemes import Newmark as Newmark
-from .schemes import SS22 as SS22
-from .schemes import Trapezoidal as Trapezoidal
-from .schemes import ZienkiewiczWoodTaylor as ZienkiewiczWoodTaylor
-from .solvers import Automatic as Automatic
-from .solvers import Condensed as Condensed
-from .solvers import Iterative as Iterative
-from .solvers import Volume as Volume
 from .run import Contact as Contact
 from .run import CrossChecked as CrossChecked
 from .run import Energy as Energy
@@ -80,5 +65,10 @@ from .run import read_run as read_run
 from .run import simulate as simulate
 from .run import simulate_many as simulate_many
 from .run import static_equilibrium as static_equilibrium
+from .schemes import *
+from .solvers import Automatic as Automatic
+from .solvers import Condensed as Condensed
+from .solvers import Iterative as Iterative
+from .solvers import Volume as Volume
 
 __all__: list[str] = ['AnalyticGap', 'Automatic', 'Certificate', 'ComponentReset', 'Condensed', 'ConsistentMass', 'Contact', 'ContactProblem', 'ContactStabilisedNewmark', 'ContactSurface', 'Coulomb', 'CrossChecked', 'DampingRatio', 'Elastic', 'Energy', 'ExponentialDecay', 'Frictionless', 'FullSine', 'GeneralisedAlpha', 'GroundMotion', 'HHT', 'HalfSine', 'HalfSpace', 'HalvedAtImpact', 'Harmonic', 'Houbolt', 'ImpulseUpdate', 'Inelastic', 'InputError', 'Interrupted', 'Iterative', 'KelvinVoigt', 'LinearElastic', 'LinearMultistep', 'MassProportional', 'Midpoint', 'MoreauJean', 'Newmark', 'Newton', 'NoDamping', 'Orthotropic', 'OutOfTime', 'PlaneStrain', 'PlaneStress', 'Probe', 'Rayleigh', 'Rectangular', 'Redistributed', 'Report', 'Ricker', 'SS22', 'Schedule', 'SlipRateCoulomb', 'Solid', 'Solution', 'State', 'StaticKinetic', 'StepFailure', 'StepProblem', 'StepResult', 'Tabulated', 'Touching', 'Trapezoidal', 'Tresca', 'ViContactError', 'Volume', 'ZienkiewiczWoodTaylor', '__version__', 'contact_points', 'cross_check', 'march', 'march_many', 'quasi_static', 'read_record', 'read_run', 'simulate', 'simulate_many', 'static_equilibrium', 'system_from_arrays', 'with_weight']

@@ -88,9 +88,9 @@ def test_a_scheme_is_one_file_and_one_registry_line(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "vi_contact", tmp_path / "vi_contact", ignore=shutil.ignore_patterns("__pycache__"))
     schemes = tmp_path / "vi_contact" / "schemes"
     (schemes / "backward_euler.py").write_text(FILES["mine/backward_euler.py"], encoding="utf-8")
-    registry = schemes / "__init__.py"
-    line = FILES["vi_contact/schemes/__init__.py"]
-    registry.write_text(registry.read_text("utf-8").replace("_CONTENTS = {\n", f"_CONTENTS = {{\n{line}"), "utf-8")
+    registry = schemes / "__init__.pyi"
+    line = FILES["vi_contact/schemes/__init__.pyi"]
+    registry.write_text(registry.read_text("utf-8") + line, "utf-8")
     asked = """
 import vi_contact as vc
 from vi_contact.core.step import Scheme

@@ -72,18 +72,22 @@ def test_the_cases_that_ship_are_installed() -> None:
 
 @pytest.mark.serial
 def test_stubs_name_what_is_public() -> None:
-    """Names are imported when they are first used: a checker of types finds them in the stubs, in the same modules."""
+    """A checker of types finds in the stubs what Python does; ``*`` hands on a room, ``__all__`` has been kept up."""
     stubs = sorted((ROOT / "vi_contact").rglob("__init__.pyi"))
     assert len(stubs) > 15
     for path in stubs:
         package = import_module(path.parent.relative_to(ROOT).as_posix().replace("/", "."))
         tree = ast.parse(path.read_text(encoding="utf-8"))
-        nodes = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
-        found = {alias.asname: node.module for node in nodes for alias in node.names}
-        assert set(found) == set(package.__all__)
-        for name, module in found.items():
-            home = import_module(f"{package.__name__}.{module or name}")
-            assert getattr(package, name) is (getattr(home, name) if module else home)
+        found = {}
+        for node in tree.body[:-1]:
+            assert isinstance(node, ast.ImportFrom) and node.level == 1
+            home = import_module(f"{package.__name__}.{node.module}")
+            assert all(one.asname == one.name or one.name == "*" for one in node.names)
+            names = home.__all__ if node.names[0].name == "*" else [one.name for one in node.names]
+            found.update({name: getattr(home, name) for name in names})
+        assert isinstance(tree.body[-1], ast.AnnAssign) and tree.body[-1].value is not None
+        assert ast.literal_eval(tree.body[-1].value) == package.__all__ == sorted(found)
+        assert all(getattr(package, name) is value for name, value in found.items())
 
 
 def ran(script: str, **environment: str) -> str:

@@ -9,18 +9,4 @@ In this order: a ``BoundaryMesh``, ``energetic_blocks``, ``PoincareSteklov``, ``
 
 from ..core.lazy import lazy
 
-_CONTENTS = {
-    "boundary_mesh": ("BoundaryMesh", "circle", "polygon"),
-    "boundary_operators": ("Galerkin", "OperatorMatrices"),
-    "compressed": ("CompressedBlocks",),
-    "contact": ("BoundaryContact", "Conditions", "conditions_on"),
-    "contact_run": ("ContactRun", "march_contact"),
-    "energetic": ("EnergeticBlocks", "energetic_blocks"),
-    "fundamental_solution": ("TimeKernels",),
-    "loads": ("traction_forces",),
-    "multiplier_mesh": ("MultiplierMesh",),
-    "poincare_steklov": ("BoundaryMotion", "BoundaryProblem", "CondensedCompliance", "PoincareSteklov"),
-    "quadrature": ("Orders",),
-    "uzawa_space_time": ("SpaceTimeUzawa",),
-}
-__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, __file__)

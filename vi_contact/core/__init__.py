@@ -5,15 +5,4 @@ Read ``step.py`` first: ``Scheme``, ``Solver``, ``Recorder`` and the values betw
 
 from .lazy import lazy
 
-_CONTENTS = {
-    "certificate": ("Certificate",),
-    "errors": ("InputError", "Interrupted", "OutOfTime", "StepFailure", "ViContactError"),
-    "obstacles": ("AnalyticGap", "HalfSpace", "Obstacle", "Touching"),
-    "problem": ("ContactProblem",),
-    "protocols": ("Excitation", "Frictionless", "FrictionLaw", "ImpactLaw", "MassLaw"),
-    "step": ("PreparedSolver", "Recorder", "Report", "Scheme", "Solver", "State", "StepProblem", "StepResult"),
-    "surfaces": ("ContactSurface",),
-    "system": ("Companion", "Load", "SemiDiscreteSystem"),
-    "verify": ("energy_balance", "kkt_residual"),
-}
-__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, __file__)

@@ -1,5 +1,5 @@
 # ruff: noqa
-# Made from __init__.py by docs/make_api.py, for checkers of types and editors.
+# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes __all__.
 from .certificate import Certificate as Certificate
 from .errors import InputError as InputError
 from .errors import Interrupted as Interrupted
@@ -12,8 +12,8 @@ from .obstacles import Obstacle as Obstacle
 from .obstacles import Touching as Touching
 from .problem import ContactProblem as ContactProblem
 from .protocols import Excitation as Excitation
-from .protocols import Frictionless as Frictionless
 from .protocols import FrictionLaw as FrictionLaw
+from .protocols import Frictionless as Frictionless
 from .protocols import ImpactLaw as ImpactLaw
 from .protocols import MassLaw as MassLaw
 from .step import PreparedSolver as PreparedSolver

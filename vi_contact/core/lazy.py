@@ -1,22 +1,32 @@
 """Give a package its public names, each imported when it is first used: what nobody asks for need not be installed."""
 
+import ast
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from importlib import import_module
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 
-def lazy(package: str,
-         contents: Mapping[str, Sequence[str]]) -> tuple[list[str], Callable[[str], Any], Callable[[], list[str]]]:
-    """Return ``__all__``, ``__getattr__``, ``__dir__`` of a package (PEP 562): module -> names."""
-    home = {name: module for module, names in contents.items() for name in names}
+def lazy(package: str, file: str) -> tuple[list[str], Callable[[str], Any], Callable[[], list[str]]]:
+    """Return ``__all__``, ``__getattr__``, ``__dir__`` of a package (PEP 562) by the stub beside its ``__init__.py``.
+
+    A line ``from .module import Name as Name`` of ``__init__.pyi`` is a public name and its module, here and for
+    checkers of types (Scientific Python, SPEC 1); ``from .room import *`` imports a room and hands on all its names.
+    """
+    home: dict[str, str] = {}
+    for node in ast.parse(Path(file).with_suffix(".pyi").read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.ImportFrom):
+            module = f"{package}.{node.module}"
+            for one in node.names:
+                home.update(dict.fromkeys(import_module(module).__all__ if one.name == "*" else [one.name], module))
     public = sorted(home)
 
     def get(name: str) -> Any:
         if name not in home:
             raise AttributeError(f"module '{package}' has no attribute '{name}'")
-        return getattr(import_module(f"{package}.{home[name]}"), name)
+        return getattr(import_module(home[name]), name)
 
     class Room(ModuleType):
         """Keep names when Python binds a module of the same name: ``run.simulate`` stays the function."""

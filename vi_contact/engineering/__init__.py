@@ -10,12 +10,4 @@ array([0. , 1.5, 6. ])
 
 from ..core.lazy import lazy
 
-_CONTENTS = {
-    "checks.comparison": ("Check", "Comparison"),
-    "floor_spectra": ("TransferFunction", "floor_spectrum", "recorded_motion", "transfer_function"),
-    "modal": ("lowest_frequency",),
-    "peak_values": ("Loop", "Peak", "hysteresis", "peaks", "write_peaks"),
-    "racking": ("Racking",),
-    "resultants": ("Resultants", "contact_summary"),
-}
-__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, __file__)

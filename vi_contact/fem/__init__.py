@@ -19,28 +19,4 @@ if find_spec("dolfinx") is None:
         "python3-dolfinx-real, and make virtual environments with --system-site-packages) or by conda (fenics-dolfinx "
         "of conda-forge), see docs/start/install.md", name="dolfinx")
 
-_CONTENTS = {
-    "assembly": ("assemble",),
-    "contact.joined": ("joined_surfaces",),
-    "contact.matching": ("NodeToNode",),
-    "contact.mortar": ("DualMortar",),
-    "contact.pairs": ("contact_pair",),
-    "contact.surface": ("contact_surface",),
-    "dashpots": ("CompliantBase", "Dashpots"),
-    "heterogeneous": ("Heterogeneous",),
-    "initial_strains": ("InitialStrain",),
-    "linear_forms": ("LinearForm",),
-    "loads": ("BodyForce", "Prescribed", "Pressure", "TangentialTraction", "Traction"),
-    "mesh": ("Cells", "Facets", "Tags", "build_mesh", "node_numbers", "read_mesh"),
-    "own_forms": ("Forms",),
-    "output.fields": ("XDMF",),
-    "output.functions": ("as_function", "read_function"),
-    "output.largest_strain": ("LargestStrain",),
-    "output.reactions": ("Reactions",),
-    "output.section_forces": ("SectionForces",),
-    "petsc_system": ("system_from_matrices",),
-    "released_supports": ("release",),
-    "space": ("bodies_of",),
-    "ties": ("Tied",),
-}
-__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, __file__)

@@ -1,5 +1,5 @@
 # ruff: noqa
-# Made from __init__.py by docs/make_api.py, for checkers of types and editors.
+# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes __all__.
 from .assembly import assemble as assemble
 from .contact.joined import joined_surfaces as joined_surfaces
 from .contact.matching import NodeToNode as NodeToNode
@@ -22,13 +22,13 @@ from .mesh import Tags as Tags
 from .mesh import build_mesh as build_mesh
 from .mesh import node_numbers as node_numbers
 from .mesh import read_mesh as read_mesh
-from .own_forms import Forms as Forms
 from .output.fields import XDMF as XDMF
 from .output.functions import as_function as as_function
 from .output.functions import read_function as read_function
 from .output.largest_strain import LargestStrain as LargestStrain
 from .output.reactions import Reactions as Reactions
 from .output.section_forces import SectionForces as SectionForces
+from .own_forms import Forms as Forms
 from .petsc_system import system_from_matrices as system_from_matrices
 from .released_supports import release as release
 from .space import bodies_of as bodies_of

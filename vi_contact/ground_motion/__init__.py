@@ -8,22 +8,4 @@
 
 from ..core.lazy import lazy
 
-_CONTENTS = {
-    "chain": ("Processing", "scaled_to_arias", "scaled_to_pga", "scaled_to_psa"),
-    "ec8": ("EC8Spectrum",),
-    "excitation": ("GroundMotion",),
-    "formats.reader": ("read_record",),
-    "formats.writer": ("write_at2", "write_columns", "write_path_series"),
-    "intensity": (
-        "arias", "cav", "d5_95", "housner_intensity", "husid", "mean_period", "pga", "pga_time", "pgd", "pgv",
-        "predominant_period", "psa", "record_info", "rms", "significant_duration",
-    ),
-    "kanai_tajimi": ("Envelope", "KanaiTajimi", "synthetic"),
-    "processing": (
-        "baseline_corrected", "filtered", "integrated", "padded", "resampled", "scaled", "tapered", "trimmed",
-        "without_mean",
-    ),
-    "record": ("STANDARD_GRAVITY", "UNITS", "Record"),
-    "spectra": ("ResponseSpectrum", "fourier_spectrum", "response_spectrum"),
-}
-__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, __file__)

@@ -1,5 +1,5 @@
 # ruff: noqa
-# Made from __init__.py by docs/make_api.py, for checkers of types and editors.
+# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes __all__.
 from .chain import Processing as Processing
 from .chain import scaled_to_arias as scaled_to_arias
 from .chain import scaled_to_pga as scaled_to_pga
@@ -37,9 +37,9 @@ from .processing import scaled as scaled
 from .processing import tapered as tapered
 from .processing import trimmed as trimmed
 from .processing import without_mean as without_mean
+from .record import Record as Record
 from .record import STANDARD_GRAVITY as STANDARD_GRAVITY
 from .record import UNITS as UNITS
-from .record import Record as Record
 from .spectra import ResponseSpectrum as ResponseSpectrum
 from .spectra import fourier_spectrum as fourier_spectrum
 from .spectra import response_spectrum as response_spectrum

@@ -8,16 +8,4 @@ Take a material first; what is not given is frictionless and undamped. Your own 
 
 from ..core.lazy import lazy
 
-_CONTENTS = {
-    "excitation": ("FullSine", "HalfSine", "Harmonic", "Rectangular", "Ricker", "Tabulated"),
-    "friction": ("Coulomb", "ExponentialDecay", "SlipRateCoulomb", "StaticKinetic", "Tresca"),
-    "impact": ("ComponentReset", "Elastic", "ImpulseUpdate", "Inelastic", "Newton"),
-    "mass": ("ConsistentMass", "Redistributed"),
-    "materials": (
-        "DampingRatio", "KelvinVoigt", "LinearElastic", "MassProportional", "NoDamping", "PlaneStrain", "PlaneStress",
-        "Rayleigh", "Solid",
-    ),
-    "orthotropic": ("Orthotropic",),
-    "weight": ("with_weight",),
-}
-__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, __file__)

@@ -8,12 +8,4 @@ angles in radians. Begin with ``wall.py``.
 
 from ..core.lazy import lazy
 
-_CONTENTS = {
-    "block": ("BlockMesh",),
-    "channel": ("ChannelMesh",),
-    "cut": ("CutOpen", "Welded"),
-    "geo_file": ("GeoFile",),
-    "two_blocks": ("Blocks", "TwoBlocks"),
-    "wall": ("WallMesh",),
-}
-__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, __file__)

@@ -5,17 +5,4 @@ Begin with ``simulate``, as README.md does. ``march`` is the bare loop below it,
 
 from ..core.lazy import lazy
 
-_CONTENTS = {
-    "cross_check": ("CrossChecked", "cross_check"),
-    "files.reading": ("RunFolder", "read_run"),
-    "march": ("march",),
-    "march_many": ("march_many",),
-    "method": ("with_defaults",),
-    "recorders": ("Contact", "Energy", "Probe"),
-    "simulate": ("simulate",),
-    "simulate_many": ("simulate_many",),
-    "solution": ("Solution",),
-    "static": ("quasi_static", "static_equilibrium"),
-    "time_steps": ("HalvedAtImpact", "Schedule"),
-}
-__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, __file__)

@@ -1,5 +1,5 @@
 # ruff: noqa
-# Made from __init__.py by docs/make_api.py, for checkers of types and editors.
+# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes __all__.
 from .cross_check import CrossChecked as CrossChecked
 from .cross_check import cross_check as cross_check
 from .files.reading import RunFolder as RunFolder

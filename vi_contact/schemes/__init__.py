@@ -9,17 +9,4 @@ GeneralisedAlpha(alpha_m=0.5, alpha_f=0.5, beta=0.25, gamma=0.5)
 
 from ..core.lazy import lazy
 
-_CONTENTS = {
-    "contact_stabilised": ("ContactStabilisedNewmark",),
-    "generalised_alpha": ("GeneralisedAlpha",),
-    "hht": ("HHT",),
-    "houbolt": ("Houbolt",),
-    "linear_multistep": ("LinearMultistep",),
-    "midpoint": ("Midpoint",),
-    "moreau_jean": ("MoreauJean",),
-    "newmark": ("Newmark",),
-    "ss22": ("SS22",),
-    "trapezoidal": ("Trapezoidal",),
-    "zienkiewicz_wood_taylor": ("ZienkiewiczWoodTaylor",),
-}
-__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, __file__)

@@ -9,14 +9,4 @@ Begin with docs/guide/soil.md, which tells ``base_motion`` (rock that moves) fro
 
 from ..core.lazy import lazy
 
-_CONTENTS = {
-    "companion": ("CompanionRun",),
-    "curves": ("SoilCurves",),
-    "equivalent_linear": ("SiteResponse", "equivalent_linear"),
-    "free_field": ("FreeField",),
-    "moving_base": ("BaseMotion", "base_motion"),
-    "soil_column": ("SoilColumn",),
-    "strain_compatible": ("StrainCompatible", "strain_compatible"),
-    "upgoing_wave": ("UpgoingVelocity", "upgoing"),
-}
-__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, __file__)

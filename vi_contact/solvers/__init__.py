@@ -9,14 +9,5 @@ array([0.5, 0. ])
 """
 
 from ..core.lazy import lazy
-from . import friction, iterative, normal, volume
 
-_CONTENTS = {
-    "automatic": ("Automatic",),
-    "condensed": ("Condensed",),
-    "friction": friction.__all__,
-    "iterative": iterative.__all__,
-    "normal": normal.__all__,
-    "volume": volume.__all__,
-}
-__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, __file__)

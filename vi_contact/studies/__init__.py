@@ -10,6 +10,4 @@
 
 from ..core.lazy import lazy
 
-_CONTENTS = {"cases.case": ("Case", "read_case"), "ida.ida": ("IDA", "run_ida"), "ida.fragility": ("fragility_curve",),
-             "ida.runs": ("record_set",), "refinement": ("refine",), "report": ("comparisons", "report")}
-__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, __file__)

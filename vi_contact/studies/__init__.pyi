@@ -1,10 +1,10 @@
 # ruff: noqa
-# Made from __init__.py by docs/make_api.py, for checkers of types and editors.
+# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes __all__.
 from .cases.case import Case as Case
 from .cases.case import read_case as read_case
+from .ida.fragility import fragility_curve as fragility_curve
 from .ida.ida import IDA as IDA
 from .ida.ida import run_ida as run_ida
-from .ida.fragility import fragility_curve as fragility_curve
 from .ida.runs import record_set as record_set
 from .refinement import refine as refine
 from .report import comparisons as comparisons

@@ -2,9 +2,4 @@
 
 from ...core.lazy import lazy
 
-_CONTENTS = {
-    "earth_pressure_static": ("AtRest", "Coulomb", "Rankine"),
-    "earth_pressure_seismic": ("MononobeOkabe", "VeletsosYounan", "Wood"),
-    "racking_ratio": ("RackingRatio",), "shaken_block": ("Housner", "NewmarkBlock"),
-}
-__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, __file__)

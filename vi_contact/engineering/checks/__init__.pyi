@@ -1,11 +1,11 @@
 # ruff: noqa
-# Made from __init__.py by docs/make_api.py, for checkers of types and editors.
-from .earth_pressure_static import AtRest as AtRest
-from .earth_pressure_static import Coulomb as Coulomb
-from .earth_pressure_static import Rankine as Rankine
+# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes __all__.
 from .earth_pressure_seismic import MononobeOkabe as MononobeOkabe
 from .earth_pressure_seismic import VeletsosYounan as VeletsosYounan
 from .earth_pressure_seismic import Wood as Wood
+from .earth_pressure_static import AtRest as AtRest
+from .earth_pressure_static import Coulomb as Coulomb
+from .earth_pressure_static import Rankine as Rankine
 from .racking_ratio import RackingRatio as RackingRatio
 from .shaken_block import Housner as Housner
 from .shaken_block import NewmarkBlock as NewmarkBlock

@@ -2,12 +2,4 @@
 
 from ...core.lazy import lazy
 
-_CONTENTS = {
-    "extrapolation": ("Anderson", "Plain"),
-    "fixed_point": ("FixedPoint",),
-    "given_forces": ("GivenForces",),
-    "newton": ("FrictionNewton",),
-    "nsgs": ("NSGS",),
-    "slip_rate": ("RateIteration",),
-}
-__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, __file__)

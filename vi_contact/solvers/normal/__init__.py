@@ -2,10 +2,4 @@
 
 from ...core.lazy import lazy
 
-_CONTENTS = {
-    "active_set": ("ActiveSet",),
-    "hildreth": ("Hildreth",),
-    "lemke": ("Lemke",),
-    "uniqueness": ("PMatrix", "p_matrix"),
-}
-__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, __file__)

@@ -2,5 +2,4 @@
 
 from ...core.lazy import lazy
 
-_CONTENTS = {"route": ("Volume",), "snes": ("ReducedNewton", "SemismoothNewton"), "tao": ("TaoTron",)}
-__all__, __getattr__, __dir__ = lazy(__name__, _CONTENTS)
+__all__, __getattr__, __dir__ = lazy(__name__, __file__)

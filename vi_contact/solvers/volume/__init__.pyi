@@ -1,5 +1,5 @@
 # ruff: noqa
-# Made from __init__.py by docs/make_api.py, for checkers of types and editors.
+# The public names of this package: one line each, here only. docs/make_api.py sorts them and writes __all__.
 from .route import Volume as Volume
 from .snes import ReducedNewton as ReducedNewton
 from .snes import SemismoothNewton as SemismoothNewton
