@@ -283,6 +283,9 @@ def test_functions_of_no_material_are_refused_with_their_place(comm: Any) -> Non
         ({"rho": lambda x: 0.0 * x[0]}, r"the mass density rho .* is 0 at"),
         ({"E": lambda x: x[7]}, "Heterogeneous: Young's modulus .* ended in IndexError"),
         ({"E": lambda x: np.nan * x[0]}, "is nan at"),
+        ({"E": lambda x: 1e9 * (1.0 + x[:, 0])}, r"E \[Pa\] has values of shape \(3,\) at \d+ points; give a function"),
+        ({"xi": lambda x: 0.1}, r"damping ratio xi has values of shape \(\) at"),
+        ({"rho": lambda x: 1e3 + x[:1].T}, r"density rho .* has values of shape \(\d+, 1\) at"),
     ):
         with pytest.raises(InputError, match=words):
             fem.assemble(mesh, Heterogeneous(**{"E": 1e9, "nu": 0.2, "rho": 1e3, **values}))

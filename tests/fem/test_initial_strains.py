@@ -18,6 +18,7 @@ from vi_contact.core.errors import InputError
 from vi_contact.core.obstacles import HalfSpace
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import State
+from vi_contact.fem.initial_strains import InitialStrains
 from vi_contact.fem.output.fields import VonMises
 from vi_contact.laws.materials import LinearElastic, PlaneStress
 from vi_contact.laws.orthotropic import Orthotropic
@@ -237,3 +238,72 @@ def test_forms_of_the_user_and_wrong_values_are_refused():
     own = fem.Forms(stiffness=lambda u, v: ufl.inner(ufl.grad(u), ufl.grad(v)) * ufl.dx)
     with pytest.raises(InputError, match="beside forms"):
         fem.assemble(mesh, CONCRETE, forms=own, loads=fem.InitialStrain(WARM))
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_only_numbers_and_tensors_of_the_body_are_taken(d: int) -> None:
+    """Shapes that would be broadcast are refused, of numbers and of functions, before anything is solved; on all ranks
+    alike, where one has the points of a function and another none."""
+    mesh, tags = block(COMM, lengths=(2.0, 1.0, 1.5)[:d], divisions=(3, 2, 1)[:d])
+    takes = [(), (d, d), *([(3, 3)] if d == 2 else [])]
+    corner = fem.Cells.where("corner", mesh, lambda x: x[0] < 0.67)
+    for shape in [(), (1,), (2,), (0, 0), (1, 1), (1, 2), (2, 1), (2, 2), (3, 1), (3, 3), (1, 1, 1), (2, 2, 2)]:
+        given: list[Any] = [np.full(shape, WARM), lambda x, t, shape=shape: np.full((len(x), *shape), WARM)]
+        for number, value in enumerate(given):
+            if shape in takes:
+                fem.assemble(mesh, CONCRETE, loads=fem.InitialStrain(value, cells=corner))
+                continue
+            with pytest.raises(InputError, match=r"InitialStrain.*: value .*d, d\) or in the plane \(.*3, 3\)"):
+                fem.assemble(mesh, CONCRETE, loads=fem.InitialStrain(value, cells=corner))
+            if number == 0:
+                with pytest.raises(InputError, match=r"give a number, or tensors \(d, d\) or in the plane"):
+                    fem.InitialStrain(value, cells=corner)
+    for value in (lambda x, t: WARM, lambda x, t: None, lambda x, t: np.full((1, len(x)), WARM),
+                  lambda x, t: np.full(len(x), True), lambda x, t: np.full(len(x), 1j), lambda x, t: ["warm"] * len(x),
+                  lambda x, t: np.where(x[:, 0] > 1.5, np.nan, WARM)):
+        with pytest.raises(InputError, match="InitialStrain at t = 0 s: value (has shape|is)"):
+            fem.assemble(mesh, CONCRETE, clamped=tags["left"], loads=fem.InitialStrain(value))
+    with pytest.raises(InputError, match=r"value is \[\[1.0\], \[1.0, 2.0\]\]; give a number, or"):
+        fem.InitialStrain([[1.0], [1.0, 2.0]])
+
+
+def test_a_function_with_a_history_is_that_of_the_start() -> None:
+    """The load takes value(x, 0) s(t), as other loads do, and so must stresses: a panel that is free has none."""
+    mesh, tags = block(COMM, lengths=(1.0, 1.0), divisions=(2, 2))
+    rollers = [fem.Prescribed(tags["left"], components=(0,)), fem.Prescribed(tags["bottom"], components=(1,))]
+    load = fem.InitialStrain(lambda x, t: WARM * (1.0 + t) * np.ones(len(x)), history=lambda t: 2.0 * t)
+    problem = linear(fem.assemble(mesh, CONCRETE, section=PlaneStress(), prescribed=rollers, loads=load))
+    for state in quasi_static(problem, [1.0, 3.0], solver=Condensed()):
+        assert max_over_ranks(COMM, stress(problem, state)) < 1e-9 * E * WARM
+        assert max_over_ranks(COMM, state.u) == pytest.approx(2.0 * state.t * WARM, rel=1e-10)
+
+
+def test_energies_are_those_of_free_unknowns_where_a_support_moves() -> None:
+    """A bar of 4 cells stretched by what warming asks has no stress, and ½ uᵀKu - f_0·u + ½ ∫ eps_0 : C eps_0 of its
+    free nodes: strains WARM in three cells and -3 WARM in the last, 6 + 2 times ½ E WARM² / 2 of one cell."""
+    mesh, tags = block(COMM, lengths=(2.0,), divisions=(4,))
+    moved = fem.Prescribed(tags["right"], displacement=lambda x, t: np.full(x.shape, 2.0 * WARM))
+    bar = LinearElastic(E, 0.0, 2400.0)
+    problem = linear(fem.assemble(mesh, bar, clamped=tags["left"], prescribed=moved, loads=fem.InitialStrain(WARM)))
+    state = static_equilibrium(problem, solver=Condensed())
+    assert max_over_ranks(COMM, stress(problem, state)) < 1e-9 * E * WARM
+    assert Energy().start(problem, state)["energy_strain"] == pytest.approx(4.0 * E * WARM**2, rel=1e-10)
+
+
+def test_a_strain_that_never_changes_is_integrated_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its ledger is that of the same strain with a history of 1, which is integrated in every step."""
+    sweeps, forces = [], InitialStrains.forces
+    monkeypatch.setattr(InitialStrains, "forces", lambda *a, **k: sweeps.append(1) or forces(*a, **k))
+    runs = []
+    for history in (None, lambda t: 1.0):
+        mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 2))
+        load = fem.InitialStrain(WARM, history=history)
+        problem = linear(fem.assemble(mesh, CONCRETE, clamped=tags["left"], loads=load))
+        found = simulate(problem, scheme=Midpoint(), solver=Condensed(), dt=1e-4, t_end=1e-3, record=[Energy()]).history
+        runs.append((len(sweeps), found))
+        sweeps.clear()
+    (few, one), (many, other) = runs
+    assert (few, many) == (2, 12)  # at assembly, and in the first row or in all 11
+    scale = float(np.max(one["energy_strain"]))
+    for name in ("energy_strain", "work_input", "energy_defect"):
+        assert np.max(np.abs(one[name] - other[name])) < 1e-11 * scale

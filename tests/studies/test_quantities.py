@@ -140,6 +140,10 @@ value = "0.03 %"
 history = "t^2"
 cells = "block"
 
+[[system.loads]]
+type = "InitialStrain"
+value = [["0.03 %", "-1e-4/2"], [0.0, 2e-4]]
+
 [[contact]]
 facets = "right"
 obstacle = {type = "AnalyticGap", function = "0.01 + 0.001*y^2"}
@@ -167,6 +171,7 @@ def test_expressions_are_the_functions_of_the_interface(tmp_path_factory: Any) -
         fem.Traction(tags["right"], lambda p, t: np.column_stack([1e3 * t * p[:, 1], np.full(len(p), 2e3)])),
         fem.InitialStrain(lambda p, t: 1e-5 * (10.0 + p[:, 1]) * t),
         fem.InitialStrain(3e-4, lambda t: t**2, tags["block"]),
+        fem.InitialStrain([[3e-4, -5e-5], [0.0, 2e-4]]),
     ]
     system = fem.assemble(
         mesh, fem.Heterogeneous(lambda x: 30e6 + 2e6 * x[1], 0.3, 1800.0), clamped=tags["bottom"], loads=loads,
@@ -190,6 +195,9 @@ def test_expressions_where_none_belongs_are_refused(tmp_path: Path) -> None:
         ('["0.1*y", "0"]', '["0.1*y", "0 m"]', r"initial_velocity\[2\] is '0 m': 'm' is no unit of it: give it in m/s"),
         ('["0.1*y", "0"]', '["0.1*y*t", 0]', r"initial_velocity\[1\] is '0.1\*y\*t': .*'t' in it is no number"),
         ('["0", "-1 kPa"]', '"-1 kPa"', r"value is '-1 kPa': give a list of numbers or expressions of x, y, z, t"),
+        ("2e-4]]", '"1e-4*t"]]', r"value\[2\]\[2\] is '1e-4\*t': give a number, .*'t' in it is no number"),
+        ('"1e-5*(10 + y)*t"', '["1e-5*t", "0"]', r"value\[1\] is '1e-5\*t': give a list of numbers"),
+        ('"9810*max(0, 5 - y)"', '["9810*y", "0"]', "value is a list: give a number or an expression or a function"),
         ('divisions = [2, 3]', 'divisions = [2, "x"]', r"divisions\[2\] is 'x': give a number"),
     ):
         assert old in BLOCK

@@ -85,11 +85,18 @@ def _values(words: str, value: Values, space: Any, comm: MpiComm) -> Array:
     if any(one.ufl_id() != space.mesh.ufl_domain().ufl_id() for one in domains):
         raise InputError(f"Heterogeneous: {words} is of another mesh; give it on the mesh of the body")
 
+    def at_points(x: Array) -> Array:
+        values = np.positive(value(x), dtype=float)  # an error for complex numbers
+        if values.shape not in (x.shape[1:], (1, *x.shape[1:])):  # DOLFINx reads beyond values that are too few
+            raise InputError(f"Heterogeneous: {words} has values of shape {values.shape} at {x.shape[1]} points; give "
+                             "a function of points x (3, k) that returns (k,)")
+        return np.asarray(values)
+
     def fill() -> None:
         if domains:
             found.interpolate(value if _is_function(value) else compat.expression(value, space))
         elif callable(value) and not isinstance(value, Expr):
-            found.interpolate(lambda x: np.positive(value(x), dtype=float))  # an error for complex numbers
+            found.interpolate(at_points)
         else:
             found.x.array[:] = float(value)
 

@@ -9,7 +9,8 @@ import numpy as np
 import ufl
 
 from ..core.algebra import Array, total
-from ..core.checks import array, function, optional
+from ..core.checks import array, function, optional, shape_of, shown
+from ..core.errors import InputError
 from ..laws.materials import PlaneStress
 from . import compat
 from .forms import ElasticForms
@@ -30,30 +31,43 @@ class InitialStrain(ActingLoad):
 
     Args:
         value: the strain of all directions, across the plane too, or a tensor, of which the symmetric part counts,
-            (d, d) or in the plane (3, 3); or a function of points (k, d) [m] and the time [s] -> (k,) or (k, d, d).
-        history: factor s(t) of a value that is constant in time; cells: the part of the body that is strained.
+            (d, d) or in the plane (3, 3); or a function of points (k, d) [m] and the time [s] -> (k,), (k, d, d) or in
+            the plane (k, 3, 3), which is asked at t = 0 s when a body is assembled.
+        history: factor s(t) of the value at t = 0 s; cells: the part of the body that is strained.
     Raises:
         InputError: values of other shapes, NaN; beside forms=… of the user's own, which do not tell C.
     """
 
-    value: float | Callable[[Array, float], Array]  # type: ignore[assignment]  # what is given
+    value: float | Sequence[Sequence[float]] | Callable[[Array, float], Array]  # type: ignore[assignment]  # as given
     history: Callable[[float], float] | None = None
     cells: Cells | None = None
 
     def __post_init__(self) -> None:
-        if not callable(self.value):
-            array("InitialStrain", "value", self.value, (None,) * np.ndim(self.value))
         optional(function, "InitialStrain", "history", self.history, "give a function of the time [s], or None")
         optional(cells_of, "InitialStrain", "cells", self.cells)
+        if not callable(self.value):
+            dimensions = (1, 2, 3) if self.cells is None else (self.cells.mesh.geometry.dim,)
+            _tensors("InitialStrain", self.value, (), dimensions)
 
     def at(self, points: Array, room: Array, t: float) -> Array:
         """Return the tensors at points (k, d), less the history, in the shape (k, 9) of the room."""
-        given = np.asarray(self.value(points, t) if callable(self.value) else self.value)
-        if given.ndim < 2:
-            return np.multiply.outer(np.broadcast_to(given, len(points)), np.eye(3).ravel())
+        value: Any = self.value(points, 0.0 if self.history else t) if callable(self.value) else self.value
+        at_points = (len(points),) if callable(self.value) else ()
+        found = _tensors(f"InitialStrain at t = {t:g} s", value, at_points, points.shape[1:])
         whole = np.zeros((len(points), 3, 3))
-        whole[:, : given.shape[-1], : given.shape[-1]] = given
+        whole[:, : found.shape[-1], : found.shape[-1]] = found
         return whole.reshape(room.shape)
+
+
+def _tensors(owner: str, value: Any, leading: tuple[int, ...], dimensions: tuple[int, ...]) -> Array:
+    """Return strains, one or one at each point, as tensors; InputError unless one of these dimensions has the shape."""
+    shape = shape_of(value)
+    if shape != leading and shape not in {(*leading, n, n) for d in dimensions for n in (d, 3 if d == 2 else d)}:
+        what = f"is {shown(value)}" if -1 in shape else f"has shape {shape}"
+        there, ask, k = (f" at {leading[0]} points", "return numbers (k,)", "k, ") if leading else ("", "give a number", "")
+        raise InputError(f"{owner}: value {what}{there}; {ask}, or tensors ({k}d, d) or in the plane ({k}3, 3)")
+    found = array(owner, "value", value, shape)
+    return np.multiply.outer(found, np.eye(3)) if shape == leading else found
 
 
 class InitialStrains:
@@ -68,6 +82,9 @@ class InitialStrains:
         sigma, beyond = body.hooke(own, across, ufl.tr(own))
         self._work = self._space.compiled(ufl.inner(sigma, ufl.sym(ufl.grad(body.v))) * ufl.dx)
         self._energy = self._space.compiled(0.5 * (ufl.inner(sigma, own) + beyond * across) * cell * ufl.dx)
+        self._still: tuple[Array, float] | None = None  # what ``energy`` takes of strains that never change
+        for one in given:
+            self.follow(0.0, only=one)  # tells of wrong functions before there is any work
 
     def _split(self, eps: Any) -> tuple[Any, Any]:
         """(Strain (d, d), that across the plane, none in plane stress) of tensors."""
@@ -100,5 +117,7 @@ class InitialStrains:
 
     def energy(self, u: Array, t: float) -> float:
         """Return ½ ∫ eps_0 : C eps_0 - f_0·u [J], what they add to ½ uᵀKu of the free unknowns."""
-        work = self.forces(t) @ u
-        return total(self._space.comm, compat.assemble_vector(self._energy).array_r.sum() - work)
+        found = self._still or (self.forces(t), float(compat.assemble_vector(self._energy).array_r.sum()))
+        if not any(one.history or callable(one.value) for one in self._given):
+            self._still = found
+        return total(self._space.comm, found[1] - found[0] @ u)

@@ -68,8 +68,10 @@ class Energy:
     """Record the energy ledger of the run, all in joules, works and losses cumulative:
 
         W_input + E(0) = E(t) + D_damping + D_contact + D_friction + D_impact + D_algorithmic - defect
-        E = ½ vᵀMv + ½ uᵀKu, with initial strains ½ vᵀMv + ½ ∫ (eps - eps_0) : C (eps - eps_0), whose rates work too
+        E = ½ vᵀMv + ½ uᵀKu of the free unknowns, with initial strains ½ vᵀMv + ½ uᵀKu - f_0·u + ½ ∫ eps_0 : C eps_0
 
+    with f_0·u = ∫ C eps_0 : eps(u), so that it is ½ ∫ (eps - eps_0) : C (eps - eps_0) where supports are at zero. The
+    rates of initial strains work too. What moved supports store by themselves is in no E: their pull -K U is a load.
     D_impact = ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ with its sign; W_input is the work of loads, inertia loads -M r a_g and
     prescribed motions. The defect is the work of the residual of the equation of motion, accumulated; its size relative
     to the largest energy or work is in ``summary.json``. Three products a step; damping and impacts take one each.

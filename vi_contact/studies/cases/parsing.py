@@ -213,7 +213,8 @@ def _expected(members: Sequence[Any], words: Words) -> str:
         elif get_origin(member) in (Mapping, dict):
             found.append("a table of names")
         elif member in (FIELD, HISTORY, Expression):
-            found.append("an expression of t" if member == HISTORY else "expressions of x, y, z, t, one per dimension")
+            vector = "expressions of x, y, z, t, one per dimension"
+            found.append("an expression of t" if member == HISTORY else "an expression" if float in members else vector)
     if not found or any(get_origin(member) is Callable or member is Callable for member in members):
         found.append("a function, which only the Python interface takes")
     return " or ".join(dict.fromkeys(found))

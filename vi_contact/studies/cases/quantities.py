@@ -41,7 +41,7 @@ def text_node(text: str, members: Sequence[Any], spot: Spot) -> Any:
 
     InputError: no arithmetic, a unit of another dimension than that of the key, a value that is not finite or whole.
     """
-    one_value = not any(get_origin(member) in (tuple, list, Sequence) for member in members)
+    one_value = float in members or not any(get_origin(member) in (tuple, list, Sequence) for member in members)
     kinds = ((FIELD, "xyzt"), (Expression, "xyz"), (HISTORY, "t"))
     kind, letters = next((one for one in kinds if one[0] in members and one_value), (None, ""))
     if kind is None and float not in members and int not in members:
@@ -58,7 +58,7 @@ def text_node(text: str, members: Sequence[Any], spot: Spot) -> Any:
 def list_node(values: list[Any], members: Sequence[Any], spot: Spot) -> Places | None:
     """Return the vector field that a list stands for; None where none is asked for or nothing in it has variables."""
     letters = "xyzt" if FIELD in members else "xyz" if AT_START in members and spot.unit in ("m", "m/s") else ""
-    if not letters or not any(isinstance(one, str) for one in values):
+    if not letters or float in members or not any(isinstance(one, str) for one in values):
         return None
     texts = [one if isinstance(one, str) else repr(one) for one in values if isinstance(one, str | int | float)]
     found = tuple(_expression(one, letters, spot.entry(number)) for number, one in enumerate(texts, start=1))
