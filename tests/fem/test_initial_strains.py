@@ -256,14 +256,14 @@ def test_only_numbers_and_tensors_of_the_body_are_taken(d: int) -> None:
             with pytest.raises(InputError, match=r"InitialStrain.*: value .*d, d\) or in the plane \(.*3, 3\)"):
                 fem.assemble(mesh, CONCRETE, loads=fem.InitialStrain(value, cells=corner))
             if number == 0:
-                with pytest.raises(InputError, match=r"give a number, or tensors \(d, d\) or in the plane"):
+                with pytest.raises(InputError, match=r"give a number, a tensor \(d, d\) or in the plane"):
                     fem.InitialStrain(value, cells=corner)
     for value in (lambda x, t: WARM, lambda x, t: None, lambda x, t: np.full((1, len(x)), WARM),
                   lambda x, t: np.full(len(x), True), lambda x, t: np.full(len(x), 1j), lambda x, t: ["warm"] * len(x),
                   lambda x, t: np.where(x[:, 0] > 1.5, np.nan, WARM)):
         with pytest.raises(InputError, match="InitialStrain at t = 0 s: value (has shape|is)"):
             fem.assemble(mesh, CONCRETE, clamped=tags["left"], loads=fem.InitialStrain(value))
-    with pytest.raises(InputError, match=r"value is \[\[1.0\], \[1.0, 2.0\]\]; give a number, or"):
+    with pytest.raises(InputError, match=r"value is \[\[1.0\], \[1.0, 2.0\]\]; give a number, a tensor"):
         fem.InitialStrain([[1.0], [1.0, 2.0]])
 
 

@@ -64,8 +64,8 @@ def _tensors(owner: str, value: Any, leading: tuple[int, ...], dimensions: tuple
     shape = shape_of(value)
     if shape != leading and shape not in {(*leading, n, n) for d in dimensions for n in (d, 3 if d == 2 else d)}:
         what = f"is {shown(value)}" if -1 in shape else f"has shape {shape}"
-        there, ask, k = (f" at {leading[0]} points", "return numbers (k,)", "k, ") if leading else ("", "give a number", "")
-        raise InputError(f"{owner}: value {what}{there}; {ask}, or tensors ({k}d, d) or in the plane ({k}3, 3)")
+        ask, k = (f"numbers ({leading[0]},), tensors", f"{leading[0]}, ") if leading else ("a number, a tensor", "")
+        raise InputError(f"{owner}: value {what}; give {ask} ({k}d, d) or in the plane ({k}3, 3)")
     found = array(owner, "value", value, shape)
     return np.multiply.outer(found, np.eye(3)) if shape == leading else found
 
