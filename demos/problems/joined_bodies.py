@@ -15,16 +15,16 @@ body 2: friction limits p_1. The source has u_perp = -u.n, so that g_perp = -g.n
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_factor, cho_solve, lu_factor, lu_solve
 
-from vi_contact.bem.contact import SUPPORTED, BoundaryContact, Conditions
+from vi_contact.bem.contact import ASYMMETRIC, SUPPORTED, BoundaryContact, Conditions
 from vi_contact.bem.energetic import summed
 from vi_contact.bem.loads import traction_forces
 from vi_contact.bem.poincare_steklov import BoundaryMotion, BoundaryProblem, CondensedCompliance
-from vi_contact.core.algebra import Array, Indices, Mask
+from vi_contact.core.algebra import Array, Indices, Mask, max_abs
 from vi_contact.core.checks import array, at, mask, optional, provides
 from vi_contact.core.errors import InputError
 from vi_contact.core.protocols import FrictionLaw, Frictionless
@@ -169,6 +169,13 @@ def matching(points: Array, others: Array) -> Indices:
     return nearest
 
 
+def inverse(matrix: Array) -> Callable[[Array], Array]:
+    """Return b -> matrix⁻¹ b, by Cholesky's factors or, of a matrix of the unsymmetric form, by LU factors."""
+    if max_abs(matrix - matrix.T) > ASYMMETRIC * max_abs(matrix):
+        return partial(lu_solve, lu_factor(matrix))
+    return partial(cho_solve, cho_factor(0.5 * (matrix + matrix.T)))
+
+
 class Weld:
     """Hold the relative displacement of masked nodes (m,) at given jumps (steps, 2m): ``contact`` is what is left of a
     compliance when the weld forces are eliminated."""
@@ -184,10 +191,10 @@ class Weld:
         self._responses = responses = np.zeros_like(known)
         left = np.concatenate([W[:, touching][:, :, touching], compliance.u_free[:, touching, None]], axis=2)
         if welded.any():
-            factor = cho_factor(0.5 * (inner[0] + inner[0].T))
+            solve = inverse(inner[0])
             for k in range(steps):
                 early = summed(inner[k:0:-1], responses[:k]) if k else 0.0
-                responses[k] = -cho_solve(factor, known[k] + early)
+                responses[k] = -solve(known[k] + early)
             left += np.array([summed(across[k::-1], responses[: k + 1]) for k in range(steps)])
         kept = {name: getattr(compliance, name)[~nodes] for name in ("nodes", "points", "normals", "lengths")}
         W, u_free = np.ascontiguousarray(left[:, :, :-1]), np.ascontiguousarray(left[:, :, -1])

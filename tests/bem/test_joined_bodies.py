@@ -15,7 +15,14 @@ import pytest
 import vi_contact as vc
 from demos.problems.boundary_elements import pressed, steklov, unloaded
 from demos.problems.joined_bodies import TwoBodies
-from vi_contact.bem import BoundaryContact, BoundaryProblem, march_contact, polygon, traction_forces
+from vi_contact.bem import (
+    BoundaryContact,
+    BoundaryProblem,
+    PoincareSteklov,
+    march_contact,
+    polygon,
+    traction_forces,
+)
 from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial
@@ -81,6 +88,24 @@ def test_a_jump_of_tractions_across_a_weld():
     nodal = np.zeros((STEPS, 2, K + 1))
     nodal[:, 1] = PUSH / K * np.array([0.5, 1.0, 1.0, 1.0, 1.0, 0.5])
     assert faces(joined(traction=nodal))[0] == pytest.approx(above, rel=1e-12)
+
+
+def test_welds_of_the_unsymmetric_form():
+    """B14: bodies whose W[0] is 2 % off symmetry are held as well as others: by a given jump, and beside rubbing."""
+    one, two = (replace(body, operator=PoincareSteklov(body.operator.blocks, body.operator.rho, symmetric=False))
+                for body in rods())
+    motions = TwoBodies(one, two, welded=one.contact, jump=along(1, JUMP)).solve()
+    u = [motion.displacement[:, :, body.contact_nodes] for motion, body in zip(motions, (one, two), strict=True)]
+    assert np.abs(u[0] - u[1][:, :, ::-1] - JUMP * np.array([[0.0], [1.0]])).max() < 1e-12 * JUMP
+    welded = np.zeros(len(one.contact), bool)
+    welded[np.flatnonzero(one.contact)[:2]] = True
+    bodies = TwoBodies(one, two, welded=welded, traction=along(1, PUSH))
+    contact = bodies.contact(vc.Tresca(0.05))
+    run = march_contact(contact)
+    v = [motion.displacement for motion in bodies.solve(run.forces)]
+    apart = v[0][:, :, one.contact_nodes] - v[1][:, :, two.contact_nodes][:, :, ::-1]
+    assert not contact.symmetric and np.abs(apart[:, :, :3]).max() < 1e-12 * np.abs(v[0]).max()
+    assert run.worst < 1e-12 and run.r_n.max() > 0.01
 
 
 def test_jumps_where_bodies_only_touch():

@@ -16,6 +16,7 @@ from demos.problems.inf_sup import space_constant, time_constant
 from vi_contact.bem import (
     BoundaryContact,
     BoundaryProblem,
+    CondensedCompliance,
     MultiplierMesh,
     SpaceTimeUzawa,
     circle,
@@ -44,7 +45,8 @@ def condensed():
 
 def own(**choice) -> MultiplierMesh:
     """Patches on the bottom of the square."""
-    return MultiplierMesh(square().operator.mesh, square().contact, condensed(), **choice)
+    return MultiplierMesh(**{"mesh": square().operator.mesh, "elements": square().contact, "compliance": condensed(),
+                             **choice})
 
 
 @pytest.mark.parametrize("degree", [0, 1])
@@ -72,14 +74,33 @@ def test_patches_end_at_corners_and_close_circles():
     assert sorted(int(run[0]) for run in runs) == [0, 0, 1, 1, 3, 3] and all(len(set(run)) == 1 for run in runs)
     normals = patches.condensed().normals
     assert normals == pytest.approx(mesh.normals[[patch[0] for patch in patches.patches]], abs=1e-15)
-    ring = circle(1.0, 16)
-    whole = np.ones(16, bool)
-    loads = np.zeros((2, 2, 16))
-    disk = BoundaryProblem(steklov(ring, MATERIAL, dt=0.4, steps=2), loads, contact=whole)
-    around = MultiplierMesh(ring, whole, disk.condensed(), patch=3, interval=2)
-    assert [len(patch) for patch in around.patches] == [4, 3, 3, 3, 3]
-    assert np.concatenate(around.patches).tolist() == list(range(16))
-    assert np.hypot(*around.condensed().normals.T) == pytest.approx(np.ones(5), abs=1e-15)
+    ring, whole = circle(1.0, 40), np.ones(40, bool)
+    disk = nothing(ring, whole, steps=2)
+    around = MultiplierMesh(ring, whole, disk, patch=3, interval=2)
+    assert [len(patch) for patch in around.patches] == [4, *[3] * 12]
+    assert np.concatenate(around.patches).tolist() == list(range(40))
+    assert np.hypot(*around.condensed().normals.T) == pytest.approx(np.ones(13), abs=1e-15)
+
+
+def nothing(mesh, elements, *, steps: int) -> CondensedCompliance:
+    """The compliance of a body that does not move."""
+    m = len(nodes := np.flatnonzero(mesh.nodes_of(elements)))
+    return CondensedCompliance(np.zeros((steps, 2 * m, 2 * m)), np.zeros((steps, 2 * m)), nodes, mesh.points[nodes],
+                               mesh.node_normals(elements)[nodes], mesh.node_lengths(elements)[nodes], 1.0)
+
+
+def test_a_mean_normal_stands_for_30_degrees():
+    """B15: patches of a circle under a pressure 1 that presses it outwards. A patch that turns more is refused: in half
+    a circle the mean normal misses more than half of the pressure; two elements of 16, 22.5 degrees, miss 4 %."""
+    ring, whole, steps = circle(1.0, 16), np.ones(16, bool), 2
+    loads = np.tile(ring.node_normals(whole).T, (steps, 1, 1))
+    disk = BoundaryProblem(steklov(ring, MATERIAL, dt=0.4, steps=steps), loads, contact=whole).condensed()
+    around = MultiplierMesh(ring, whole, disk, patch=2, interval=1)
+    pressed_on = march_contact(BoundaryContact(around.condensed())).r_n.sum(axis=1)
+    assert pressed_on == pytest.approx(np.full(steps, 16.0), rel=0.12)
+    for patch, turn in ((3, "67.5"), (8, "157"), (16, "180")):
+        with pytest.raises(InputError, match=f"one turns by {turn} degrees, more than 30, under one mean normal; give"):
+            MultiplierMesh(ring, whole, disk, patch=patch, interval=1)
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -203,7 +224,10 @@ def test_the_benchmark(tmp_path):
 
 def test_bad_input():
     for wrong, words in (({"patch": 7}, "a side has 6 elements"), ({"interval": 5}, "4 steps are left over"),
-                         ({"sigma": 1.0}, "sigma weighs means")):
+                         ({"sigma": 1.0}, "sigma weighs means"),
+                         ({"sigma": 1e300, "testing": "mean"}, "leaves the ends of steps no weight"),
+                         ({"mesh": polygon(2.0 * np.array(SIDES), 2.0 / K)}, "other nodes than mesh"),
+                         ({"mesh": polygon(SIDES, 1.0), "elements": np.ones(4, bool)}, "other nodes than mesh")):
         with pytest.raises(InputError, match=words):
             own(**wrong)
     mesh = square().operator.mesh

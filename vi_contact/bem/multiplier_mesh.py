@@ -18,10 +18,11 @@ from functools import cached_property
 import numpy as np
 from scipy.special import hyp1f1
 
-from ..core.algebra import Array, Indices, Mask
+from ..core.algebra import Array, Indices, Mask, max_abs
 from ..core.checks import array, attributes, check_word, function, instance, mask, whole
 from ..core.corners import FEATURE_ANGLE
 from ..core.errors import InputError
+from ..solvers.normal.lcp import EPS
 from .boundary_mesh import P1_MASS, BoundaryMesh
 from .poincare_steklov import CondensedCompliance
 
@@ -35,7 +36,8 @@ class MultiplierMesh:
     lambda on a patch; testing: "end" takes displacements at the ends of intervals, "mean" the source's means; sigma: of
     the weight of these [1/s]. The normal of a patch is its mean normal; patches end at corners.
 
-    Raises InputError for elements not condensed, sides shorter than a patch, steps left over, a weight without means.
+    Raises InputError for elements not condensed, sides shorter than a patch, patches that turn by more than 30°, steps
+    left over, a weight without means or one that leaves nothing of them.
     """
 
     mesh: BoundaryMesh
@@ -57,11 +59,20 @@ class MultiplierMesh:
         whole(owner, "degree", self.degree, most=1)
         if self.sigma and self.testing == "end":
             raise InputError(f"{owner}: sigma weighs means, and testing is 'end'; give testing='mean' or sigma=0")
-        if not np.isin(np.flatnonzero(self.mesh.nodes_of(self.elements)), self.compliance.nodes).all():
+        if 2.0 * self.sigma * self.compliance.dt * EPS > 1.0:  # the weight at the end of a step, 1/(2 sigma dt)
+            raise InputError(f"{owner}: sigma = {self.sigma:g} 1/s leaves the ends of steps no weight; give less")
+        nodes, points = self.compliance.nodes, self.mesh.points
+        if max(nodes) >= len(points) or max_abs(points[nodes] - self.compliance.points) > 1e-9 * self.mesh.size:
+            raise InputError(f"{owner}: compliance has other nodes than mesh; give the mesh it was condensed on")
+        if not np.isin(np.flatnonzero(self.mesh.nodes_of(self.elements)), nodes).all():
             raise InputError(f"{owner}: elements must have all their nodes in the compliance; put them in `contact`")
         shortest = min(map(len, self._runs()), default=0)
         if shortest < self.patch:
             raise InputError(f"{owner}: patch is {self.patch}, and a side has {shortest} elements; give fewer")
+        least = max(-1.0, min((n @ n.T).min() for n in (self.mesh.normals[patch] for patch in self.patches)))
+        if least < np.cos(FEATURE_ANGLE * (1.0 + 1e-9)):
+            raise InputError(f"{owner}: patch is {self.patch}, and one turns by {np.degrees(np.arccos(least)):.3g} "
+                             "degrees, more than 30, under one mean normal; give fewer elements, or a finer mesh")
         if steps := len(self.compliance.W) % self.interval:
             raise InputError(f"{owner}: {steps} steps are left over from intervals of {self.interval}; give a divisor")
 

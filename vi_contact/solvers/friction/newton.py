@@ -76,6 +76,9 @@ class FrictionNewton(Settings):
             sweep, r, w = sweeper(step), step.admissible(r), None
             for _ in range(FIRST_SWEEPS * 2**attempt):
                 r, swept = sweep(r), swept + 1
+                if not step.delassus.symmetric and not step.rounding(r) <= step.unit:  # they lead nowhere
+                    r = np.zeros_like(r)
+                    break
         return r, len(history) + swept, history
 
     def _newton(self, kept: Kept, step: ScaledProblem, y: Array, history: list[float]) -> tuple[Array, bool]:

@@ -93,11 +93,12 @@ def on_disk(S: Array, q: Array, limit: Callable[[Array], float]) -> Array:
     """Return r with S r = -q when |r| <= limit(r), else (S + lambda) r = -q on |r| = limit(r), lambda > 0.
 
     S (k, k) symmetric positive definite. r falls from S⁻¹q to 0 as lambda grows; the root of |r| - limit is bracketed
-    in s = 1/(1 + lambda/trace S) between 0 and 1.
+    in s = 1/(1 + lambda/trace S) between 0 and 1. Of any other S the moduli of the eigenvalues give r: a start only.
     """
     if len(q) == 0 or not q.any():
         return np.zeros(len(q))
     values, vectors = (np.diag(S), np.eye(1)) if len(q) == 1 else np.linalg.eigh(S)
+    values = np.abs(values)
     part, unit = vectors.T @ q, float(np.sum(values))
 
     def reaction(s: float) -> Array:
@@ -113,7 +114,7 @@ def on_disk(S: Array, q: Array, limit: Callable[[Array], float]) -> Array:
         return np.zeros(len(q))
     from scipy.optimize import brentq  # late: it takes a while
 
-    root = brentq(outside, 0.0, 1.0, xtol=1e-300, rtol=8.9e-16, maxiter=200)
+    root = brentq(outside, 0.0, 1.0, xtol=1e-300, rtol=8.9e-16, maxiter=200, disp=False)
     r = reaction(root)
     size, radius = float(np.linalg.norm(r)), limit(r)
     return r * (radius / size) if size > radius else r

@@ -142,7 +142,8 @@ class ScaledProblem:
         carried = r != 0.0
         if carried.any():
             moved = self.moved(r)
-            best = -(self.q[carried] @ r[carried]) / np.vdot(moved, r)
+            energy = np.vdot(moved, r)  # positive, unless G is not symmetric
+            best = -(self.q[carried] @ r[carried]) / energy if energy > 0.0 else 0.0
             r *= best
             self._last[:] = r.copy(), best * moved
         return r

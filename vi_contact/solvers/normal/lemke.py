@@ -1,11 +1,12 @@
 """Solve the small problem of a G that is not symmetric: Lemke's complementary pivoting.
 
-    w = q + G r + z 1,    0 <= r  perpendicular to  w >= 0,    z >= 0                                               (2)
+    w = q + G r + z d,    0 <= r  perpendicular to  w >= 0,    z >= 0                                               (2)
 
 With z as large as the violation of r = 0, that r solves (2). Every pivot takes the complement of what left the basis
 into it, z moves, and when z leaves the basis r solves problem (1) of ``lcp``. Ties among rows go to the lexicographic
-minimum of (q, inverse of the basis), so that no basis returns. Sources: Lemke, Management Sci. 11, 1965; Cottle, Pang
-and Stone, The Linear Complementarity Problem, 1992, section 4.4.
+minimum of (q, inverse of the basis), so that no basis returns; d has numbers from 1 to 2, since ones tie rows of equal
+q, which took m²/2 pivots. Sources: Lemke, Management Sci. 11, 1965; Cottle, Pang and Stone, The Linear Complementarity
+Problem, 1992, section 4.4.
 
 It ends in the one solution of a P-matrix (``p_matrix``); of a copositive-plus G, which one with positive definite
 symmetric part is, in a solution or, where there is none, on a ray: a basis that nothing has to leave. For other G a ray
@@ -21,6 +22,7 @@ import numpy as np
 from ...core.algebra import Array, Indices, Mask, max_abs
 from ...core.checks import attributes
 from ...core.errors import InputError, StepFailure
+from ...core.matrix_checks import probe
 from .lcp import EPS, Found, PreparedLCP, ScaledLCP, failure, scaled_dense
 
 TINY = 1e-11  # of the largest entry of a column: no pivot
@@ -64,7 +66,7 @@ class _Pivots:
         """Try the guessed set, or that of guessed reactions; where it is wrong, pivot."""
         history: list[float] = []
         r, residual = self._on_set(gap < 0.0 if guess is None else guess > 0, gap)
-        if residual > self._scaled.rounding(r):
+        if residual > min(self._scaled.rounding(r), self.method.tolerance * unit):  # huge r round to anything
             r, residual = self._on_set(self._closed(gap, unit, history), gap)
         if not residual <= self.method.tolerance * unit:
             advice = "G is too ill-conditioned; remove contacts that nearly depend on others"
@@ -90,8 +92,9 @@ class _Pivots:
         if not (q < 0.0).any():
             return closed
         basis, z = np.arange(m), 2 * m  # numbers of w, then of r, then of z
-        tableau = np.column_stack([np.eye(m), -self._matrix[np.ix_(rows, rows)], -np.ones(m), q])
-        row, entering, left = m - 1 - int(np.argmin(q[::-1])), z, -1
+        d = 1.5 + probe(np.arange(m), 0)  # covers q, and is parallel to none that a model would have
+        tableau = np.column_stack([np.eye(m), -self._matrix[np.ix_(rows, rows)], -d, q])
+        row, entering, left = m - 1 - int(np.argmin((q / d)[::-1])), z, -1
         while left != z:
             if len(history) == self.method.max_iterations:
                 raise failure(self.method, iterations=len(history), residual=history[-1], advice="raise max_iterations")
