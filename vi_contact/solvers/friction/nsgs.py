@@ -98,8 +98,7 @@ def on_disk(S: Array, q: Array, limit: Callable[[Array], float]) -> Array:
     if len(q) == 0 or not q.any():
         return np.zeros(len(q))
     values, vectors = (np.diag(S), np.eye(1)) if len(q) == 1 else np.linalg.eigh(S)
-    values = np.abs(values)
-    part, unit = vectors.T @ q, float(np.sum(values))
+    values, part, unit = np.abs(values), vectors.T @ q, float(np.sum(np.abs(values)))
 
     def reaction(s: float) -> Array:
         return np.asarray(vectors @ (-s * part / (s * values + (1.0 - s) * unit)))

@@ -36,8 +36,7 @@ def p_matrix(G: Array) -> PMatrix:
     check_operator(G, np.zeros(len(G), dtype=bool))
     if not (G.diagonal() > 0.0).all():
         return PMatrix(False, NONE)
-    d = energy_scale(G)
-    matrix = d[:, None] * G * d
+    matrix = energy_scale(G)[:, None] * G * energy_scale(G)
     norm = float(np.abs(matrix).sum(axis=1).max(initial=0.0))
     if np.linalg.eigvalsh(0.5 * (matrix + matrix.T)).min(initial=1.0) > len(G) * EPS * norm:
         return PMatrix(True, "is a P-matrix, its symmetric part is positive definite: the solution is unique")
