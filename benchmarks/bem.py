@@ -128,7 +128,7 @@ def wave_errors(blocks: bem.EnergeticBlocks, k: int) -> dict[str, float]:
         wave, mesh = pulse(shear=shear), blocks.mesh
         forces = bem.traction_forces(mesh, wave.traction, dt=blocks.dt, steps=4 * k)
         exact = np.array([wave.displacement(mesh.points, blocks.dt * (j + 1)).T for j in range(4 * k)])
-        found = bem.PoincareSteklov(blocks, 1.0).solve(forces)
+        found = bem.BoundaryProblem(bem.PoincareSteklov(blocks, 1.0), forces).solve().displacement
         errors[name] = float(np.linalg.norm(found - exact) / np.linalg.norm(exact))
     return errors
 
@@ -188,6 +188,8 @@ def main() -> None:
     parser.add_argument("--cost", nargs=3, help=argparse.SUPPRESS)
     parser.add_argument("--one", type=int, nargs=3, help=argparse.SUPPRESS)
     chosen = parser.parse_args()
+    if chosen.n and len(chosen.n) != len(chosen.k):
+        parser.error(f"--n has {len(chosen.n)} numbers, --k {len(chosen.k)}; give one number of steps for each k")
     if chosen.one:
         print(json.dumps(row(chosen.one[0], chosen.one[1], errors=bool(chosen.one[2]))))
         return

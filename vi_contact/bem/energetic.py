@@ -28,7 +28,7 @@ from ..core.errors import InputError
 from ..laws.materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
 from .boundary_operators import Galerkin, OperatorMatrices, check_body
-from .compressed import NUMBERS, CompressedBlocks, compressed_blocks
+from .compressed import AHEAD, NUMBERS, CompressedBlocks, compressed_blocks
 from .fundamental_solution import TimeKernels
 from .quadrature import Orders
 
@@ -87,18 +87,25 @@ def energetic_blocks(
     check_time_step(mesh, material.c_p, dt)
     galerkin, n, speeds = Galerkin(mesh, material.c_s, orders), len(mesh), (material.c_p, material.c_s)
 
-    def assembled(among: Callable[[int], Mask] | None = None) -> Iterator[tuple[Array, Array, Array]]:
-        """Return V^j, K^j, D^j, right where pairs are ``among`` those of the times j - 1, j and j + 1, all if None."""
+    def assembled(among: Callable[[int], Mask] | None = None) -> Iterator[tuple[Array, Array, Array] | None]:
+        """Return V^j, K^j, D^j, right where pairs are ``among`` those of the times j - 1, j and j + 1, all if None;
+        None instead of them where there is no pair at j + 1."""
 
-        def at(i: int) -> OperatorMatrices:
+        def at(i: int) -> OperatorMatrices | None:
             some, t = copy(galerkin), i * dt
             some.pairs = galerkin.pairs if among is None else galerkin.pairs.where(among(i))
+            if not len(some.pairs):
+                return None
             return some.assemble(TimeKernels(t, *speeds), (speeds[1] * t, speeds[0] * t))
 
         a, b, c, change = (np.zeros(1) for _ in range(4))
+        last = steps if small else AHEAD * steps
         with ThreadPoolExecutor(threads) as pool:
-            for start in range(1, steps + 1, threads):
-                for now in pool.map(at, range(start, min(start + threads, steps + 1))):  # each at a time of its own
+            for start in range(1, last + 1, threads):
+                for now in pool.map(at, range(start, min(start + threads, last + 1))):  # each at a time of its own
+                    if now is None:
+                        yield None
+                        continue
                     yield now.single - a, (now.double - b) / dt, (now.hyper - c - change) / dt**2
                     a, b, c, change = now.single, now.double, now.hyper, now.hyper - c
 
@@ -106,7 +113,8 @@ def energetic_blocks(
         return compressed_blocks(mesh, galerkin.pairs, speeds, dt, steps, assembled)
     single, double, hyper = (np.empty((steps, a * n, b * n)) for a, b in ((4, 4), (4, 2), (2, 2)))
     for j, blocks in enumerate(assembled()):
-        single[j], double[j], hyper[j] = blocks
+        if blocks is not None:
+            single[j], double[j], hyper[j] = blocks
     return EnergeticBlocks(mesh, *speeds, dt, single, double, hyper)
 
 

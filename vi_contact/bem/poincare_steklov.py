@@ -170,6 +170,8 @@ class BoundaryProblem:
         provides(owner, "operator", self.operator, names, "give PoincareSteklov(…)")
         n, wanted = len(self.operator.mesh), self.operator.load_shape(len(shape_of(self.forces)))
         object.__setattr__(self, "forces", array(owner, "forces", self.forces, wanted, unit="N/m"))
+        if not len(self.forces):
+            raise InputError(f"{owner}: forces have no step; give those of one step or more")
         for name, shape in (("fixed", (2, n)), ("contact", (n,))):
             optional(mask, owner, name, getattr(self, name), shape)
         optional(array, owner, "prescribed", self.prescribed, (len(self.forces), 2, n), unit="m")
