@@ -22,7 +22,7 @@ from vi_contact.bem import (
     polygon,
     traction_forces,
 )
-from vi_contact.core.errors import InputError
+from vi_contact.core.errors import InputError, StepFailure
 
 RHO = 2.5
 
@@ -35,7 +35,7 @@ def with_hole() -> BoundaryMesh:
 
 
 SHAPES = {
-    "square": (lambda: polygon(SQUARE, 0.1), 0.1, 40),
+    "square": (lambda: polygon(SQUARE, 0.125), 0.125, 32),
     "thin slab": (lambda: polygon([(0.0, 0.0), (1.0, 0.0), (1.0, 0.02), (0.0, 0.02)], [5, 1, 5, 1]), 0.1, 50),
     "disk": (lambda: circle(0.5, 25), 0.15, 30),
     "hole": (with_hole, 0.2, 30),
@@ -110,6 +110,8 @@ def test_circle_of_frequencies(shape, held, symmetric):
         found, exact = getattr(one, name), getattr(other, name)
         assert np.abs(found - exact).max() < 10.0 * lost * np.abs(exact).max(), name
     free = ~np.asarray(ours.fixed)
+    if held:
+        assert np.array_equal(one.displacement[:, ~free], ours.prescribed[:, ~free])
     assert np.allclose(one.forces[:, free], ours.forces[:, free], rtol=1e-15, atol=0.0)
     if symmetric:
         assert one.work.min() > -1e-9 * one.work.max()
@@ -156,6 +158,49 @@ def test_long_tails_of_a_small_body():
     assert sum(part.values.size for part in short.stretches) < 0.3 * 28 * 100 * len(mesh) ** 2
 
 
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_long_runs(symmetric, monkeypatch):
+    """Motions of many large steps are those of the march; blocks cut off at the last step are wrong and are refused."""
+    mesh, steps = polygon(SQUARE, 0.5), 200
+    short = energetic_blocks(mesh, MATERIAL, dt=2.0, steps=steps, compressed=True)
+    pull = traction_forces(mesh, lambda x, n, t: np.sin(t) * n + [0.1, 0.2], dt=2.0, steps=steps,
+                           elements=mesh.labels == 1)
+    ours, march = (BoundaryProblem(PoincareSteklov(blocks, RHO, symmetric), pull, contact=mesh.labels == 0)
+                   for blocks in (short, expanded(short)))
+    one, other = ours.solve().displacement, march.solve().displacement
+    assert np.abs(one - other).max() < 1e-8 * np.abs(other).max()
+    one, other = ours.condensed().W, march.condensed().W
+    assert np.abs(one - other).max() < 1e-7 * np.abs(other).max()
+    if not symmetric:
+        monkeypatch.setattr("vi_contact.bem.compressed.AHEAD", 1)
+        monkeypatch.setattr("vi_contact.bem.energetic.AHEAD", 1)
+        cut = energetic_blocks(mesh, MATERIAL, dt=2.0, steps=steps, compressed=True)
+        with pytest.raises(StepFailure, match="of the motion, which grows behind step 200.* compressed=False"):
+            BoundaryProblem(PoincareSteklov(cut, RHO, False), pull).solve()
+
+
+def test_rounding_moves_a_free_body(monkeypatch):
+    """Where rounding of second differences outgrows the momentum of a free body, a sentence; held bodies go on."""
+    mesh, steps = polygon(SQUARE, 1.0), 300
+    short = energetic_blocks(mesh, MATERIAL, dt=4.0, steps=steps, compressed=True)
+    free, held = (BoundaryProblem(PoincareSteklov(short, 1.0), np.ones((steps, 2, len(mesh))), fixed)
+                  for fixed in (None, np.eye(2, len(mesh), dtype=bool)))
+    assert np.isfinite(free.solve().displacement).all()
+    monkeypatch.setattr("vi_contact.bem.frequency_circle.DRIFT", 1e-12)
+    with pytest.raises(InputError, match="300 steps rounding moves a free body; take fewer steps"):
+        free.solve()
+    assert np.isfinite(held.solve().displacement).all()
+
+
+def test_missed_equations(monkeypatch):
+    """An answer that misses the equations of the march is refused."""
+    free = problem(both("disk")[1], symmetric=True, held=False)
+    monkeypatch.setattr("vi_contact.bem.frequency_circle.CompressedBlocks.applied",
+                        lambda self, p, u, jumps: [0.0 * p[0], p[0], u[0], u[0]])
+    with pytest.raises(StepFailure, match="misses the equations of step 14 of 27 .* take fewer steps"):
+        free.solve()
+
+
 def test_choice_by_size(monkeypatch):
     """Small problems keep dense blocks; beyond a number of numbers they are compressed; both can be asked for."""
     mesh = polygon(SQUARE, 0.5)
@@ -169,9 +214,12 @@ def test_refusals():
     """Sentences for what cannot be done, before any work."""
     mesh = polygon(SQUARE, 0.5)
     for options, message in (({"compressed": "yes"}, "compressed is 'yes'"), ({"threads": 0}, "threads is 0"),
-                             ({"steps": 10**9, "compressed": True}, "1000000000 steps of 8 elements asks for")):
+                             ({"steps": 10**9, "compressed": True}, "1000000000 steps of 8 elements asks for"),
+                             ({"steps": 200_000, "compressed": True}, "circle of 200000 steps asks for")):
         with pytest.raises(InputError, match=message):
             energetic_blocks(mesh, MATERIAL, **({"dt": 0.5, "steps": 9} | options))
     short = both("disk")[1]
     with pytest.raises(InputError, match="assemble it with more steps"):
         BoundaryProblem(PoincareSteklov(short, 1.0), np.zeros((31, 2, 25))).solve()
+    with pytest.raises(InputError, match="forces have no step"):
+        BoundaryProblem(PoincareSteklov(short, 1.0), np.zeros((0, 2, 25)))

@@ -86,13 +86,13 @@ class CompressedBlocks:
         shapes, at = ((4, 4), (4, 2), (4, 2), (2, 2)), ((0, 0), (4, 4), (8, 6), (10, 4))
         indices = [np.indices((a * n, b * n)).reshape(2, -1) for a, b in shapes]
         indices[2] = indices[2][::-1]
-        rows, columns = np.hstack([part + n * np.array(start)[:, None] for part, start in zip(indices, at, strict=True)])
+        rows, columns = np.hstack([part + n * np.c_[start] for part, start in zip(indices, at, strict=True)])
         numbers = np.insert(self.places, np.full(8 * n**2, 24 * n**2), self.places[16 * n**2 : 24 * n**2])
         order = np.argsort(numbers, kind="stable")
         return numbers[order], rows[order], columns[order]
 
     def applied(self, p: Array, u: Array, jumps: Array) -> list[Array]:
-        """Return sum_j V^j p_j, K^j u_j, K^jᵀ jumps_j, D^j u_j of (steps, 4n), (steps, 2n), (steps, 4n), latest first."""
+        """Return sum_j V^j p_j, K^j u_j, K^jᵀ jumps_j, D^j u_j of histories (steps, 4n or 2n), latest first."""
         values, start, n = np.pad(np.hstack([p, u, jumps]), ((0, self.reach - len(p)), (0, 0))), 0, len(self.mesh)
         (numbers, rows, columns), total = self._entries, np.zeros(12 * n)
         for part in self.stretches:

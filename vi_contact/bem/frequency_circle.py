@@ -8,7 +8,7 @@ With û(z) = sum_j z^j u_j for increments u_j, and so on, the march of energetic
 whose coefficients are those of a Fourier transform on |z| = R < 1. With L points step j + L adds R^L to step j, and
 rounding is magnified by R^-N in the last of N: 1e-12 and 1e6 for L = 2 N. Ch. Lubich, Numer. Math. 52 (1988) 413. What
 is added is the motion in steps N to 3 N: it stays small as long as the blocks reach that far, and grows where they are
-cut off at N. Whether it did is asked of the equations of the march in two steps.
+cut off at N. Growth from N to 2 N says what wraps around; the equations of the march are asked in two steps.
 """
 
 import numpy as np
@@ -20,7 +20,8 @@ from .compressed import CompressedBlocks
 
 BALANCE = 1e-18  # R^(L + N)
 BATCH = 12  # frequencies whose matrices are held at once
-SHARE = 1e-7  # of displacements and of forces: what the equations of the march may miss
+DRIFT = 1e-2  # of the momentum of a free body: what rounding may add
+SHARE = 1e-6  # of displacements and of forces: what may wrap around, what the equations of the march may miss
 
 
 def on_circle(
@@ -29,15 +30,18 @@ def on_circle(
     """Return W (steps, m, m), the displacements of m unknowns after unit nodal forces on them during step 0, and as
     ``marched`` does displacements (steps, 2n), tractions (steps, 4n), nodal forces (steps, 2n) of one right-hand side:
     forces and prescribed, of fixed unknowns (2n,), both (steps, 2n). Raises InputError for more steps than the blocks
-    are for, StepFailure where the right-hand side or a unit force misses the equations of the march."""
+    are for and where rounding of D moves a free body, StepFailure where much wraps around, and where the right-hand
+    side or a unit force misses the equations of the march."""
     steps, m, mass, free = len(forces), len(units), blocks.mesh.mass, ~fixed
     if steps > blocks.steps:
         raise InputError(f"boundary elements: {steps} steps, blocks for {blocks.steps}; assemble it with more steps")
+    if symmetric and not fixed.any():
+        _check_drift(blocks, steps)
     count, radius = 2 * steps, BALANCE ** (1.0 / (3 * steps))
     scale, circle = radius ** np.arange(steps), radius * np.exp(-2j * np.pi / count * np.arange(count // 2 + 1))
     columns, W = np.zeros((len(free), m + 1), complex), np.empty((len(circle), m, m), complex)
     columns[units, np.arange(m)] = 1.0
-    pulls, kept = np.zeros((steps, len(free), 1 + (m > 0))), [m, m // 2][: 1 + (m > 0)]  # and one unit force, to check
+    pulls, kept = np.zeros((steps, len(free), 1 + (m > 0))), np.array([m, m // 2][: 1 + (m > 0)])  # and one unit force, to check
     pulls[..., 0], pulls[0, units[m // 2 : m // 2 + 1], 1:] = forces, 1.0
     given = np.zeros_like(pulls)
     if prescribed is not None:
@@ -59,11 +63,16 @@ def on_circle(
             u[i, free] = moved[np.ix_(free, kept)]
             p[i], loads[i] = traction @ u[i], stiffness @ u[i]
             u[i], W[i] = u[i] / (1.0 - z), moved[units, :-1] / (1.0 - z)
-    W, u, p, total = ((np.fft.irfft(values, count, axis=0)[:steps].T / scale).T for values in (W, u, p, loads))
-    u[:, fixed], total[:, free] = given[:, fixed], pulls[:, free]
-    for column in range(len(kept)):
-        _check(blocks, u[..., column], p[..., column], total[..., column], symmetric)
-    return W, u[..., 0], p[..., 0], total[..., 0]
+    found = [np.fft.irfft(values, count, axis=0) for values in (W, u, p, loads)]
+    lost = max(_around(values, radius) for values in found[:2])
+    if not lost <= SHARE:
+        raise StepFailure(_refusal(f"adds {lost:.1e} of the motion, which grows behind step {steps},", symmetric))
+    compliance, *motion = ((values[:steps].T / scale).T for values in found)
+    motion[0][:, fixed], motion[2][:, free] = given[:, fixed], pulls[:, free]
+    for column in reversed(range(len(kept))):
+        moves, pressed, total = (values[..., column] for values in motion)
+        _check(blocks, moves, pressed, total, symmetric)
+    return compliance, moves, pressed, total
 
 
 def _check(blocks: CompressedBlocks, u: Array, p: Array, forces: Array, symmetric: bool) -> None:
@@ -76,7 +85,34 @@ def _check(blocks: CompressedBlocks, u: Array, p: Array, forces: Array, symmetri
         lost = [np.abs(v - double - mass @ u[k]).max() / max(np.abs(u @ mass.T).max(), np.finfo(float).tiny),
                 np.abs(found - forces[k]).max() / max(np.abs(forces).max(), np.finfo(float).tiny)]
         if not max(lost) <= SHARE:
-            raise StepFailure(
-                f"boundary elements: the circle of frequencies misses the equations of step {k + 1} of {steps} by "
-                f"{max(lost):.1e} of their size, {SHARE:.0e} is the most; assemble with compressed=False, take fewer "
-                "steps" + ("" if symmetric else " or the symmetric form"))
+            what = f"misses the equations of step {k + 1} of {steps} by a share of {max(lost):.1e}"
+            raise StepFailure(_refusal(what, symmetric))
+
+
+def _around(values: Array, radius: float) -> float:
+    """Return what wraps around onto the last of N steps, as a share, if growth from N to 2 N goes on to 3 N."""
+    size = np.abs(values.reshape(len(values), -1)).max(1, initial=0.0) / radius ** np.arange(len(values))
+    near, far = size[: len(values) // 2].max(), size[-1 - len(values) // 16 :].max()
+    return float(radius ** len(values) * (far / near) ** 2) if near else 0.0
+
+
+def _refusal(what: str, symmetric: bool) -> str:
+    """Return the sentence that names the fault and the remedies."""
+    return (f"boundary elements: the circle of frequencies {what}, {SHARE:.0e} is the most; assemble with "
+            "compressed=False, take fewer steps" + ("" if symmetric else " or the symmetric form"))
+
+
+def _check_drift(blocks: CompressedBlocks, steps: int) -> None:
+    """Raise InputError where rounding of the second differences D changes the momentum of a drifting body.
+
+    Behind the last wave the sum of D^j over steps j of a translation vanishes like t^-3; what it has instead is force.
+    """
+    n = len(blocks.mesh)
+    if steps < 4 * max(part.smooth for part in blocks.stretches):
+        return
+    ones = np.zeros((steps, 2 * n))
+    ones[steps // 2 :, :n] = 1.0
+    force = np.abs(blocks.applied(np.zeros((steps, 4 * n)), ones, np.zeros((steps, 4 * n)))[3]).max()
+    if force * steps * blocks.dt**2 > DRIFT * abs(blocks.mesh.area):
+        raise InputError(f"boundary elements: over {steps} steps rounding moves a free body; take fewer steps, hold it "
+                         "or take the unsymmetric form")
