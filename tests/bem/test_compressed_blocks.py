@@ -36,9 +36,9 @@ def with_hole() -> BoundaryMesh:
 
 SHAPES = {
     "square": (lambda: polygon(SQUARE, 0.125), 0.125, 32),
-    "thin slab": (lambda: polygon([(0.0, 0.0), (1.0, 0.0), (1.0, 0.02), (0.0, 0.02)], [5, 1, 5, 1]), 0.1, 50),
+    "thin slab": (lambda: polygon([(0.0, 0.0), (1.0, 0.0), (1.0, 0.02), (0.0, 0.02)], [5, 1, 5, 1]), 0.1, 44),
     "disk": (lambda: circle(0.5, 25), 0.15, 30),
-    "hole": (with_hole, 0.2, 30),
+    "hole": (with_hole, 0.2, 24),
     "outside": (lambda: circle(0.5, 20, exterior=True), 0.15, 30),
 }
 

@@ -86,7 +86,7 @@ class CompressedBlocks:
         shapes, at = ((4, 4), (4, 2), (4, 2), (2, 2)), ((0, 0), (4, 4), (8, 6), (10, 4))
         indices = [np.indices((a * n, b * n)).reshape(2, -1) for a, b in shapes]
         indices[2] = indices[2][::-1]
-        rows, columns = np.hstack([part + n * np.c_[start] for part, start in zip(indices, at, strict=True)])
+        rows, columns = np.hstack([part + n * np.array([start]).T for part, start in zip(indices, at, strict=True)])
         numbers = np.insert(self.places, np.full(8 * n**2, 24 * n**2), self.places[16 * n**2 : 24 * n**2])
         order = np.argsort(numbers, kind="stable")
         return numbers[order], rows[order], columns[order]

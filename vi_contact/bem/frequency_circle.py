@@ -41,7 +41,8 @@ def on_circle(
     scale, circle = radius ** np.arange(steps), radius * np.exp(-2j * np.pi / count * np.arange(count // 2 + 1))
     columns, W = np.zeros((len(free), m + 1), complex), np.empty((len(circle), m, m), complex)
     columns[units, np.arange(m)] = 1.0
-    pulls, kept = np.zeros((steps, len(free), 1 + (m > 0))), np.array([m, m // 2][: 1 + (m > 0)])  # and one unit force, to check
+    kept = np.array([m, m // 2][: 1 + (m > 0)])  # the right-hand side; one unit force, to check
+    pulls = np.zeros((steps, len(free), len(kept)))
     pulls[..., 0], pulls[0, units[m // 2 : m // 2 + 1], 1:] = forces, 1.0
     given = np.zeros_like(pulls)
     if prescribed is not None:
