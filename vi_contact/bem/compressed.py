@@ -111,7 +111,7 @@ def compressed_blocks(
     function of i that returns the pairs (p,) of elements to integrate at time i dt, or None where it has none."""
     counted("boundary elements", f"a circle of {steps} steps", steps, "steps", most=LONGEST)
     asked, steps = steps, AHEAD * steps
-    n, h, stretches, needed, total = len(mesh), float(mesh.lengths.max()), [], [], 0
+    n, h, stretches, needed = len(mesh), float(mesh.lengths.max()), [], []
     entries = np.arange(28 * n**2)
     single, double, hyper = np.split(entries, [16 * n**2, 24 * n**2])
     mirrored = np.concatenate([single.reshape(4 * n, -1).T.ravel(), double, hyper.reshape(2 * n, -1).T.ravel()])
@@ -125,10 +125,10 @@ def compressed_blocks(
     spans = np.minimum([first - first % MULTIPLE, smooth + -smooth % MULTIPLE], steps)
     above = np.stack(np.triu_indices(n))
     windows, group = np.unique(spans[:, above[0], above[1]], axis=1, return_inverse=True)
-    sizes = np.bincount(np.ravel(group)) * 28 * (windows[1] - windows[0])
-    limit = f"{asked} steps of {n} elements"
-    counted("boundary elements", limit, sizes.sum(), "numbers", most=NUMBERS)  # nothing is integrated yet
     tails = {int(end): tail(int(end), steps, dt, speeds, h) for end in np.unique(windows[1])}
+    kept = windows[1] - windows[0] + np.array([len(tails[int(end)][0]) for end in windows[1]])
+    total = 36 * (np.bincount(np.ravel(group)) * kept).sum()  # nothing is allocated yet
+    counted("boundary elements", f"{asked} steps of {n} elements", total, "numbers", most=NUMBERS)
     for number, (begin, end) in enumerate(windows.T):
         (a, b), behind = above[:, np.ravel(group) == number], tails[int(end)]
         parts = single[:, a, :, :, b], double[:, a, :, :, b], double[:, b, :, :, a], hyper[:, a, :, b]
@@ -136,8 +136,6 @@ def compressed_blocks(
         kept = np.append(np.arange(begin, end), behind[0])
         stretches.append(Stretch(int(begin), int(end), *behind, places, np.empty((len(kept), len(places)))))
         needed.append((a, b, np.isin(np.arange(-1, steps + 1), np.add.outer(kept, (-1, 0, 1)))))
-        total += kept.size * places.size
-        counted("boundary elements", limit, total, "numbers", most=NUMBERS)
 
     def among(i: int) -> Mask:
         wanted = np.zeros((n, n), bool)
