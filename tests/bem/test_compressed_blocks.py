@@ -24,6 +24,7 @@ from vi_contact.bem import (
 )
 from vi_contact.core.errors import InputError, StepFailure
 
+pytestmark = pytest.mark.serial
 RHO = 2.5
 
 
