@@ -1,22 +1,32 @@
 #!/usr/bin/env python3
-"""Boundary elements: accuracy and cost against the numbers of elements and steps; boundedness over long times.
+"""Measure accuracy and cost of boundary elements against numbers of elements and steps, and motions over long times.
 
     python3 benchmarks/bem.py [--sides 5 10 20 40] [--steps 60 120 240] [--long] [--thin]
     python3 benchmarks/bem.py --json [--k 40 80] [--n 240 480]
 
-Unit square, c_P = 1, c_S = 1/2, rho = 1, k elements a side, c_P dt = h, symmetric form; one thread; a row is a process
-of its own, seconds are processor time. Errors are relative L2 norms over all nodes and steps: oblique plane pulses of
-duration 2 up to T = 4 without supports; top of a rod between rollers under a step and a sin² load up to T = 6. --steps
-adds rows with k = 10 and other numbers of steps; --long the rod up to T = 60 for c_P dt / h from 0.1 to 4;
---thin a rod of widths down to h/20, the sin² load, with c_P dt = h and h/2 and by Radau IIA, c_P dt = h.
+The body is the unit square with c_P = 1, c_S = 1/2, rho = 1, k elements on a side, c_P dt = h, and the symmetric
+form. Every row is computed by one thread in a process of its own, and its seconds are processor time. Errors are
+relative L2 norms over all nodes and steps. Two problems have exact solutions: oblique plane pulses of duration 2 up
+to T = 4 in a square without supports, and the top of a rod between rollers under a step and under a sin² load up to T
+= 6.
 
---json prints seconds and memory of two ways to keep blocks and to condense: "direct" (dense blocks, a march with all
-columns), "compressed" (tails interpolated, a circle of frequencies). Rows: k, steps, way, assembly_s, condensation_s,
-march_s (the motion of the rod, by the way's own method; left out beyond k = 40), total_s (assembly and condensation),
-peak_mb, blocks_mb, ratio_to_direct (total_s over that of the direct way, measured in the same run at k = 20, 120 steps;
-for larger k over the direct cost that follows from it: assembly like N n², condensation like N² n² (k + 1)),
-error_against_exact (relative L2, rod under the sin² load). growth: exponents of total_s in N at k = 10 between the two
-largest numbers of steps, before (direct) and after (compressed). --k, --n: sizes of the compressed rows.
+--steps adds rows with k = 10 and other numbers of steps. --long computes the rod up to T = 60 for c_P dt / h from 0.1
+to 4. --thin computes a rod of widths down to h/20 under the sin² load, with c_P dt = h and h/2, and by Radau IIA with
+c_P dt = h.
+
+--json prints seconds and memory of two ways to store and to condense the blocks. "direct" stores dense blocks and
+marches with all columns. "compressed" interpolates the tails and uses a circle of frequencies. A row has these keys:
+
+* k, steps, way;
+* assembly_s, condensation_s, and total_s, which is their sum;
+* march_s: the motion of the rod by the method of this way; it is left out beyond k = 40;
+* peak_mb, blocks_mb: memory;
+* ratio_to_direct: total_s over that of the direct way, measured in the same run at k = 20 and 120 steps. For larger k
+  it is over the direct cost that follows from it: assembly grows like N n², condensation like N² n² (k + 1);
+* error_against_exact: relative L2 error of the rod under the sin² load.
+
+growth has the exponents of total_s in N at k = 10 between the two largest numbers of steps, before (direct) and after
+(compressed). --k and --n are the sizes of the compressed rows.
 """
 
 from __future__ import annotations

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""Convolution quadrature against the energetic boundary elements: accuracy and cost on the problems of bem.py.
+"""Compare convolution quadrature with the energetic boundary elements: accuracy and cost on the problems of bem.py.
 
     python3 benchmarks/bem_convolution.py [--sides 10 20] [--methods convolution energetic]
 
-Unit square, k elements a side, c_P dt = h, T = 6, N = 6 k steps, symmetric form; one thread; a row is a process of its
-own, seconds are processor time. Errors as in bem.py. Contact: the pressed square under Tresca's friction (V7.1):
-impulse at t = 4, energy at t = 2, iterations of Uzawa's method with rho = 1/lambda_max(W_0) and a fifth of it (nan: not
-in 2000); W_0: its greatest eigenvalue.
+The body is the unit square with k elements on a side, c_P dt = h, T = 6, N = 6 k steps, and the symmetric form. Every
+row is computed by one thread in a process of its own, and its seconds are processor time. Errors are those of bem.py.
+The contact problem is the pressed square under Tresca's friction. Its columns are the impulse at t = 4, the energy at
+t = 2, and the iterations of Uzawa's method with rho = 1/lambda_max(W_0) and with a fifth of it; nan means more than
+2000. The last column is the greatest eigenvalue of W_0.
 """
 
 from __future__ import annotations

@@ -1,14 +1,16 @@
 #!/usr/bin/env python3
-"""Error of both forms of the Poincaré-Steklov operator: squared energy norm of the error against h, and its slope.
+"""Measure the error of both forms of the Poincaré-Steklov operator: its squared energy norm against h, and the slope.
 
     python3 benchmarks/bem_error_of_forms.py [--levels 5 10 20 40] [--examples square "concrete on steel"]
         [--supports rollers clamped "Tresca 0.05"] [--json FILE] [--figure docs/figures/bem_error_of_forms.png]
 
-The pressed square under a step and the concrete box under its slow load, c_P dt / h fixed, k elements a side, the base
-on rollers, clamped, or in contact with friction; each level against the finest symmetric solution. How errors, slopes
-and the error of the reference are defined: demos/problems/error_of_forms.py. --json FILE: rows with the keys case,
-form, k, error_squared, energy_difference, slope, local_slopes, settled, reference_error, cosine, certificate; rows of
-other cases that the file has stay, and the figure shows all of them.
+The examples are the pressed square under a step and the concrete box under its slow load. c_P dt / h is fixed, and a
+side has k elements. The base is on rollers, clamped, or in contact with friction. Every level is compared with the
+finest symmetric solution. demos/problems/error_of_forms.py defines errors, slopes and the error of the reference.
+
+--json FILE writes rows with the keys case, form, k, finest, error_squared, energy_difference, slope,
+local_slopes, settled, reference_error, cosine and certificate. Rows of other cases that
+the file has already stay, and the figure shows all.
 """
 
 from __future__ import annotations
@@ -44,7 +46,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--levels", type=int, nargs="+", default=[5, 10, 20, 40])
     parser.add_argument("--examples", nargs="+", choices=list(EXAMPLES), default=list(EXAMPLES))
-    parser.add_argument("--supports", nargs="+", default=[], help="of the base: rollers, clamped, or a friction law")
+    parser.add_argument("--supports", nargs="+", default=[], help="base: rollers, clamped, or a friction law")
     parser.add_argument("--json", type=Path)
     parser.add_argument("--figure", type=Path)
     options = parser.parse_args()

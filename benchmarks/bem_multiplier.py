@@ -1,19 +1,26 @@
 #!/usr/bin/env python3
-"""The contact multiplier on its own mesh (H, DT): what the ratio to the mesh (h, dt) of the displacements does.
+"""Measure what the mesh (H, DT) of the contact multiplier does beside the mesh (h, dt) of the displacements.
 
     python3 benchmarks/bem_multiplier.py [--sides 8 16 24] [--finest 32] [--json FILE] [--figure FILE]
 
-Square under the pressure 1, c_P dt = 0.9 h, h = 1/k, without friction and with Tresca's threshold 0.05, until t = 4.
-H/h and DT/dt are 1, 2, 3, 4, 8 in space alone, in time alone and in both; contact is tested at the ends of intervals
-or in the mean; degree: of lambda on a patch; sigma: of the weight of the means.
+A square is under the pressure 1 until t = 4, with c_P dt = 0.9 h and h = 1/k, without friction and with Tresca's
+threshold 0.05. H/h and DT/dt are 1, 2, 3, 4 and 8, in space alone, in time alone and in both. Contact is tested at
+the ends of intervals or in the mean. "degree" is the degree of lambda on a patch, and "sigma" belongs to the weight
+of the means.
 
-inf_sup: constant of the pairing, space times time (demos/problems/inf_sup.py); step: smallest eigenvalue of the normal
-flexibility of one interval per length, over DT/(rho c_P). Beside nodal forces tested at the ends of steps with --finest
-elements a side: oscillation: largest second difference of the error of the contact force (means over intervals), over
-four times the largest force; impulse_error: largest error of the contact impulse, over the largest; energy_error of the
-energy of the body likewise; multiplier_error of the pressure in L2 of space and time, without the ends of the side. t,
-force, finest: histories of the force and of the means of the finest one. uzawa: iterations to 1e-8 without friction,
-rho = 0.4/lambda_max(W[0]); null: more than 2000.
+* inf_sup: the constant of the pairing, space times time (demos/problems/inf_sup.py);
+* step: the smallest eigenvalue of the normal flexibility of one interval per length, over DT/(rho c_P).
+
+The other columns compare with nodal forces that are tested at the ends of steps, on a mesh with --finest elements on
+a side:
+
+* oscillation: the largest second difference of the error of the contact force (means over intervals), over four times
+  the largest force;
+* impulse_error: the largest error of the contact impulse, over the largest impulse;
+* energy_error: the largest error of the energy of the body, over the largest energy;
+* multiplier_error: the error of the pressure in L2 of space and time, without the ends of the side;
+* t, force, finest: histories of the force, and of the means of the finest force;
+* uzawa: iterations to 1e-8 without friction with rho = 0.4/lambda_max(W[0]); null means more than 2000.
 """
 
 from __future__ import annotations
@@ -151,7 +158,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sides", type=int, nargs="*", default=[8, 16, 24])
     parser.add_argument("--finest", type=int, default=32)
-    parser.add_argument("--json", type=Path, help="file for all numbers; one that is there is drawn without a run")
+    parser.add_argument("--json", type=Path, help="file for all numbers; a file that exists is drawn without a run")
     parser.add_argument("--figure", type=Path, help="picture of the errors of the finest of the sides")
     chosen = parser.parse_args()
     if chosen.json and chosen.json.exists():

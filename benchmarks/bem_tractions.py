@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""Contact tractions of boundary elements against finite elements, the pressed square: relative L2 differences.
+"""Compare contact tractions of boundary elements with those of finite elements on the pressed square.
 
     python3 benchmarks/bem_tractions.py [--elements 20 40] [--cells 80 160] [--json FILE]
 
-Unit square, c_P = 1, c_S = 1/2, unit pressure on its top from t = 0 to 5, c_P dt = h for both. Forces on the nodes of
-the finite elements are collected on those of the boundary elements (demos/problems/compare_tractions.py); whole contact
-boundary, its ends included. "0.2 s": means over windows of time; "patches": and over hats 0.1 wide; "early": until
-t = 3, at nodes two elements or more from the ends; "late": the same from t = 3 to 5.
+The unit square has c_P = 1, c_S = 1/2 and a unit pressure on its top from t = 0 to 5; c_P dt = h for both methods.
+Forces on the nodes of the finite elements are collected on those of the boundary elements
+(demos/problems/compare_tractions.py), on the whole contact boundary with its ends. The numbers are relative L2
+differences. "0.2 s" compares means over windows of time, and "patches" compares means over hat functions 0.1 wide
+too. "early" is until t = 3, at nodes two elements or more from the ends. "late" is the same from t = 3 to 5.
 """
 
 from __future__ import annotations
@@ -45,8 +46,8 @@ def row(both: Tractions) -> dict[str, float]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--elements", type=int, nargs="+", default=[20], help="of a side, boundary elements")
-    parser.add_argument("--cells", type=int, nargs="+", default=[80, 160], help="of a side, finite elements")
+    parser.add_argument("--elements", type=int, nargs="+", default=[20], help="numbers of boundary elements on a side")
+    parser.add_argument("--cells", type=int, nargs="+", default=[80, 160], help="numbers of finite elements on a side")
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     material, rows = Square().material, []

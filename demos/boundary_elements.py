@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Solve the examples of Aimi, Di Credico and Gimperlein (2024) by space-time boundary elements, beside finite elements.
 
-A pressed square, concrete on steel, concrete in concrete and a tennis ball on a moving plane. Boundary elements have
-unknowns on the boundary only and share no matrix with the finite elements: what agrees is the mechanics.
+The examples are a pressed square, concrete on steel, concrete in concrete, and a tennis ball on a moving plane.
+Boundary elements have unknowns on the boundary only, and they share no matrix with the finite elements. So the
+agreement of both methods shows that the mechanics agree.
 
     bash demos/run.sh boundary_elements        # three figures and a table, into results/boundary_elements
 

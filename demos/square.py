@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Press a square on a rigid support, without friction, with Tresca's and with Coulomb's: space-time boundary
-elements' first example by finite elements.
+"""Press a square on a rigid support without friction, with Tresca's and with Coulomb's friction, by finite elements.
 
-A pressure of 0.1 acts on the top of the unit square from t = 0 on (c_P = 1, c_S = 1/2). Its wave arrives at the support
-at t = 1 and comes back; the energy grows linearly until then, and friction takes some of it.
+This is the first example of the space-time boundary elements.
+
+A pressure of 0.1 acts on the top of the unit square from t = 0 on (c_P = 1, c_S = 1/2). Its wave arrives at the
+support at t = 1 and comes back; the energy grows linearly until then, and friction takes some of it.
 
     bash demos/run.sh square                # three figures and a table, into results/square
     bash demos/run.sh -n 2 square           # the same on two ranks

@@ -70,7 +70,7 @@ def test_curves_and_outside():
     (lambda: from_segments(SQUARE, [(0, 1), (1, 2), (2, 3)]), "open or branches at point 0"),
     (lambda: from_segments(SQUARE, [(0, 1), (1, 2), (2, 3), (3, 0), (0, 2)]), "branches at point 0"),
     (lambda: BoundaryMesh(np.array([(0, 0), (2, 0), (0, 1), (2, 2.0)])), "cross"),
-    (lambda: BoundaryMesh(np.array([(0, 0), (1, 0.0)])), "three or more"),
+    (lambda: BoundaryMesh(np.array([(0, 0), (1, 0.0)])), "at least 3 points for each loop, and 2 for all"),
     (lambda: BoundaryMesh(np.array([(0, 0), (1, 0), (1, 0), (0, 1.0)])), "no length"),
     (lambda: BoundaryMesh(np.array([(0, 0), (1, 0), (np.nan, 1.0)])), "finite"),
     (lambda: BoundaryMesh(np.array(SQUARE), labels=np.zeros(3, int)), "labels has shape"),

@@ -20,7 +20,7 @@ from vi_contact.bem import (
     PoincareSteklov,
     polygon,
 )
-from vi_contact.bem.contact import BoundaryContact, conditions_on
+from vi_contact.bem.contact import BoundaryContact, Conditions, conditions_on
 from vi_contact.bem.contact_run import ContactRun, march_contact
 from vi_contact.bem.uzawa_space_time import SpaceTimeUzawa
 from vi_contact.core.errors import InputError, StepFailure
@@ -112,6 +112,39 @@ def test_uzawa_in_windows(window):
     found = SpaceTimeUzawa(tolerance=1e-10, window=window).solve(contact)
     assert away(found, run("weak Coulomb")) < 1e-6
     assert len(found.iterations) == -(-30 // window) and found.iterations.sum() == len(found.history)
+
+
+@pytest.mark.parametrize("rho", [1e-6, 1e-300])
+def test_uzawa_does_not_stop_because_its_steps_are_small(rho):
+    """B10: the change to stop at is that of the default rho: with a small one nothing moved, and all was wrong."""
+    with pytest.raises(StepFailure, match="stopped after 50 iterations"):
+        SpaceTimeUzawa(tolerance=1e-3, rho=rho, max_iterations=50).solve(BoundaryContact(condensed()))
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_uzawa_is_certified_in_any_unit(law):
+    """B10: every step within the tolerance, of the largest numbers of the run; loads of 1e-170 N/m too, whose squares
+    are zero."""
+    given = condensed()
+    laws = (LAWS[law], vc.Tresca(0.05e-170) if law == "Tresca" else LAWS[law])
+    contacts = [BoundaryContact(replace(given, u_free=size * given.u_free), friction=one)
+                for size, one in zip((1.0, 1e-170), laws, strict=True)]
+    runs = [SpaceTimeUzawa(tolerance=1e-8).solve(contact) for contact in contacts]
+    assert 0.0 < runs[0].worst < 1e-6 and runs[1].worst < 1e-6 and len(runs[0].certificates) == 30
+    assert runs[1].r_n == pytest.approx(1e-170 * runs[0].r_n, rel=1e-6, abs=1e-178)
+
+
+def test_conditions_and_supports_that_leave_no_contact_are_refused():
+    """Three conditions at a node were answered by two; lengths of zero gave a pressure of NaN; nothing free, an index
+    error."""
+    for nodes, lengths in (([0, 0, 0], [1.0, 1.0, 1.0]), ([0, 1, 2], [1.0, 0.0, 1.0]), ([], [])):
+        with pytest.raises(InputError, match="one condition or more, at most two at a node, and positive lengths"):
+            Conditions(nodes, np.tile([0.0, -1.0], (len(nodes), 1)), lengths)
+    held = replace(condensed(), W=0.0 * condensed().W)
+    with pytest.raises(InputError, match="supports hold all contact nodes|a support holds a contact node"):
+        march_contact(BoundaryContact(held))
+    with pytest.raises(InputError, match="W has no step"):
+        replace(held, W=held.W[:0], u_free=held.u_free[:0])
 
 
 def test_uzawa_fails_in_words():

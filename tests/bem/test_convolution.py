@@ -268,5 +268,5 @@ def test_errors(operators):
             BoundaryProblem(operator, forces, fixed=wrong)
     with pytest.raises(InputError, match="contact .* give a boolean mask"):
         BoundaryProblem(operator, forces, contact=np.array([1, 2]))
-    with pytest.raises(InputError, match="no contact boundary"):
+    with pytest.raises(InputError, match="contact is empty"):
         BoundaryProblem(operator, forces).condensed()

@@ -266,7 +266,7 @@ def test_other_errors(blocks):
         BoundaryProblem(operator, np.zeros((99, 2, 20))).solve()
     with pytest.raises(InputError, match=r"fixed has shape \(20,\)"):
         BoundaryProblem(operator, np.zeros((3, 2, 20)), np.zeros(20, bool))
-    with pytest.raises(InputError, match="no contact boundary"):
+    with pytest.raises(InputError, match="contact is empty"):
         BoundaryProblem(operator, np.zeros((3, 2, 20))).condensed()
     with pytest.raises(InputError, match="mass density"):
         PoincareSteklov(blocks[5], 0.0)

@@ -186,6 +186,13 @@ def test_the_weight():
     assert 1.05 < growth[0] < np.exp(z)
 
 
+def test_a_weight_that_lets_the_means_swing_without_bounds_is_refused():
+    """The resultant was a thousand times that of the load, without a word."""
+    for sigma in (1e3, 1e6):
+        with pytest.raises(InputError, match="the means swing .* times as far in each of 6 intervals; reduce sigma"):
+            own(patch=2, interval=4, testing="mean", sigma=sigma).condensed()
+
+
 def test_inf_sup_constants():
     """B15: with H = h and, for means, DT = dt the constants vanish with the mesh: zig-zags of lambda are not seen. With
     patches of two elements and intervals of two steps they stay, sqrt(3)/2 in time; linear lambda takes four."""
@@ -223,9 +230,9 @@ def test_the_benchmark(tmp_path):
 
 
 def test_bad_input():
-    for wrong, words in (({"patch": 7}, "a side has 6 elements"), ({"interval": 5}, "4 steps are left over"),
-                         ({"sigma": 1.0}, "sigma weighs means"),
-                         ({"sigma": 1e300, "testing": "mean"}, "leaves the ends of steps no weight"),
+    for wrong, words in (({"patch": 7}, "a side has 6 elements"), ({"interval": 5}, "5 does not divide"),
+                         ({"sigma": 1.0}, "sigma is for means"),
+                         ({"sigma": 1e300, "testing": "mean"}, "gives ends of steps no weight"),
                          ({"mesh": polygon(2.0 * np.array(SIDES), 2.0 / K)}, "other nodes than mesh"),
                          ({"mesh": polygon(SIDES, 1.0), "elements": np.ones(4, bool)}, "other nodes than mesh")):
         with pytest.raises(InputError, match=words):

@@ -4,8 +4,7 @@ The body lies to the left of its boundary: outer loops run counter-clockwise, ho
 of the body. `exterior=True` means the unbounded outside of the loops: everything reversed. Element i starts at node i.
 
 Displacements: continuous P1, values (2, n) (component, node). Tractions: discontinuous P1, values (2, n, 2) (component,
-element, end), so that a corner carries two tractions. Flattened in that order they are the unknowns of the matrices.
-"""
+element, end), so that a corner carries two tractions. Flattened in that order they are the unknowns of the matrices."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -30,8 +29,7 @@ class BoundaryMesh:
     points: (n, 2) nodes [m], loop after loop, in the direction that keeps the body on the left.
     loop_sizes: nodes of each loop. labels: (n,) integer of each element, to name parts of the boundary.
     exterior: the body is the unbounded outside. Raises InputError for fewer than three nodes in a loop, elements of no
-    length, a boundary that crosses or touches itself or runs the wrong way round.
-    """
+    length, a boundary that crosses or touches itself or runs the wrong way round."""
 
     points: Array
     loop_sizes: tuple[int, ...] = ()
@@ -43,7 +41,8 @@ class BoundaryMesh:
         counted("BoundaryMesh", "points", len(points), "elements", most=MOST_ELEMENTS)
         sizes = tuple(integers("BoundaryMesh", "loop_sizes", self.loop_sizes, (None,)).tolist()) or (len(points),)
         if min(sizes) < 3 or sum(sizes) != len(points):
-            raise InputError(f"BoundaryMesh: loops of {sizes} nodes, {len(points)} points; a loop has three or more")
+            raise InputError(f"BoundaryMesh: loop_sizes is {sizes}; give at least 3 points for each loop, "
+                             f"and {len(points)} for all loops together")
         flag("BoundaryMesh", "exterior", self.exterior)
         tags = np.zeros(len(points)) if shape_of(self.labels) == (0,) else self.labels
         labels = integers("BoundaryMesh", "labels", tags, (len(points),))
@@ -153,11 +152,10 @@ def polygon(corners: ArrayLike, h: float | Sequence[int], *, exterior: bool = Fa
     """Mesh a polygon; label of an element = number of its side, side i from corner i to corner i + 1.
 
     corners: (m, 2) [m], counter-clockwise (clockwise for an exterior body). h: greatest element length [m], or the
-    number of elements of every side.
-    """
+    number of elements of every side."""
     start = array("polygon", "corners", corners, (None, 2), unit="m")
     if len(start) < 3:
-        raise InputError(f"polygon: {len(start)} corners; give three or more")
+        raise InputError(f"polygon: corners has {len(start)} points; give three or more")
     sides = np.roll(start, -1, axis=0) - start
     if shape_of(h) != ():
         counts = integers("polygon", "the number of elements of a side", h, (len(start),))

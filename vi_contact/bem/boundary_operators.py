@@ -10,8 +10,7 @@ is worse than a logarithm on a closed curve):
                + 2 mu [(v.Mu) dPhi_S/dn_x + (u.Mv) dPhi_S/dn_y]
                + 2 mu [(n_x.v) grad_x(Phi_P - Phi_S).Mu + (n_y.u) grad_y(Phi_P - Phi_S).Mv]      hypersingular
 
-in u/2 = V p - K u and p/2 = K' p - D u. For density rho: V/rho, K, rho D.
-"""
+in u/2 = V p - K u and p/2 = K' p - D u. For density rho: V/rho, K, rho D."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -127,8 +126,7 @@ class Galerkin:
 def double_local(mesh: BoundaryMesh, shear: float, m: NDArray, y: NDArray[np.int64]) -> NDArray:
     """Return (2, 2, p, a, 2): component of K u, component of u, pair, shape function of x, of y on the elements y (p,).
 
-    m: (8, p, a, 2) moments of the stacked kernels of the double layer; shear: c_S².
-    """
+    m: (8, p, a, 2) moments of the stacked kernels of the double layer; shear: c_S²."""
     normal, slopes = mesh.normals[y].T[:, :, None, None], SLOPE / mesh.lengths[y][:, None, None]
     phi, g = m[4].sum(2)[..., None], tensor(m[5:8].sum(3))[..., None]
     by_normal = (m[0:2] * normal).sum(0)

@@ -7,8 +7,7 @@ greatest distance between the elements of an entry, and h the longest, the block
 
 for then the points of the integrals stay where they are (quadrature.py). All steps between are integrated and kept, and
 of the tail those from which the others are interpolated (tails.py); of symmetric matrices, one half. Blocks are kept
-AHEAD times as long as asked for: the circle of frequencies needs them (frequency_circle.py).
-"""
+AHEAD times as long as asked for: the circle of frequencies needs them (frequency_circle.py)."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -50,8 +49,7 @@ class CompressedBlocks:
     """Hold the blocks of density 1, as EnergeticBlocks does, compressed in time.
 
     places: (28 n²,) of each entry of the matrices of a step, one behind the other, among the numbers of all stretches;
-    steps: asked for; reach: kept.
-    """
+    steps: asked for; reach: kept."""
 
     mesh: BoundaryMesh
     c_p: float

@@ -8,8 +8,7 @@ v = N u with the contact direction n and the tangent as rows of N, lam = -Nᵀ r
     0 <= r_n  ⊥  gap - v_n >= 0,    |r_t| <= limit(r_n), along the slip v_t[k] - v_t[k-1]
 
 so that every method for the small problem and the certificate of a step serve here too. Reactions r = (r_n, r_t) are
-those of the body on its support, nodal forces [N/m] held during a step; traction = force / length.
-"""
+those of the body on its support, nodal forces [N/m] held during a step; traction = force / length."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -40,8 +39,7 @@ SUPPORTED = 1e-12  # of the largest flexibility: supported unknowns
 class Conditions:
     """Hold one contact condition per row: the contact node (row of CondensedCompliance), outward normal, length.
 
-    nodes: (c,); normals: (c, 2); lengths: (c,) [m]. A node may have two conditions: the corner of a box in a notch.
-    """
+    nodes: (c,); normals: (c, 2); lengths: (c,) [m]. A node may have two conditions: the corner of a box in a notch."""
 
     nodes: Indices
     normals: Array
@@ -53,6 +51,8 @@ class Conditions:
             raise InputError(f"Conditions: nodes has {nodes.min()}; give numbers of contact nodes from 0 on")
         normals = array("Conditions", "normals", self.normals, (len(nodes), 2))
         lengths = array("Conditions", "lengths", self.lengths, (len(nodes),), unit="m")
+        if not len(nodes) or np.bincount(nodes).max() > 2 or lengths.min() <= 0.0:
+            raise InputError("Conditions: give one condition or more, at most two at a node, and positive lengths")
         for name, value in (("nodes", nodes), ("normals", normals), ("lengths", lengths)):
             object.__setattr__(self, name, value)
 
@@ -60,13 +60,12 @@ class Conditions:
 def conditions_on(mesh: BoundaryMesh, compliance: CondensedCompliance, *sides: ArrayLike) -> Conditions:
     """Return the conditions of several sides, masks of elements (n,): a node of two sides gets one for each.
 
-    Raises InputError for a side with nodes that were not condensed, and for more than two sides at a node.
-    """
+    Raises InputError for a side with nodes that were not condensed, and for more than two sides at a node."""
     owner = "conditions_on"
     instance(owner, "mesh", mesh, BoundaryMesh, "give the BoundaryMesh of the body")
     instance(owner, "compliance", compliance, CondensedCompliance, "give what condensed() returns")
     if not sides:
-        raise InputError(f"{owner}: no side; give masks of elements, one for each side")
+        raise InputError(f"{owner}: no side is given; give masks of elements, one for each side")
     place = np.full(len(mesh), -1)
     place[compliance.nodes] = np.arange(len(compliance.nodes))
     chosen = [np.flatnonzero(mesh.nodes_of(side)) for side in sides]
@@ -88,8 +87,7 @@ class BoundaryContact:
 
     Raises InputError for a contact boundary that turns by more than 30° where the obstacle follows it and no conditions
     are given, for a symmetric compliance W[0] that is not positive definite and any that is singular, supports that
-    hold a contact direction, and bodies that penetrate their obstacle.
-    """
+    hold a contact direction, and bodies that penetrate their obstacle."""
 
     compliance: CondensedCompliance
     obstacle: Obstacle = field(default_factory=Touching)
@@ -211,12 +209,18 @@ class BoundaryContact:
     def p_matrix(self) -> PMatrix:
         """Tell whether the step matrix, W[0] of contact, is one: steps then have one solution, see there."""
         rows = np.arange(self.free.sum()) if self.frictional else self.surface.owned
-        return p_matrix(self.W[0][np.ix_(rows, rows)])
+        found = p_matrix(self.W[0][np.ix_(rows, rows)])
+        if not (self.frictional and self.friction.slope(self.surface.weights).any()):
+            return found
+        return PMatrix(found.holds, found.sentence.replace("the solution is", "for given limits of friction, which "
+                                                           "those of this law are not, the solution is"))
 
     @cached_property
     def matrix(self) -> EffectiveMatrix:
         """Return the matrix A of the step."""
         first = self.W[0]
+        if not first.size:
+            raise InputError("BoundaryContact: supports hold all contact nodes; free some, or leave out contact")
         if not self.symmetric:
             if np.linalg.cond(first) > 1.0 / ASYMMETRIC:
                 raise InputError("BoundaryContact: the compliance of one step is singular; use the symmetric "

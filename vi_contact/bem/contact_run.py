@@ -1,5 +1,6 @@
 """March through contact on a condensed boundary; answer with histories, resultants, works."""
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -7,7 +8,7 @@ import numpy as np
 
 from ..core.algebra import Array, Mask
 from ..core.certificate import Certificate
-from ..core.checks import instance, number
+from ..core.checks import instance, number, optional
 from ..core.errors import StepFailure
 from ..core.step import StepProblem, StepResult
 from ..core.verify import kkt_residual
@@ -17,6 +18,7 @@ from ..solvers.normal.lemke import Lemke
 from .contact import BoundaryContact
 from .poincare_steklov import work
 
+log = logging.getLogger(__name__)
 
 def march_contact(
     contact: BoundaryContact, *, solver: Condensed | None = None, tolerance: float = TOLERANCE
@@ -24,13 +26,14 @@ def march_contact(
     """March through all steps of the compliance; ``solver``: Condensed with any of its methods, by default ActiveSet,
     or Lemke where the compliance is not symmetric.
 
-    Raises StepFailure when a step's certificate exceeds ``tolerance``, with step, time and residuals.
-    """
+    Raises StepFailure when a step's certificate exceeds ``tolerance``, with step, time and residuals."""
     instance("march_contact", "contact", contact, BoundaryContact, "give a BoundaryContact")
-    if solver is not None:
-        instance("march_contact", "solver", solver, Condensed, "give Condensed() with any of its methods, or None")
+    hint = "give Condensed() with any of its methods, or None"
+    optional(instance, "march_contact", "solver", solver, Condensed, hint)
     number("march_contact", "tolerance", tolerance, positive=True)
     default = Condensed() if contact.symmetric else Condensed(Lemke())
+    if not contact.symmetric and not contact.p_matrix.holds:
+        log.warning(f"boundary elements: W[0] {contact.p_matrix.sentence}; other runs may be as right as this one")
     prepared = (solver or default).prepare(contact.matrix, contact.surface, 1.0)
 
     def solved(step: StepProblem) -> StepResult:
@@ -38,7 +41,7 @@ def march_contact(
         certificate = kkt_residual(step, result)
         if not certificate.worst <= tolerance:
             raise StepFailure(f"boundary element step {step.k} at t = {step.t:.6g} s stayed above the certificate "
-                              f"tolerance {tolerance:g} ({certificate}): try another method for the small problem")
+                              f"tolerance {tolerance:g} ({certificate}): try Condensed() with another method")
         return result
 
     return run_steps(contact, solved)
@@ -52,8 +55,7 @@ class ContactRun:
     step, normal and along the tangent; gap: (steps, c) at the ends [m]; slip: (steps, c) in each step [m];
     displacement: (steps, 2m) of the contact nodes at the ends and forces: (steps, 2m) on the body [N/m] in the order of
     CondensedCompliance; active: (steps, c). certificates: of each step; iterations: (steps,) of the method in a step,
-    or one per window of a method for many steps; history: what such a method logs.
-    """
+    or one per window of a method for many steps; history: what such a method logs."""
 
     contact: BoundaryContact
     times: Array

@@ -23,8 +23,7 @@ class ElementPairs:
     same, corner, near, close: boolean masks; shares_end: the common corner is the end of the first element.
 
     Raises InputError for elements that are nearer than a twentieth of the longer one's length, and for corners of two
-    elements so sharp, or of lengths so different, that an end of one is as near to the other.
-    """
+    elements so sharp, or of lengths so different, that an end of one is as near to the other."""
 
     def __init__(self, mesh: BoundaryMesh) -> None:
         instance("boundary elements", "the mesh", mesh, BoundaryMesh, "give a BoundaryMesh, for example polygon(...)")

@@ -10,8 +10,7 @@ A, B, C the operators integrated once, twice, three times and u_l the increment 
     Mᵀ p_k                                      = F_k          unsymmetric
 
 F_k is the nodal force [N/m], the mean over step k. In the symmetric form the work sum_k F_k.u_k is a positive definite
-quadratic form of the history of u: the energy of the body, from boundary data alone.
-"""
+quadratic form of the history of u: the energy of the body, from boundary data alone."""
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -40,8 +39,7 @@ SMALLEST_RATIO, GREATEST_RATIO = 0.05, 8.0  # limits of c_P dt / h
 class EnergeticBlocks:
     """Hold the blocks of density 1; they depend on the mesh, the wave speeds and the time step only.
 
-    single: (steps, 4n, 4n); double: (steps, 4n, 2n); hyper: (steps, 2n, 2n).
-    """
+    single: (steps, 4n, 4n); double: (steps, 4n, 2n); hyper: (steps, 2n, 2n)."""
 
     mesh: BoundaryMesh
     c_p: float
@@ -64,7 +62,7 @@ def check_time_step(mesh: BoundaryMesh, c_p: float, dt: float) -> None:
     if not SMALLEST_RATIO <= ratio <= GREATEST_RATIO:
         what = "enlarge the time step or refine" if ratio < SMALLEST_RATIO else "reduce the time step or coarsen"
         raise InputError(f"boundary elements: c_P dt / h is {ratio:.3g} (h = {mesh.lengths.max():.3g} m, "
-                         f"dt = {dt:.3g} s), good is 0.5 to 2; {what} the mesh")
+                         f"dt = {dt:.3g} s), beyond {SMALLEST_RATIO:g} to {GREATEST_RATIO:g}; {what} the mesh")
 
 
 def energetic_blocks(
@@ -75,8 +73,7 @@ def energetic_blocks(
 
     compressed: whether to keep CompressedBlocks and solve on a circle of frequencies; None does so where dense blocks
     would take 400 MB. threads: how many integrate; answers do not depend on it. Raises InputError for a time step far
-    too small or large for the mesh, and for a body too thin or sharp for it.
-    """
+    too small or large for the mesh, and for a body too thin or sharp for it."""
     owner = "boundary elements"
     check_body(mesh, material, orders)
     steps = whole(owner, "the number of time steps", steps, least=1)
@@ -128,7 +125,7 @@ def marched(
     """
     steps, unknowns, count = forces.shape
     if steps > blocks.steps:
-        raise InputError(f"boundary elements: forces for {steps} steps, but the operator has {blocks.steps}; "
+        raise InputError(f"boundary elements: the forces have {steps} steps and the operator {blocks.steps}; "
                          "assemble it with more steps")
     mass, free = blocks.mesh.mass, ~fixed
     v0 = cho_factor(0.5 * (blocks.single[0] + blocks.single[0].T))

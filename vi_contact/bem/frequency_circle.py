@@ -8,8 +8,7 @@ With û(z) = sum_j z^j u_j for increments u_j, and so on, the march of energetic
 whose coefficients are those of a Fourier transform on |z| = R < 1. With L points step j + L adds R^L to step j, and
 rounding is magnified by R^-N in the last of N: 1e-12 and 1e6 for L = 2 N. Ch. Lubich, Numer. Math. 52 (1988) 413. What
 is added is the motion in steps N to 3 N: it stays small as long as the blocks reach that far, and grows where they are
-cut off at N. Growth from N to 2 N says what wraps around; the equations of the march are asked in two steps.
-"""
+cut off at N. Growth from N to 2 N says what wraps around; the equations of the march are asked in two steps."""
 
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve, solve
@@ -34,7 +33,7 @@ def on_circle(
     side or a unit force misses the equations of the march."""
     steps, m, mass, free = len(forces), len(units), blocks.mesh.mass, ~fixed
     if steps > blocks.steps:
-        raise InputError(f"boundary elements: {steps} steps, blocks for {blocks.steps}; assemble it with more steps")
+        raise InputError(f"boundary elements: blocks of {blocks.steps} steps for {steps}; assemble it with more steps")
     if symmetric and not fixed.any():
         _check_drift(blocks, steps)
     count, radius = 2 * steps, BALANCE ** (1.0 / (3 * steps))
@@ -67,7 +66,7 @@ def on_circle(
     found = [np.fft.irfft(values, count, axis=0) for values in (W, u, p, loads)]
     lost = max(_around(values, radius) for values in found[:2])
     if not lost <= SHARE:
-        raise StepFailure(_refusal(f"adds {lost:.1e} of the motion, which grows behind step {steps},", symmetric))
+        raise StepFailure(_refusal(f"adds {lost:.1e} of the motion, which grows behind step {steps}", symmetric))
     compliance, *motion = ((values[:steps].T / scale).T for values in found)
     motion[0][:, fixed], motion[2][:, free] = given[:, fixed], pulls[:, free]
     for column in reversed(range(len(kept))):
@@ -99,7 +98,7 @@ def _around(values: Array, radius: float) -> float:
 
 def _refusal(what: str, symmetric: bool) -> str:
     """Return the sentence that names the fault and the remedies."""
-    return (f"boundary elements: the circle of frequencies {what}, {SHARE:.0e} is the most; assemble with "
+    return (f"boundary elements: the compressed operator {what}, and {SHARE:.0e} is the limit; assemble with "
             "compressed=False, take fewer steps" + ("" if symmetric else " or the symmetric form"))
 
 
@@ -115,5 +114,5 @@ def _check_drift(blocks: CompressedBlocks, steps: int) -> None:
     ones[steps // 2 :, :n] = 1.0
     force = np.abs(blocks.applied(np.zeros((steps, 4 * n)), ones, np.zeros((steps, 4 * n)))[3]).max()
     if force * steps * blocks.dt**2 > DRIFT * abs(blocks.mesh.area):
-        raise InputError(f"boundary elements: over {steps} steps rounding moves a free body; take fewer steps, hold it "
-                         "or take the unsymmetric form")
+        raise InputError(f"boundary elements: in {steps} steps rounding errors move a free body; take fewer steps, "
+                         "hold the body, or take the unsymmetric form")

@@ -30,8 +30,7 @@ class KernelSet(NamedTuple):
 
     single: (g1, g2) of G (density 1); double: (phi, dphi, ddiff, g1, g2) with phi = Phi_S, dphi = Phi_S'/r, ddiff =
     (Phi_P - Phi_S)'/r, a prime being d/dr; hyper: the same and (inertia_p, inertia_s), inertia_a = s² Phi_a (in time:
-    Phi_a integrated twice less).
-    """
+    Phi_a integrated twice less)."""
 
     single: tuple[NDArray, ...]
     double: tuple[NDArray, ...]
@@ -42,16 +41,15 @@ def check_speeds(kernels: Any) -> None:
     """Raise InputError unless c_p and c_s of kernels are positive and c_p is the larger."""
     attributes(kernels, positive=("c_p", "c_s"))
     if kernels.c_p <= kernels.c_s:
-        raise InputError(f"{type(kernels).__name__}: c_p is {kernels.c_p:g} and c_s is {kernels.c_s:g} m/s; pressure "
-                         "waves are faster than shear waves")
+        raise InputError(f"{type(kernels).__name__}: c_p is {kernels.c_p:g} and c_s is {kernels.c_s:g} m/s; give "
+                         "c_p above c_s: pressure waves are faster than shear waves")
 
 
 @dataclass(frozen=True)
 class TimeKernels:
     """Evaluate kernels at a time t [s]: G integrated once (single layer), twice (double), three times (hypersingular).
 
-    That is what functions constant in time (traction) and linear in time (displacement) need.
-    """
+    That is what functions constant in time (traction) and linear in time (displacement) need."""
 
     t: float
     c_p: float

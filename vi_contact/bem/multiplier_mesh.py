@@ -26,6 +26,8 @@ from ..solvers.normal.lcp import EPS
 from .boundary_mesh import P1_MASS, BoundaryMesh
 from .poincare_steklov import CondensedCompliance
 
+SWING = 1e6  # times: growth of the swing of means over all intervals that is taken
+
 
 @dataclass(frozen=True, eq=False)
 class MultiplierMesh:
@@ -37,8 +39,7 @@ class MultiplierMesh:
     the weight of these [1/s]. The normal of a patch is its mean normal; patches end at corners.
 
     Raises InputError for elements not condensed, sides shorter than a patch, patches that turn by more than 30°, steps
-    left over, a weight without means or one that leaves nothing of them.
-    """
+    left over, a weight without means or one that leaves nothing of them."""
 
     mesh: BoundaryMesh
     elements: Mask
@@ -58,9 +59,9 @@ class MultiplierMesh:
         check_word("testing", self.testing, ("end", "mean"))
         whole(owner, "degree", self.degree, most=1)
         if self.sigma and self.testing == "end":
-            raise InputError(f"{owner}: sigma weighs means, and testing is 'end'; give testing='mean' or sigma=0")
+            raise InputError(f"{owner}: sigma is for means and testing is 'end'; give testing='mean' or sigma=0")
         if 2.0 * self.sigma * self.compliance.dt * EPS > 1.0:  # the weight at the end of a step, 1/(2 sigma dt)
-            raise InputError(f"{owner}: sigma = {self.sigma:g} 1/s leaves the ends of steps no weight; give less")
+            raise InputError(f"{owner}: sigma = {self.sigma:g} 1/s gives ends of steps no weight; reduce sigma")
         nodes, points = self.compliance.nodes, self.mesh.points
         if max(nodes) >= len(points) or max_abs(points[nodes] - self.compliance.points) > 1e-9 * self.mesh.size:
             raise InputError(f"{owner}: compliance has other nodes than mesh; give the mesh it was condensed on")
@@ -73,8 +74,8 @@ class MultiplierMesh:
         if least < np.cos(FEATURE_ANGLE * (1.0 + 1e-9)):
             raise InputError(f"{owner}: patch is {self.patch}, and one turns by {np.degrees(np.arccos(least)):.3g} "
                              "degrees, more than 30, under one mean normal; give fewer elements, or a finer mesh")
-        if steps := len(self.compliance.W) % self.interval:
-            raise InputError(f"{owner}: {steps} steps are left over from intervals of {self.interval}; give a divisor")
+        if (steps := len(self.compliance.W)) % self.interval:
+            raise InputError(f"{owner}: interval {self.interval} does not divide {steps} steps; give a divisor")
 
     def _runs(self) -> list[Indices]:
         """Return the elements of each part of the contact boundary without corners, in the order of the loop."""
@@ -134,9 +135,13 @@ class MultiplierMesh:
         """Return the compliance that BoundaryContact takes: its nodes are the functions psi, its steps the intervals.
 
         ``points`` are centres, so that the gaps of planes are met in the mean. The displacements of a run are those
-        tested, so that its works are not those of the body. For obstacles that move see ``averaged``.
-        """
+        tested, so that its works are not those of the body. For obstacles that move see ``averaged``. Raises InputError
+        for a weight with which the swing of the means grows SWING times."""
         fine, B, q = self.compliance, self.pairing, self.interval
+        growth, intervals = q / (self.weights[0] @ np.arange(q + 1.0)) - 1.0, len(fine.W) // q
+        if growth > SWING ** (1.0 / intervals):
+            raise InputError(f"MultiplierMesh: with sigma = {self.sigma:g} 1/s the means swing {growth:.3g} times as "
+                             f"far in each of {intervals} intervals; reduce sigma, or take testing='end'")
         both = np.kron(np.eye(2), B)
         held = np.cumsum(both.T @ fine.W @ both, axis=0)
         held[q:] = held[q:] - held[:-q]  # by a force during the first interval

@@ -1,8 +1,7 @@
 """Build the Poincaré-Steklov operator of one body, boundary value problems with it, and what contact needs of them.
 
 S maps the history of boundary displacements to nodal forces. Symmetric form S = (K' + 1/2) V⁻¹ (K + 1/2) - D (default:
-its space-time matrix is positive definite), unsymmetric form S = V⁻¹ (K + 1/2) (positivity not guaranteed).
-"""
+its space-time matrix is positive definite), unsymmetric form S = V⁻¹ (K + 1/2) (positivity not guaranteed)."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,13 +10,17 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.algebra import Array, Indices, Mask
+from ..core.algebra import Array, Indices, Mask, max_abs
 from ..core.checks import array, flag, instance, integers, mask, number, optional, provides, shape_of
-from ..core.errors import InputError
+from ..core.errors import InputError, StepFailure
+from ..solvers.normal.lcp import EPS
 from .boundary_mesh import BoundaryMesh
 from .compressed import CompressedBlocks
 from .energetic import EnergeticBlocks, marched, summed
 from .frequency_circle import on_circle
+
+GROWN = 1e-3  # of the motion: what rounding errors may grow to
+MISSED = 0.1  # of the largest force: what motions of the unsymmetric form may miss in the equation that they do not use
 
 
 class BodyOperator(Protocol):
@@ -70,11 +73,29 @@ class PoincareSteklov:
     def motion(self, forces: Array, fixed: Mask, prescribed: Array | None) -> tuple[Array, Array, Array]:
         """Return the motion by one march, or on a circle of frequencies; forces: (steps, 1, 2n)."""
         if isinstance(self.blocks, CompressedBlocks):
-            found = on_circle(self.blocks, fixed, forces[:, 0] / self.rho, prescribed, np.arange(0), self.symmetric)
-            return found[1], self.rho * found[2], self.rho * found[3]
-        given = None if prescribed is None else prescribed[:, :, None]
-        u, p, total = marched(self.blocks, fixed, forces.swapaxes(1, 2) / self.rho, given, symmetric=self.symmetric)
-        return u[:, :, 0], self.rho * p[:, :, 0], self.rho * total[:, :, 0]
+            pulls, nothing = forces[:, 0] / self.rho, np.arange(0)
+            u, p, total = on_circle(self.blocks, fixed, pulls, prescribed, nothing, self.symmetric)[1:]
+        else:
+            given = None if prescribed is None else prescribed[:, :, None]
+            found = marched(self.blocks, fixed, forces.swapaxes(1, 2) / self.rho, given, symmetric=self.symmetric)
+            u, p, total = (values[:, :, 0] for values in found)
+        missed = 0.0 if self.symmetric else max_abs(self._other_equation(u, p) - total[-1]) / (max_abs(total) or 1.0)
+        if not missed <= MISSED:
+            raise StepFailure(f"boundary elements: after {len(u)} steps the motion of the unsymmetric form misses the "
+                              f"other integral equation by {missed:.1e} of the largest force, and {MISSED:g} is the "
+                              "limit; take the symmetric form, fewer steps, another time step, or a finer mesh")
+        return u, self.rho * p, self.rho * total
+
+    def _other_equation(self, u: Array, p: Array) -> Array:
+        """Return (2n,) Mᵀ p_k/2 + sum_l K'^(k-l) p_l - D^(k-l) u_l of the last step: forces, in the symmetric form."""
+        changes, jumps = (np.diff(values, axis=0, prepend=0.0) for values in (u, p))
+        half = 0.5 * self.mesh.mass.T
+        if isinstance(self.blocks, CompressedBlocks):
+            adjoint, hyper = self.blocks.applied(p[::-1], changes[::-1], jumps[::-1])[2:]
+            return np.asarray(half @ p[-1] + adjoint - hyper)
+        double, hyper = (blocks[len(u) - 1 :: -1] for blocks in (self.blocks.double, self.blocks.hyper))
+        past = summed(double.swapaxes(1, 2), jumps[..., None]) - summed(hyper, changes[..., None])
+        return half @ p[-1] + past[:, 0]
 
     def condense(self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: Indices) -> tuple[Array, Array]:
         """Return W and u_free of CondensedCompliance for these unknowns, in one march with 2m + 1 columns, or so."""
@@ -86,7 +107,18 @@ class PoincareSteklov:
         columns[:, :, -1] = forces[:, 0] / self.rho
         given = None if prescribed is None else np.concatenate([0.0 * columns[..., :-1], prescribed[..., None]], axis=2)
         u = marched(self.blocks, fixed, columns, given, symmetric=self.symmetric)[0][:, unknowns]
+        _refuse_growth(u[..., : 0 if self.symmetric else -1])
         return np.ascontiguousarray(u[:, :, :-1]), np.ascontiguousarray(u[:, :, -1])
+
+
+def _refuse_growth(moved: Array) -> None:
+    """Raise StepFailure where motions (steps, n, r) after unit forces in step 0 grow so far that rounding shows."""
+    size = np.abs(moved).max(axis=(1, 2), initial=0.0)
+    if not size.max() * EPS <= GROWN * size[0]:
+        share = size.max() * EPS / size[0]
+        raise StepFailure(f"boundary elements: in {len(size)} steps after unit forces the unsymmetric form lets "
+                          f"rounding errors grow to {share:.1e} of the motion, and {GROWN:.0e} is the limit; take the "
+                          "symmetric form, fewer steps, or another time step")
 
 
 @dataclass(frozen=True)
@@ -94,8 +126,7 @@ class BoundaryMotion:
     """Hold the answer of a boundary value problem.
 
     times: (steps,) ends of the steps [s]; displacement: (steps, 2, n) there [m]; traction: (steps, 2, n, 2) in each
-    step [Pa], at both ends of each element; forces: (steps, 2, n) nodal forces [N/m], reactions included.
-    """
+    step [Pa], at both ends of each element; forces: (steps, 2, n) nodal forces [N/m], reactions included."""
 
     times: Array
     displacement: Array
@@ -122,8 +153,7 @@ class CondensedCompliance:
     a unit nodal force [N/m] during step 0; u_free: (steps, 2m) [m] without contact forces; nodes: (m,) numbers in the
     mesh; points, normals: (m, 2) places [m] and outward unit normals; lengths: (m,) [m] of contact boundary that
     belongs to a node, traction = force / length; dt [s]; turns: (m,) angle [rad] by which the contact boundary turns at
-    a node, None where nobody knows. Rows and columns of supported unknowns are zero.
-    """
+    a node, None where nobody knows. Rows and columns of supported unknowns are zero."""
 
     W: Array
     u_free: Array
@@ -138,6 +168,8 @@ class CondensedCompliance:
         owner = "CondensedCompliance"
         m = len(integers(owner, "nodes", self.nodes, (None,)))
         steps = len(array(owner, "W", self.W, (None, 2 * m, 2 * m), unit="m²/N"))
+        if not steps:
+            raise InputError(f"{owner}: W has no step; give one or more")
         for name, shape in (("u_free", (steps, 2 * m)), ("points", (m, 2)), ("normals", (m, 2)), ("lengths", (m,))):
             array(owner, name, getattr(self, name), shape)
         number(owner, "dt", self.dt, positive=True, unit="s")
@@ -156,8 +188,7 @@ class BoundaryProblem:
     over the steps, or of the shape that the operator asks for (``load_shape``); fixed: (2, n) supported unknowns;
     prescribed: (steps, 2, n) their displacement [m] at the ends of the steps, zero if None; contact: (n,) mask of the
     elements of the contact boundary. Everything else is free of traction. Raises InputError for wrong shapes and what
-    is no mask.
-    """
+    is no mask."""
 
     operator: BodyOperator
     forces: Array
@@ -171,7 +202,7 @@ class BoundaryProblem:
         n, wanted = len(self.operator.mesh), self.operator.load_shape(len(shape_of(self.forces)))
         object.__setattr__(self, "forces", array(owner, "forces", self.forces, wanted, unit="N/m"))
         if not len(self.forces):
-            raise InputError(f"{owner}: forces have no step; give those of one step or more")
+            raise InputError(f"{owner}: forces is empty; give the forces of one step or more")
         for name, shape in (("fixed", (2, n)), ("contact", (n,))):
             optional(mask, owner, name, getattr(self, name), shape)
         optional(array, owner, "prescribed", self.prescribed, (len(self.forces), 2, n), unit="m")
@@ -185,7 +216,7 @@ class BoundaryProblem:
     def contact_nodes(self) -> Indices:
         """Return (m,) numbers of the nodes of the contact boundary."""
         if self.contact is None or not np.any(self.contact):
-            raise InputError("BoundaryProblem: no contact boundary; give `contact`, the mask of its elements")
+            raise InputError("BoundaryProblem: contact is empty; give the mask of the contact elements")
         return np.flatnonzero(self.operator.mesh.nodes_of(self.contact))
 
     def _given(self, contact_forces: ArrayLike | None = None) -> tuple[Array, Mask, Array | None]:

@@ -9,8 +9,7 @@ Elements that face each other at a fraction of their length have peaks of that w
 stretched about the foot of x on the second element, the outer one about the feet of that element's ends, the integral
 over w about the foot of one end on the other element (rules.placed).
 
-Every piece is mapped with w -> w²(3 - 2w), which makes square roots and logarithms at both ends harmless.
-"""
+Every piece is mapped with w -> w²(3 - 2w), which makes square roots and logarithms at both ends harmless."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

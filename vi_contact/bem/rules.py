@@ -55,8 +55,7 @@ def placed(
 
     about: (centre, height), then x = centre + height sinh(v), the rule being one in v, for functions of
     sqrt((x - centre)² + height²) that are singular where it is zero, however near that is: a peak becomes 1/cosh(v).
-    Far from the centre the substitution is an exponential; beside a great height it is linear.
-    """
+    Far from the centre the substitution is an exponential; beside a great height it is linear."""
     x, w = rule
     if about is None:
         return low[:, None] + length[:, None] * x, (scale * length)[:, None] * w

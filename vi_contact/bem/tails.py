@@ -7,8 +7,7 @@ these integrals do not move: what interpolates all f_j(r), 0 < r <= r_max, from 
 
 An interpolative decomposition of a table of the functions chooses the steps (Cheng, Gimbutas, Martinsson, Rokhlin, SIAM
 J. Sci. Comput. 26 (2005) 1389). The rows of w add up to one: static parts are exact. Errors of functions bound those of
-entries through the lengths of the elements.
-"""
+entries through the lengths of the elements."""
 
 import numpy as np
 from scipy.linalg import qr, solve_triangular

@@ -2,20 +2,20 @@
 
     solve     v = v_free + W * lam                      all steps at once
     project   r <- Pr_C(r + rho (v_n - gap, slip)),     Pr_C(w)_n = max(w_n, 0),  Pr_C(w)_t = w_t min(1, F/|w_t|)
-    until     |r_new - r| <= tolerance |r_new|
+    until     |Pr_C(r + rho_1 (v_n - gap, slip)) - r| <= tolerance |r|,   rho_1 = 1/lambda_max(W[0]), whatever rho is
 
 The normal multiplier meets the gap at the end of each step, the tangential one the slip of the step; F is Tresca's
 threshold or Coulomb's limit of the r_n just found. rho = 1/lambda_max(W[0]) by default: that of one step. The operator
 of all steps is not normal, so that changes grow before they shrink, the more the more steps there are, until rounding
-errors win: long runs are cut into windows, one after the other, the past of which is known.
-"""
+errors win: long runs are cut into windows, one after the other, the past of which is known."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
+from scipy.linalg import norm  # of tiny numbers too, whose squares are zero
 
-from ..core.algebra import Array
+from ..core.algebra import Array, max_abs
 from ..core.checks import attributes, instance
 from ..core.errors import InputError, StepFailure
 from ..core.step import StepProblem, StepResult
@@ -25,18 +25,19 @@ from .contact_run import ContactRun, run_steps
 from .energetic import summed
 
 GROWN = 1e12  # change over the first one: diverged
+LOOSE = 10.0  # times the tolerance: certificates of a run, which were up to 1.1 times
 
 
 @dataclass(frozen=True)
 class SpaceTimeUzawa:
     """Solve the whole history at once, or window by window.
 
-    tolerance: relative change of the multiplier to stop at (the source's 1e-n); rho > 0 [N/m²] or
-    None: 1/lambda_max(W[0]); window: steps that are solved at once, all of them if None. The run's ``iterations`` has
-    one entry per window, ``history`` the relative changes.
+    tolerance: relative change of the multiplier to stop at (the source's 1e-n), that of a step of the default rho;
+    rho > 0 [N/m²] or None: 1/lambda_max(W[0]); window: steps that are solved at once, all of them if None. The run's
+    ``iterations`` has one entry per window, ``history`` the relative changes. Its certificates measure each step by the
+    largest forces and motions of the run, which is what this method solves for.
 
-    Raises InputError for rho <= 0, window < 1 and a law that depends on the slip rate.
-    """
+    Raises InputError for rho <= 0, window < 1 and a law that depends on the slip rate."""
 
     tolerance: float = 1e-8
     rho: float | None = None
@@ -48,7 +49,8 @@ class SpaceTimeUzawa:
         attributes(self, positive=("tolerance", *rho), counts=("max_iterations", *window))
 
     def solve(self, contact: BoundaryContact) -> ContactRun:
-        """Solve the problem; StepFailure when ``max_iterations`` do not reach the tolerance."""
+        """Solve the problem; StepFailure when ``max_iterations`` do not reach the tolerance, or certificates are not
+        within LOOSE times the tolerance."""
         instance("SpaceTimeUzawa", "contact", contact, BoundaryContact, "give a BoundaryContact")
         if contact.frictional and contact.friction.at(np.ones(contact.surface.count)) is not contact.friction:
             raise InputError(f"SpaceTimeUzawa: {contact.friction} depends on the slip rate; use march_contact")
@@ -62,21 +64,26 @@ class SpaceTimeUzawa:
             r[window], changes = self._window(problem, np.zeros_like(r[window]))
             history += changes
             counts.append(len(changes))
-        return problem.run(r, np.array(counts), tuple(history))
+        run = problem.run(r, np.array(counts), tuple(history))
+        if not run.worst <= LOOSE * self.tolerance:
+            raise StepFailure(f"{self}: the worst certificate is {run.worst:.1e}, of the run's largest numbers, and "
+                              f"{LOOSE * self.tolerance:.1e} is the limit; take a smaller tolerance, or march_contact")
+        return run
 
     def _window(self, problem: "_SpaceTime", r: Array) -> tuple[Array, list[float]]:
         """Return the multipliers (steps, 2, c) of the window that was entered, and the relative changes on the way."""
-        rho, unit = self.rho or problem.default_rho, float(np.linalg.norm(problem.violation(r)))
+        rho, unit = self.rho or problem.default_rho, float(norm(problem.violation(r).ravel()))
         changes: list[float] = []
         while len(changes) < self.max_iterations:
-            new = problem.projected(r + rho * problem.violation(r))
-            size = float(np.linalg.norm(new))
-            change = float(np.linalg.norm(new - r)) / (size or 1.0)
+            pushed = problem.violation(r)
+            best = problem.projected(r + problem.default_rho * pushed)
+            size = float(norm(best.ravel()))
+            change = float(norm((best - r).ravel())) / (size or 1.0)
             changes.append(change)
-            r = new
             if change <= self.tolerance:
-                return r, changes
-            if not np.isfinite(change) or size > GROWN * unit * rho:
+                return best, changes
+            r = best if rho == problem.default_rho else problem.projected(r + rho * pushed)
+            if not np.isfinite(change) or size > GROWN * unit * problem.default_rho:
                 break
         raise StepFailure(f"{self} stopped after {len(changes)} iterations with a change of {changes[-1]:.1e} at "
                           f"rho = {rho:.3g}: take a fifth of this rho, a window of fewer steps, or march_contact")
@@ -141,4 +148,16 @@ class _SpaceTime:
             x = contact.matrix.factor.solve(step.b + contact.load(r_n, r_t))
             return StepResult(x, r_n, (r_n > 0.0) | contact.bilateral, int(counts.sum()), "space-time Uzawa", r_t)
 
-        return run_steps(contact, solved, iterations=counts, history=history)
+        return self._certified(run_steps(contact, solved, iterations=counts, history=history))
+
+    def _certified(self, run: ContactRun) -> ContactRun:
+        """Return the run with the certificates of its steps measured by its largest numbers."""
+        limit = (self._still + self._slope * np.maximum(run.r_n, 0.0)) * self._rubs
+        motion = max(max_abs(run.displacement), max_abs(self.contact.v_free)) or 1.0
+        gap, slip = run.gap / motion, run.slip / motion  # slips alone are no measure: where all stick, they are errors
+        limit, r_t = (one / (max(max_abs(limit), max_abs(run.r_t)) or 1.0) for one in (limit, run.r_t))
+        parts = (np.where(self.contact.bilateral, 0.0, -gap), np.where(run.active, np.abs(gap), 0.0),
+                 (np.abs(r_t) - limit) * self._rubs, (limit * np.abs(slip) - r_t * slip) * self._rubs)
+        rows = zip(run.certificates, *(part.max(axis=1).clip(0.0).tolist() for part in parts), strict=True)
+        return replace(run, certificates=tuple(
+            replace(one, penetration=a, complementarity=b, cone=c, dissipation=d) for one, a, b, c, d in rows))
