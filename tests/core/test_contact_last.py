@@ -118,7 +118,7 @@ def test_without_it_today_s_factor_serves_and_the_log_says_so_once(
         cold.write_text("a file where the folder should be")
     assert library(SerialComm()) is None and library(SerialComm()) is None
     said = [record.getMessage() for record in caplog.records]
-    assert len(said) == 1 and said[0].startswith("PETSc factorises, without contact unknowns last")
+    assert len(said) == 1 and said[0].startswith("PETSc factorises, because the quicker way needs")
     assert not cold.is_dir() or not list(cold.iterdir())
 
 

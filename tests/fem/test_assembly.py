@@ -44,6 +44,7 @@ def rotations(d: int) -> list:
 
 # Mass and stiffness ---------------------------------------------------------------------------------------------------
 
+@pytest.mark.two_ranks
 @bodies
 def test_rigid_modes_have_no_strain_energy(name):
     """K r = 0 for every translation and rotation, relative to the forces that single entries of K would make."""
@@ -76,6 +77,7 @@ def test_mass_of_rigid_motions(name):
         assert 2.0 * system.kinetic_energy(nodal(system, turn)) == pytest.approx(expected, rel=1e-12)
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("section, thickness", [(PlaneStress(0.2), 0.2), (PlaneStrain(3.0), 3.0), (None, 1.0)])
 def test_thickness_multiplies_all_integrals(section, thickness):
     """M, K, C and loads of a section are its thickness times those of unit thickness; plane strain is the default."""
@@ -120,6 +122,7 @@ def test_uniaxial_bar(section, lengths, simplices):
     assert np.abs(values - points * strain).max() < 1e-12 * np.abs(values).max()
 
 
+@pytest.mark.two_ranks
 def test_two_materials_in_series():
     """Two halves of a bar share the stress; their elongations and masses add. Cells are chosen by position."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 3))
@@ -144,6 +147,7 @@ def test_two_materials_in_series():
 
 # Damping --------------------------------------------------------------------------------------------------------------
 
+@pytest.mark.two_ranks
 def test_rayleigh_damping():
     """C = alpha M + beta K."""
     system = free_body("triangles", damping=Rayleigh(alpha=0.7, beta=2.0e-3))
@@ -152,6 +156,7 @@ def test_rayleigh_damping():
     assert max_over_ranks(COMM, system.C @ x - expected) < 1e-13 * max_over_ranks(COMM, expected)
 
 
+@pytest.mark.two_ranks
 def test_mass_proportional_damping_is_a_force_per_volume():
     """c u' in the equation of motion (eq. 7): C = c/rho M; without damping there is no C at all."""
     system = free_body("hexahedra", damping=MassProportional(c=480.0))

@@ -37,6 +37,7 @@ COARSE: dict[str, Any] = {"lengths": (2.0, 1.5, 1.2), "divisions": (2, 2, 2), "s
 curved = pytest.mark.parametrize("curved", [False, True], ids=["straight", "curved"])
 
 
+@pytest.mark.two_ranks
 def test_the_shares_of_bubbles_on_flat_and_curved_facets() -> None:
     """A/5 for the edges at a vertex, -A/15 for the other; their sum over vertices is ∫ b_k on any facet."""
     corners = np.array([[0.0, 0.0, 0.0], [2.0, 0.3, 0.1], [0.4, 1.0, -0.2]])
@@ -103,6 +104,7 @@ def at_rest(
     return problem, state
 
 
+@pytest.mark.two_ranks
 @curved
 @pytest.mark.parametrize("limit", [2.0 * MU, MU], ids=["sticks", "slides"])
 def test_pressure_and_shear_are_exact_with_friction(curved: bool, limit: float) -> None:
@@ -150,6 +152,7 @@ def test_pressure_and_shear_go_through_two_bodies(curved: bool, limit: float) ->
     assert max_over_ranks(COMM, problem.cartesian(state.u) - exact) < 1e-9 * top
 
 
+@pytest.mark.two_ranks
 def test_a_corner_carries_the_pressure_of_both_faces() -> None:
     """A parallelepiped pressed into a corner of oblique walls by a uniform pressure on all else."""
     lean = np.array([[1.0, 0.3, 0.0], [0.0, 1.0, 0.0], [0.2, 0.1, 1.0]])
@@ -166,6 +169,7 @@ def test_a_corner_carries_the_pressure_of_both_faces() -> None:
     assert np.allclose(state.r_n, P * surface.weights, rtol=1e-8, atol=0.0)
 
 
+@pytest.mark.serial
 def test_turning_everything_changes_nothing() -> None:
     """A block pressed obliquely onto a half-space with friction, and the same turned in space: equal reactions."""
     turn = np.linalg.qr(np.random.default_rng(5).standard_normal((3, 3)))[0]
@@ -183,6 +187,7 @@ def test_turning_everything_changes_nothing() -> None:
     assert np.allclose(*reactions, rtol=0.0, atol=1e-9 * P)
 
 
+@pytest.mark.two_ranks
 def test_moved_supports_move_the_conditions_beside_them() -> None:
     """A side that is moved along the ground takes the free body with it: every condition slips by as much."""
     mesh, tags = fem.build_mesh(mesh_of("tetrahedra", False), COMM)
@@ -245,6 +250,7 @@ def test_a_tied_layer_carries_the_same_along_it_on_any_number_of_ranks() -> None
     assert np.allclose(*found, rtol=0.0, atol=1e-8 * found[1].max())
 
 
+@pytest.mark.serial
 def test_mass_of_rigid_motions_is_kept() -> None:
     """Redistributed mass has the total mass, centre and inertia of the body and none at the contact nodes."""
     problem = thrown_block(COMM)
@@ -308,6 +314,7 @@ def test_a_sphere_of_curved_cells_on_a_plane() -> None:
     assert np.all(errors[1] < 0.8 * errors[0])
 
 
+@pytest.mark.two_ranks
 def test_wrong_uses_are_refused() -> None:
     both = blocks(3, upper=(2, 1, 2), lower=(2, 2, 2), simplices=True)
     mesh, tags = fem.build_mesh(both, COMM)
@@ -316,7 +323,7 @@ def test_wrong_uses_are_refused() -> None:
     with pytest.raises(InputError, match="matched by matching=NodeToNode"):
         fem.contact_pair(system, one, two, matching=fem.DualMortar())
     wall = fem.contact_surface(system, tags["lower_right"])
-    with pytest.raises(InputError, match="is on side 2 of a contact pair and has a condition besides"):
+    with pytest.raises(InputError, match="is on side 2 of a contact pair and of another surface"):
         fem.joined_surfaces(fem.contact_pair(system, one, two), wall)
     joined = fem.joined_surfaces(fem.contact_pair(system, one, two), fem.contact_surface(system, tags["lower_bottom"]))
     assert joined.total == 18

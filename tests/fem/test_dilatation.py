@@ -39,6 +39,7 @@ def deflection(system: Any, state: Any) -> float:
     return float(space.sample(state.u, space.find_nodes(np.array([TIP])), 0.0)[0, 1])
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize(("nu", "integration", "low", "high"), [
     (0.3, "full", 0.94, 0.98), (0.3, "selective", 0.96, 0.99),
     (0.4999, "full", 0.2, 0.4), (0.4999, "selective", 0.96, 0.99),
@@ -50,6 +51,7 @@ def test_cooks_membrane(nu: float, integration: str, low: float, high: float) ->
     assert low < deflection(system, state) / LIMIT[nu] < high
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("nu", [0.3, 0.4999])
 @pytest.mark.parametrize("data", [{}, {"integration": "selective"}, {"degree": 2, "simplices": True}],
                          ids=["Q1", "selective", "P2"])
@@ -120,6 +122,7 @@ def test_section_forces_are_those_of_the_load() -> None:
     assert held["reaction_y_end"] == pytest.approx(-1.0, rel=1e-9)
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize(("name", "data", "message"), [
     ("triangles", {"integration": "selective"}, "take degree=2"),
     ("tetrahedra", {"integration": "selective"}, "take degree=2"),

@@ -146,6 +146,7 @@ def test_where_conditions_meet_the_last_one_counts():
     assert fem.assemble(mesh, CONCRETE, tied=fem.Tied(left, right), bcs=held).space.unknowns == 2 * 5 * 4
 
 
+@pytest.mark.two_ranks
 def test_floating_bodies_and_contact_nodes():
     """One roller leaves a body floating, as Prescribed does; clamped contact nodes are left out."""
     mesh = own_mesh(COMM, "triangle")
@@ -161,6 +162,7 @@ def test_floating_bodies_and_contact_nodes():
     assert surface.total == 5 and surface.everywhere(surface.points)[:, 0].min() > 0.0
 
 
+@pytest.mark.two_ranks
 def test_what_is_refused():
     """One sentence on all ranks for each."""
     mesh, other = own_mesh(COMM, "triangle"), own_mesh(COMM, "triangle")
@@ -181,20 +183,20 @@ def test_what_is_refused():
     assert "bcs[1] is on another space" in said(clamped(V), clamped(scalar))
     assert remedy in said((0, 1)) and remedy in said("clamped")
     nothing = dfem.dirichletbc(np.zeros(2), np.zeros(0, dtype=np.int32), V)
-    assert "bcs[0] holds no unknown on any rank; look how its dofs were located" in said(nothing)
+    assert "bcs[0] prescribes no unknown on any rank; check how its dofs were located" in said(nothing)
     missing = dfem.dirichletbc(np.array([0.0, np.nan]), on(V, at(0, 0.0)), V)
-    assert "bcs[0] contains NaN or infinite values" in said(missing)
+    assert "bcs[0] has NaN or infinite values" in said(missing)
     assert "space is on another mesh; give a space on this one" in said(space=W)
     assert "give a DOLFINx function space, or None" in said(space="P1")
     for wrong in (scalar, make(mesh, ("DG", 0)), V.sub(0)):
         assert "give the Lagrange space of degree 1 or 2 with 2 components" in said(space=wrong)
     base = fem.Facets.where("base", mesh, at(0, 0.0))
     shifted = dfem.dirichletbc(np.array([1e-4, 0.0]), on(V, at(0, 0.0)), V)
-    assert "bcs[0] and what is prescribed on 'base' hold the same at different values" in said(shifted, clamped=base)
+    assert "bcs[0] and what is prescribed on 'base' differ at an unknown of both" in said(shifted, clamped=base)
     fem.assemble(mesh, CONCRETE, bcs=[clamped(V)], clamped=base)
     rates = (np.sin, np.cos, lambda t: -np.sin(t))
     swing = fem.Prescribed(base, *(lambda x, t, f=f: 0.0 * x + 1e-3 * f(t) for f in rates))
-    assert "bcs[0] and what is prescribed on 'base' hold the same at diff" in said(clamped(V), prescribed=swing)
+    assert "bcs[0] and what is prescribed on 'base' differ at an unknown" in said(clamped(V), prescribed=swing)
     fem.assemble(mesh, CONCRETE, bcs=[clamped(V, at(1, 0.0))], prescribed=swing)
     still = fem.Prescribed(base, (1e-4, 0.0))
     fem.assemble(mesh, CONCRETE, bcs=[shifted], prescribed=still)
@@ -216,6 +218,7 @@ def test_lists_that_differ_between_ranks_are_refused():
     )
 
 
+@pytest.mark.two_ranks
 def test_own_forms_beside_own_conditions():
     """The whole problem in the user's own words: V, forms, load and conditions; equal to the usual route."""
     mesh = own_mesh(COMM, "triangle")
@@ -236,6 +239,7 @@ def test_own_forms_beside_own_conditions():
     same(system, fem.assemble(mesh, CONCRETE, clamped=base, loads=fem.BodyForce((0.0, -2e4))))
 
 
+@pytest.mark.two_ranks
 def test_stages_and_functions_beside_them():
     """Supports released after a static stage, stiffness of its stresses, u on the user's own space; a unit square."""
     mesh = dolfinx.mesh.create_unit_square(COMM, 4, 3)

@@ -179,6 +179,7 @@ def test_a_box_in_a_corner_by_enumeration(shape, n):
             assert np.abs(found - u).max() < 1e-9 * np.abs(u).max()
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize(("shape", "n"), [("prism", 2), pytest.param("leaning", 3, marks=serial)])
 def test_a_pit_of_one_body(shape, n):
     """Floor and wall of one body, whose nodes in the bend belong to both: every condition is the relative displacement
@@ -226,6 +227,7 @@ def uniform(mesh: Any, rollers: list[str], tops: list[str], surface_of: Any) -> 
     return problem
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize(("kind", "n"), [("hexahedra", 3), pytest.param("tetrahedra", 3, marks=serial),
                                          pytest.param("tetrahedra", 1, marks=serial), ("triangles", 3)])
 def test_the_pressure_is_uniform_up_to_a_weld(kind, n):
@@ -313,6 +315,7 @@ def half(way: float, two: bool) -> tuple[ContactProblem, Array]:
     return problem, rows[order][rows[order, 2] > -1e-9], np.column_stack([x, u])[points][keep]
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("two", [True, pytest.param(False, marks=serial)], ids=["mortar", "rigid"])
 def test_an_edge_that_ends_in_a_symmetry_plane(two):
     """Curved faces that meet in a curved edge, and half of them: the same conditions and displacements, at nodes of the
@@ -328,6 +331,7 @@ def test_an_edge_that_ends_in_a_symmetry_plane(two):
     assert 4 < np.count_nonzero(rows[:, 8]) < len(rows)
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("two", [True, pytest.param(False, marks=serial)], ids=["mortar", "rigid"])
 def test_an_edge_between_tied_ends(two):
     """A box on a floor beside a wall, of which both ends move alike: one condition for each face of the nodes that are
@@ -489,6 +493,7 @@ def part(side: Facets, name: str, low: float, high: float) -> Facets:
     return Facets(name, side.indices[(x > low) & (x < high)], side.mesh)
 
 
+@pytest.mark.two_ranks
 def test_refused_pairs():
     """Groups of another kind and without facets, sides of one body, facets and pairs that are given twice, sides before
     which there is nothing."""
@@ -502,13 +507,13 @@ def test_refused_pairs():
     cases: dict[str, Any] = {
         "facets1 is the cell group 'upper'; give a boundary group": lambda: pair(tags["upper"], lower),
         "facets2 is 'lower_top'; give a boundary group, such as tags": lambda: pair(upper, "lower_top"),
-        "boundary group 'none' is empty, choose a group that": lambda: pair(upper, part(lower, "none", 9, 9)),
+        "boundary group 'none' is empty: choose a group": lambda: pair(upper, part(lower, "none", 9, 9)),
         "no part of 'upper_left' lies opposite 'upper_bottom', along": lambda: pair(upper, tags["upper_left"]),
         r"'upper_top' lies 1 m behind 'upper_bottom' at \(.*\): the bod": lambda: pair(upper, tags["upper_top"]),
-        r"a facet of both 'hull' and 'lower_top' at \(.*\): it cannot": lambda: pair(
+        r"a facet of both 'hull' and 'lower_top' at \(.*\): a facet cannot": lambda: pair(
             group(tags, ["upper_bottom", "lower_top"]), lower),
         "on several contact surfaces with one contact direction: list every boundary and every pair once, and "
-        "boundaries that continue one another as one group": lambda: joined_surfaces(
+        "join boundaries that continue one another": lambda: joined_surfaces(
             pair(part(upper, "left", 0.0, 0.9), lower), pair(part(upper, "right", 0.9, 1.5), lower)),
         "is on side 1 of one contact pair and on side 2 of another: exchange the sides of one of them, or give it "
         "once if both are the same": lambda: joined_surfaces(pair(upper, lower), pair(lower, upper)),
@@ -525,11 +530,12 @@ def spoilt(corner: tuple[float, float, float], to: tuple[float, float, float]) -
     return lambda x: np.where(np.abs(x - corner).max(axis=1)[:, None] < 1e-9, to, x)
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize(("simplices", "to", "sentence"), [
-    (False, (0.5, 1.0, np.nan), "TwoBlocks has nodes whose coordinates are no numbers"),
+    (False, (0.5, 1.0, np.nan), "TwoBlocks has nodes whose coordinates are not numbers"),
     (False, (0.95, 1.0, 1.15), "1 cell of TwoBlocks has crossing sides, first at"),
-    (False, (0.75, 1.0, 0.9 - 1e-9), "a facet of 'upper_bottom' at .* is a sliver or not convex: no normal can be"),
-    (True, (1e-9, 1.0, 0.6), "a facet of 'upper_bottom' at .* is a sliver or not convex: no normal can be trusted"),
+    (False, (0.75, 1.0, 0.9 - 1e-9), "a facet of 'upper_bottom' at .* is a sliver or not convex: its normal cannot"),
+    (True, (1e-9, 1.0, 0.6), "a facet of 'upper_bottom' at .* is a sliver or not convex: its normal cannot be trusted"),
     (True, (0.5, 0.8, 0.6), r"'lower_top' lies 0\..* m behind 'upper_bottom' at \(.*\): the bodies overlap there, or"),
 ])
 def test_refused_facets_of_a_mesh(simplices, to, sentence):

@@ -114,6 +114,7 @@ def test_von_mises_of_uniform_plane_stress_and_strain(comm: Any, section: Sectio
     assert stress == pytest.approx(exact, rel=1e-12)
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("simplices", [False, True])
 def test_von_mises_in_three_dimensions(comm: Any, simplices: bool) -> None:
     """Pure shear gamma in x, y: √3 G gamma. A pressure has none."""
@@ -125,6 +126,7 @@ def test_von_mises_in_three_dimensions(comm: Any, simplices: bool) -> None:
     assert np.all(von_mises(1e-3 * x) < 1e-9 * RUBBER.E * 1e-3)
 
 
+@pytest.mark.two_ranks
 def test_von_mises_of_bending_is_a_cell_mean(comm: Any) -> None:
     """u = (x y, 0), nu = 0, E = 1, plane stress: sigma_x = y, sigma_xy = x/2, so the mean of √(y² + 3 x²/4)."""
     mesh, _ = block(comm, lengths=(1.0, 1.0), divisions=(1, 2), corner=(0.0, 1.0))
@@ -249,6 +251,7 @@ def test_friction_in_space(comm: Any, shared_tmp: Path) -> None:
     assert not {"slip", "contact_traction_t"} & set(frames(shared_tmp / "wall")[0])
 
 
+@pytest.mark.two_ranks
 def test_acceleration_is_that_of_the_step(comm: Any, shared_tmp: Path) -> None:
     """a = (v_new - v_old)/dt where no impact law changes the velocity."""
     mesh, tags = block(comm, lengths=(1.0, 2.0), divisions=(2, 3))
@@ -259,6 +262,7 @@ def test_acceleration_is_that_of_the_step(comm: Any, shared_tmp: Path) -> None:
     assert np.allclose(after["a"], (after["v"] - before["v"]) / DT, rtol=0.0, atol=1e-9 * np.abs(after["a"]).max())
 
 
+@pytest.mark.two_ranks
 def test_prescribed_motion_is_in_the_fields(comm: Any, shared_tmp: Path) -> None:
     """Nodes that are moved by hand have their displacement, velocity and acceleration in every frame."""
     mesh, tags = block(comm, lengths=(1.0, 2.0), divisions=(2, 3))
@@ -396,6 +400,7 @@ def test_index_is_readable_after_every_frame(comm: Any, shared_tmp: Path, many: 
     assert seen == [1, 1, 2, 2, 3, 3]
 
 
+@pytest.mark.two_ranks
 def test_bad_settings_are_told(comm: Any, shared_tmp: Path) -> None:
     """every < 1, and a system whose unknowns are nowhere."""
     from chain import chain_problem
@@ -410,6 +415,7 @@ def test_bad_settings_are_told(comm: Any, shared_tmp: Path) -> None:
         XDMF().open(problem, shared_tmp, {})
 
 
+@pytest.mark.two_ranks
 def test_turned_is_the_rotation_of_the_mesh(comm: Any) -> None:
     """The angle of the walls above is not zero: their contact frames are turned."""
     assert shaken_wall(comm, angle=0.3).surface.basis is not None

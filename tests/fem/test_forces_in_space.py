@@ -92,6 +92,7 @@ def test_sections_of_a_column_are_those_of_statics(comm: Any, simplices: bool, t
     assert np.ravel(held_up @ axes) == pytest.approx(-six_of(row, "foot"), rel=1e-9, abs=1e-10 * WEIGHT[1] * -1.4)
 
 
+@pytest.mark.two_ranks
 def test_uniform_stress_on_any_plane(comm: Any) -> None:
     """A block of distorted elements under a uniform stress: sigma n A and no moment on planes that are inclined both
     ways, from a rectangle that is larger than the section."""
@@ -129,6 +130,7 @@ def shaken_column(comm: Any) -> tuple[vc.ContactProblem, Any]:
     return linear(system, excitation=vc.Harmonic(3.0, 30.0, direction=(0.6, 0.48, 0.64))), tags
 
 
+@pytest.mark.two_ranks
 def test_sections_carry_inertia(comm: Any) -> None:
     """Of a shaken column with damping: forces on the planes of a layer of tetrahedra and inside it are one polynomial
     of the height, of degree four, as linear accelerations in tetrahedra make it; at the foot they are minus the
@@ -147,6 +149,7 @@ def test_sections_carry_inertia(comm: Any) -> None:
     assert np.abs(found["foot"] * [[1.0], [1.0], [-1.0]] + reactions).max() < 1e-10 * size
 
 
+@pytest.mark.two_ranks
 def test_one_leg_of_two(comm: Any) -> None:
     """The rectangle says which part of a plane is meant; it may not end inside a body, and has a right angle."""
     legs = {name: BlockMesh(lengths=(0.5, 2.0, 0.5), divisions=(1, 3, 1), corner=(x, 0.0, 0.0))
@@ -240,6 +243,7 @@ def force_and_moment(row: Any, name: str) -> Array:
 CENTRE = (0.3, -0.2, 0.4)
 
 
+@pytest.mark.two_ranks
 def test_edges_and_corners_rub_as_their_nodes_do(comm: Any) -> None:
     """Three faces that meet at oblique angles, turned: force and moment are those of the nodal forces, the parts of the
     faces add up, and the summary of a run agrees, whether it knows the nodes or only the places."""
@@ -301,6 +305,7 @@ def test_action_is_reaction_between_faces_that_do_not_match(comm: Any, gap: floa
     assert two == pytest.approx(-one, rel=1e-11)
 
 
+@pytest.mark.two_ranks
 def test_turn_and_settlement_of_a_footing(comm: Any) -> None:
     """A stiff block on springs, level and in any orientation, under its weight, a push and an overturning: forces and
     moments are those of the loads, theta = M/(k I), settlement = N/(k A), e = M/N; vectors turn with the block."""

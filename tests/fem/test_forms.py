@@ -102,6 +102,7 @@ def test_own_isotropic_forms_are_those_of_the_material(comm: Any, name: str, sec
         assert max_over_ranks(comm, vector(ours) - vector(theirs)) < 1e-12 * max_over_ranks(comm, vector(theirs))
 
 
+@pytest.mark.two_ranks
 def test_mass_of_a_material_and_damping_of_ones_own(comm: Any) -> None:
     mesh, given, _, theirs, data = both(comm, "quadrilaterals", "strain")
     same(comm, fem.assemble(mesh, CONCRETE, forms=replace(given, mass=None), **data), theirs)
@@ -126,6 +127,7 @@ def test_outputs_of_own_isotropic_forms_are_those_of_the_material(comm: Any) -> 
     assert numbers[0] == pytest.approx(numbers[1], rel=1e-10, abs=1e-12 * np.abs(numbers[1]).max())
 
 
+@pytest.mark.two_ranks
 def test_viscous_damping_beside_own_forms(comm: Any) -> None:
     mesh, _ = block(comm, **BODIES["triangles"])
     damping, section = KelvinVoigt(3e5, 1e5), PlaneStrain(0.7)
@@ -136,6 +138,7 @@ def test_viscous_damping_beside_own_forms(comm: Any) -> None:
 # Prestress, springs and layers ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.two_ranks
 def test_a_prestressed_string(comm: Any) -> None:
     """A line with one transverse displacement, T u'v' and rho A u v: f1 = sqrt(T / rho A) / 2L, on 16 elements as the
     lattice has it, w² = 6 c²/h² (1 - cos kh)/(2 + cos kh)."""
@@ -154,6 +157,7 @@ def test_a_prestressed_string(comm: Any) -> None:
     assert found == pytest.approx(np.sqrt(c2) / (2.0 * length), rel=5e-3)
 
 
+@pytest.mark.serial
 def test_a_prestressed_beam_in_shear(comm: Any) -> None:
     """nu = 0, sigma_xx = s0 for a start: w² = k² (G + s0)/rho of u_y = sin(pi x/L), on the lattice; sides tied.
 
@@ -182,6 +186,7 @@ def test_a_prestressed_beam_in_shear(comm: Any) -> None:
     assert lowest_frequency(stiffer) == pytest.approx(lattice, rel=1e-9)
 
 
+@pytest.mark.two_ranks
 def test_springs_on_a_side_and_a_measure_of_ones_own(comm: Any) -> None:
     """A Winkler bed k on the base of a rigid-like block: u = -p/k there, and K holds the body."""
     mesh, tags = block(comm, **BODIES["quadrilaterals"])
@@ -267,6 +272,7 @@ def leaning(comm: Any) -> tuple[Any, Any]:
     return vc.ContactProblem(system, surface, mass=ConsistentMass()), push
 
 
+@pytest.mark.two_ranks
 def test_stiffness_that_is_not_symmetric(comm: Any) -> None:
     """Both methods of the volume route and Lemke's agree, statically, certified and partly open, and in dynamics;
     reactions are rows of K u - f; routes that need symmetry say so, as does the log of a run."""
@@ -306,6 +312,7 @@ def test_stiffness_that_is_not_symmetric(comm: Any) -> None:
                 assert 0.0 <= max_over_ranks(comm, volume - condensed) < 1e-8 * max_over_ranks(comm, volume)
 
 
+@pytest.mark.two_ranks
 def test_a_restart_sees_the_sense_of_a_skew_damping(comm: Any) -> None:
     """wᵀCw of a skew C is zero: C, 2 C and -C are three runs, and C is C."""
     mesh, _ = block(comm, **BODIES["triangles"])
@@ -320,6 +327,7 @@ def test_a_restart_sees_the_sense_of_a_skew_damping(comm: Any) -> None:
         assert differences(first, facts(other)) == {"damping": "another damping"}
 
 
+@pytest.mark.serial
 def test_gyroscopic_damping_takes_no_energy(comm: Any) -> None:
     """A block on springs k per volume in a frame that turns with W, C skew: z'' + 2iW z' + (k/rho) z = 0 of z = x + iy,
     so that z = v0 (exp(iat) - exp(ibt)) / (i (a - b)), a, b = -W ± sqrt(W² + k/rho); the midpoint rule has the phases
@@ -356,6 +364,7 @@ def test_gyroscopic_damping_takes_no_energy(comm: Any) -> None:
 # Misuse and outputs that need a material ------------------------------------------------------------------------------
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("wrong, words", [
     ({"stiffness": lambda u: u}, "Forms: stiffness cannot be called with .u, v., too many positional arguments"),
     ({"mass": 2400.0}, "Forms: mass is 2400.0; give a function of u and v"),
@@ -366,6 +375,7 @@ def test_what_is_no_form_is_refused(wrong: dict[str, Any], words: str) -> None:
         Forms(**{"stiffness": lambda u, v: u, **wrong})
 
 
+@pytest.mark.two_ranks
 def test_forms_that_cannot_be_a_body(comm: Any) -> None:
     mesh, _ = block(comm, **BODIES["quadrilaterals"])
     other, _ = block(comm, **BODIES["triangles"])
@@ -374,7 +384,7 @@ def test_forms_that_cannot_be_a_body(comm: Any) -> None:
     for wrong, words in (
         ({"stiffness": lambda u, v: ufl.inner(eps(u), eps(v))}, "stiffness: what it returns .*; return an integral"),
         ({"stiffness": lambda u, v: ufl.inner(u, u) * ufl.inner(u, v) * ufl.dx}, "is not linear in u or in v"),
-        ({"stiffness": lambda u, v: v[0] * ufl.dx}, "stiffness is no form in the trial and test functions"),
+        ({"stiffness": lambda u, v: v[0] * ufl.dx}, "stiffness is not a form in the given trial and test functions"),
         ({"stiffness": lambda u, v: u[5] * v[0] * ufl.dx}, "Forms: stiffness ended in"),
         ({"stiffness": lambda u, v: away * ufl.inner(u, v) * ufl.dx(domain=mesh)}, "stiffness is of another mesh"),
         ({"stiffness": lambda u, v: nan * good.stiffness(u, v)}, "stiffness has NaN or infinite entries"),
@@ -388,7 +398,7 @@ def test_forms_that_cannot_be_a_body(comm: Any) -> None:
             fem.assemble(mesh, forms=replace(good, **wrong))
     for data, words in (
         ({}, "neither a material nor forms"), ({"forms": "mine"}, "forms is 'mine'; give fem.Forms"),
-        ({"forms": good, "damping": MassProportional(1.0)}, "beside forms=…, which have no density"),
+        ({"forms": good, "damping": MassProportional(1.0)}, "needs the density of a material"),
     ):
         with pytest.raises(InputError, match=words):
             fem.assemble(mesh, **data)
@@ -411,6 +421,7 @@ def test_facets_between_ranks_need_ghosts(comm: Any) -> None:
         assert 2.0 * system.strain_energy(u.ravel()) == pytest.approx(6.0, rel=1e-10)
 
 
+@pytest.mark.two_ranks
 def test_von_mises_without_sigma_zz_is_noted(comm: Any) -> None:
     mesh, _ = block(comm, **BODIES["triangles"])
     for section, shape, noted in ((PlaneStrain(), 2, True), (PlaneStrain(), 3, False), (PlaneStress(), 2, False)):
@@ -419,6 +430,7 @@ def test_von_mises_without_sigma_zz_is_noted(comm: Any) -> None:
         assert any("take sigma_zz as zero: give a stress of shape (3, 3)" in one for one in notes) is noted
 
 
+@pytest.mark.two_ranks
 def test_complex_numbers_are_refused(comm: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     mesh, _ = block(comm, **BODIES["bar"])
     monkeypatch.setattr(PETSc, "ScalarType", np.complex128)
@@ -426,6 +438,7 @@ def test_complex_numbers_are_refused(comm: Any, monkeypatch: pytest.MonkeyPatch)
         fem.assemble(mesh, CONCRETE)
 
 
+@pytest.mark.two_ranks
 def test_outputs_that_need_a_material(comm: Any) -> None:
     """Stresses ask for the form of stress; dashpots and free fields for a material, and take it from beside the forms;
     a cut through elements for their density."""
@@ -433,9 +446,9 @@ def test_outputs_that_need_a_material(comm: Any) -> None:
     forms, low = isotropic(mesh, section=PlaneStrain()), {"clamped": tags["bottom"]}
     mute = fem.assemble(mesh, forms=replace(forms, stress=None), **low)
     state = vc.static_equilibrium(linear(mute))
-    with pytest.raises(InputError, match="tell no stress: give fem.Forms"):
+    with pytest.raises(InputError, match="have no stress: give fem.Forms"):
         geometric_stiffness(linear(mute), state)
-    with pytest.raises(InputError, match="tell no stress: give fem.Forms"):
+    with pytest.raises(InputError, match="have no stress: give fem.Forms"):
         fem.as_function(linear(mute), state, "stress")
     side = tags["left"]
     for boundary in (fem.Dashpots(side), soil.FreeField(side, base=())):
@@ -443,7 +456,7 @@ def test_outputs_that_need_a_material(comm: Any) -> None:
             fem.assemble(mesh, forms=forms, dashpots=boundary, **low)
         ours = fem.assemble(mesh, CONCRETE, forms=forms, dashpots=boundary, **low)
         same(comm, ours, fem.assemble(mesh, CONCRETE, dashpots=boundary, **low))
-    with pytest.raises(InputError, match="its column is of materials, and forms=… tell none"):
+    with pytest.raises(InputError, match="its column is of materials, and forms=… have none"):
         fem.assemble(mesh, forms=forms, dashpots=soil.FreeField(side, base=(), material=CONCRETE), **low)
     oblique = fem.SectionForces({"cut": ((0.0, 0.8), (2.0, 0.9))}, gravity=(0.0, -9.80665))
     for data in ({"forms": forms}, {"forms": replace(forms, mass=None)}, {}):
@@ -451,7 +464,7 @@ def test_outputs_that_need_a_material(comm: Any) -> None:
                                                           is None else []), **data, **low)))
         start = vc.static_equilibrium(problem)
         if data and data["forms"].mass is not None:
-            with pytest.raises(InputError, match="forms=… do not tell the mass of their parts"):
+            with pytest.raises(InputError, match="with forms=… the mass of their parts is unknown"):
                 oblique.start(problem, start)
             continue
         weight = CONCRETE.rho * 9.80665 * 2.0 * (1.5 - 0.85)

@@ -99,6 +99,7 @@ def test_tags_and_markers_name_what_gmsh_names(cell):
         assert np.array_equal(first, second), name
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("ghosts", ["none", "shared_facet"])
 def test_parts_and_refinements_of_meshes(ghosts, shared_tmp):
     """A submesh, a refined mesh, one read from XDMF: contact and fields in numbers that start from 0 without gaps."""
@@ -130,6 +131,7 @@ def test_parts_and_refinements_of_meshes(ghosts, shared_tmp):
             assert area.sum() == pytest.approx(2.0 * height, rel=1e-12) and area.min() > 0.9 * area.max()
 
 
+@pytest.mark.two_ranks
 def test_a_model_of_gmsh_as_dolfinx_reads_it():
     """Groups from the tags that DOLFINx's own reader returns."""
     gmsh = pytest.importorskip("gmsh")
@@ -197,6 +199,7 @@ def test_bodies_are_counted_without_ghosts():
         assert space.comm.max(np.max(space.body_of_node, initial=0)) == 1
 
 
+@pytest.mark.two_ranks
 def test_what_is_refused():
     """One sentence on all ranks for each."""
     mesh, other = own_mesh(COMM, "triangle"), own_mesh(COMM, "triangle")

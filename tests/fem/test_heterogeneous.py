@@ -113,6 +113,7 @@ def test_a_bar_of_linear_modulus_against_its_closed_form(comm: Any) -> None:
     assert errors[0] < 2e-3 and 3.8 < errors[0] / errors[1] < 4.2
 
 
+@pytest.mark.two_ranks
 def test_a_column_of_quadrilaterals_under_its_own_weight(comm: Any) -> None:
     """nu = 0, E = E0 (1 + y/H), rho = r (1 + y/H): u_y(H) = -∫ g m(y) / E dy with m the mass above; u is no polynomial.
 
@@ -151,6 +152,7 @@ def compliance(rotation: Any) -> Any:
     return np.einsum("ip,jq,kr,ls,pqrs->ijkl", *[rotation] * 4, s)
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("name, section", [
     ("quadrilaterals", "strain"), ("triangles", "stress"), ("quadrilaterals", "stress"), ("tetrahedra", "solid"),
 ])
@@ -185,6 +187,7 @@ def test_orthotropic_patch_test(comm: Any, name: str, section: str) -> None:
     assert stress == pytest.approx(np.sqrt(1.5 * np.sum(deviator**2)), rel=1e-10)
 
 
+@pytest.mark.two_ranks
 def test_equal_moduli_beside_isotropic_cells_are_isotropic(comm: Any) -> None:
     """Cells of both kinds in one body, with damping: M, K, C of the isotropic material."""
     mesh, tags = block(comm, **BODIES["quadrilaterals"])
@@ -203,6 +206,7 @@ def test_equal_moduli_beside_isotropic_cells_are_isotropic(comm: Any) -> None:
 # Viscous stresses -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.two_ranks
 def test_damping_ratio_of_the_first_mode_of_a_rod(comm: Any) -> None:
     """A rod without lateral strain: xi = ½ w eta/modulus, eta = bulk + 4/3 shear; the mode decays so, from C itself."""
     mesh, tags = block(comm, lengths=(2.0,), divisions=(24,))
@@ -216,6 +220,7 @@ def test_damping_ratio_of_the_first_mode_of_a_rod(comm: Any) -> None:
     assert w == pytest.approx(0.25 * np.pi * np.sqrt(modulus / CONCRETE.rho), rel=5e-4)
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("name", ["triangles", "hexahedra"])
 def test_one_retardation_time_is_rayleigh_damping(comm: Any, name: str) -> None:
     mesh, _ = block(comm, **BODIES[name])
@@ -231,6 +236,7 @@ def test_one_retardation_time_is_rayleigh_damping(comm: Any, name: str) -> None:
 # Quadrature, outputs and bad input ------------------------------------------------------------------------------------
 
 
+@pytest.mark.two_ranks
 def test_quadrature_degree(comm: Any) -> None:
     """Exact from degree 2 on for rectangles (0 is not); facets too: a traction that is linear needs degree 2."""
     mesh, tags = block(comm, **BODIES["quadrilaterals"])
@@ -265,6 +271,7 @@ def test_reactions_of_orthotropic_and_graded_bodies_carry_their_weight(comm: Any
     assert row["reaction_x_base"] == pytest.approx(-3.0, rel=1e-9)
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("wrong, words", [
     ({"E": -1.0}, "Young's modulus E .* is -1.0; give"),
     ({"nu": 0.5}, "Poisson's ratio nu is 0.5; give values between -1 and 0.5"),
@@ -308,7 +315,7 @@ def test_functions_of_no_material_are_refused_with_their_place(comm: Any) -> Non
         Heterogeneous(compat.function(compat.vector_space(mesh)), 0.2, 1e3)
     with pytest.raises(InputError, match="give a LinearElastic, Orthotropic or Heterogeneous"):
         fem.assemble(mesh, "concrete")
-    with pytest.raises(InputError, match="in PlaneStress, where the strain across"):
+    with pytest.raises(InputError, match="does not go with PlaneStress, where the strain across"):
         fem.assemble(mesh, CONCRETE, section=PlaneStress(), damping=KelvinVoigt(1.0))
     assert not isinstance(tags["left"], Cells)
 

@@ -66,6 +66,7 @@ def rotation(problem: ContactProblem, about: Array, axis: Array) -> Array:
     return np.asarray(problem.system.space.restrict(np.cross(axis, arm)[:, : points.shape[1]]))
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("simplices", [False, True], ids=["tensor", "simplices"])
 def test_rigid_rotation_lowers_the_centre_of_mass(simplices, d):
@@ -88,6 +89,7 @@ def test_rigid_rotation_lowers_the_centre_of_mass(simplices, d):
     assert system.algebra.dot(u, K_G @ v) == pytest.approx(system.algebra.dot(v, K_G @ u), rel=1e-9)
 
 
+@pytest.mark.two_ranks
 def test_tilted_block_restores_itself_less_and_less():
     """The moment that turns a block back about its corner is W (b - h_c theta); without K_G it stays W b."""
     problem = standing(material=COLUMN, lengths=(1.0, 4.0), divisions=(3, 8))
@@ -128,6 +130,7 @@ def buckling_load(divisions: tuple[int, int]) -> float:
     return 1.0 / float(scipy.linalg.eigh(-K_G, K, eigvals_only=True)[-1])
 
 
+@pytest.mark.two_ranks
 def test_euler_column():
     """P = pi² E I / 4 L² of the cantilever, with Engesser's shear term P / (1 + P / kGA), k = 5/6 (Timoshenko and Gere,
     Theory of Elastic Stability, sect. 2.17): plane Q1 elements (nu = 0) reach it from above with h², 3 % on 4 x 40."""
@@ -168,6 +171,7 @@ def test_held_sides_keep_the_unknowns():
     assert second.C is None and second.M is system.M
 
 
+@pytest.mark.two_ranks
 def test_warming_of_a_held_block_is_a_pressure():
     """Nothing moves, sigma = -E alpha dT s(t) along x: uᵀ K_G u of u = (0, x) is that times the area."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 3))

@@ -152,6 +152,7 @@ def corner_run(angle: float, **how: Any) -> tuple[ContactSurface, Array, Array]:
     return surface, np.array(r_n), np.array(active)
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("scheme", [None, Midpoint()], ids=["default", "midpoint"])
 def test_a_block_thrown_into_a_corner(scheme):
     """Gravity, speed and friction: every step certified, both conditions of the corner node active in some steps."""
@@ -161,6 +162,7 @@ def test_a_block_thrown_into_a_corner(scheme):
     assert np.any(active[:, corner].all(axis=1)) and not active.all()
 
 
+@pytest.mark.two_ranks
 def test_a_turned_corner_is_the_same():
     """With consistent mass; redistributed mass depends on the axes (0.1 to 3 % of the forces here)."""
     _, r_n, active = corner_run(0.0, scheme=Midpoint())
@@ -169,6 +171,7 @@ def test_a_turned_corner_is_the_same():
     assert np.abs(turned_r_n - r_n).max() < 1e-8 * r_n.max()
 
 
+@pytest.mark.two_ranks
 def test_what_surfaces_know_is_kept():
     """Gaps, springs, bilateral points, motions, each in its place; joined surfaces may be joined again."""
     mesh = blocks(2, gap=0.125)
@@ -205,6 +208,7 @@ def test_redistributed_mass_at_corners():
         assert momentum == pytest.approx(np.array([[1800.0, 0.0, 0.0]] * 2), abs=1e-9 * 1800.0)
 
 
+@pytest.mark.two_ranks
 def test_sliding_obstacles_at_corners():
     """A floor that slides along the edge and across: corner nodes feel the part along the edge."""
     system, tags = two_blocks(COMM, blocks(3, angle=0.0))
@@ -225,6 +229,7 @@ def test_sliding_obstacles_at_corners():
 
 # Refusals -------------------------------------------------------------------------------------------------------------
 
+@pytest.mark.two_ranks
 def test_refusals():
     mesh = blocks(2)
     system, tags = two_blocks(COMM, mesh)
@@ -241,11 +246,11 @@ def test_refusals():
     for surfaces, sentence in (
         ((pair, pair), r"contact node \(0, 1\) is on several contact surfaces with one contact direction: list every"),
         ((wall, wall), "list every boundary and every pair once"),
-        ((pair, nearly), r"contact node \(0, 1\) has 2 contact directions, not independent in its 2 dimensions: take"),
-        ((pair, wall, slope), r"contact node \(0, 1\) has 3 contact directions, more than its 2 dimensions: take"),
-        ((pair, contact_surface(other, names["lower_bottom"])), "joined_surfaces needs surfaces of .* of one system"),
-        ((), "joined_surfaces needs surfaces of"),
-        ((pair, empty_surface(system.space.comm, 2)), "joined_surfaces needs surfaces of"),
+        ((pair, nearly), r"contact node \(0, 1\) has 2 contact directions, not independent in its 2 dimensions: treat"),
+        ((pair, wall, slope), r"contact node \(0, 1\) has 3 contact directions, more than its 2 dimensions: treat"),
+        ((pair, contact_surface(other, names["lower_bottom"])), "joined_surfaces: give surfaces of .* of one system"),
+        ((), "joined_surfaces: give surfaces of"),
+        ((pair, empty_surface(system.space.comm, 2)), "joined_surfaces: give surfaces of"),
     ):
         with pytest.raises(InputError, match=sentence):
             joined_surfaces(*surfaces)

@@ -58,5 +58,5 @@ def test_what_it_refuses(comm):
     zero = vc.State(0.0, 0, problem.system.u0, problem.system.v0, np.zeros(0), np.zeros(0, dtype=bool))
     with pytest.raises(InputError, match="on a line has no shear strain"):
         fem.LargestStrain().start(problem, zero)
-    with pytest.raises(InputError, match="run it from the start"):
+    with pytest.raises(InputError, match="run from the start"):
         fem.LargestStrain().start(problem, zero, {"largest_shear_strain": 1e-3})

@@ -231,7 +231,7 @@ REFUSED = {
         msh(SQUARE | {5: (-1, 2, 0)}, [*TWO_TRIANGLES, (TRIANGLE, 1, 1, (1, 3, 5))]),
         "a neighbour on the same side of a common facet",
     ),
-    "no number": (msh({**SQUARE, 2: ("nan", 0, 0)}, TWO_TRIANGLES), "coordinates are no numbers"),
+    "no number": (msh({**SQUARE, 2: ("nan", 0, 0)}, TWO_TRIANGLES), "coordinates are not numbers"),
     "boundary beside the body": (
         msh(SQUARE | {5: (3, 0, 0)}, [*TWO_TRIANGLES, *BASE, (LINE, 2, 1, (2, 5))], NAMES),
         "has 1 facet that is no side of a cell",

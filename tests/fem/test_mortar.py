@@ -71,6 +71,7 @@ def matched(system: Any, one: Any, two: Any) -> Any:
 
 # The matrix P ---------------------------------------------------------------------------------------------------------
 
+@pytest.mark.two_ranks
 @shapes
 @pytest.mark.parametrize("swapped", [False, pytest.param(True, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("angle", [0.0, 0.4])
@@ -87,6 +88,7 @@ def test_linear_fields_and_uniform_pressure(angle, swapped, simplices):
     assert found.P.T @ found.weights == pytest.approx(nodes2.weights, rel=1e-12)
 
 
+@pytest.mark.two_ranks
 def test_matching_sides_are_the_special_case():
     """On sides that are meshed alike P is the identity: node to node."""
     block = BlockMesh(lengths=(1.5, 1.0), divisions=(4, 3), deform=uneven)
@@ -129,6 +131,7 @@ def rings(gap: float) -> Blocks:
     return Blocks({"inner": ring(1.0, 16), "outer": ring(2.0 + gap, 23)})
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("gap", [0.0, 0.1])
 def test_curved_sides(gap):
     """Polygons of one curve: gaps within the height of the arcs above their chords, radius (1 - cos of half the
@@ -208,6 +211,7 @@ routes = pytest.mark.parametrize(("scheme", "mass"), ROUTES, ids=["midpoint", "t
 frictions = pytest.mark.parametrize("friction", [None, Coulomb(0.3)], ids=["smooth", "rough"])
 
 
+@pytest.mark.two_ranks
 @frictions
 @routes
 def test_what_one_body_gains_the_other_loses(scheme, mass, friction):
@@ -248,6 +252,7 @@ def test_condensed_and_volume_agree(scheme, mass):
 
 # Refusals -------------------------------------------------------------------------------------------------------------
 
+@pytest.mark.two_ranks
 def test_refusals():
     system, tags = two_blocks(COMM, unlike())
     for one, two, sentence in (

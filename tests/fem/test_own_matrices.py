@@ -106,7 +106,7 @@ def test_corner_of_two_oblique_walls():
     surface = vc.contact_points(system, [0, 0], way)
     state = vc.static_equilibrium(vc.ContactProblem(system, surface))
     assert state.r_n == pytest.approx(np.linalg.solve(way.T, force), rel=1e-12)
-    with pytest.raises(InputError, match="several contact directions, and how they rub"):
+    with pytest.raises(InputError, match="several contact directions, and friction on two faces"):
         vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3))
 
 
@@ -191,7 +191,7 @@ def test_matrices_that_are_not_symmetric(name):
     problem = vc.ContactProblem(system, vc.contact_points(system, [0], [1.0, 0.0]), mass=vc.ConsistentMass())
     rubbing = replace(problem, friction=vc.Coulomb(0.1))
     for one, solver in ((problem, vc.Condensed()), (rubbing, vc.Condensed(Lemke(), NSGS()))):
-        with pytest.raises(InputError, match=r"Condensed needs symmetric .*Condensed\(Lemke\(\)\) or solver=Volume"):
+        with pytest.raises(InputError, match=r"Condensed needs symmetric .*Condensed\(Lemke\(\)\), or Volume"):
             marched(one, steps=1, scheme=vc.MoreauJean(theta=1.0), dt=dt, solver=solver)
     A = np.diag([1.0, 2.0]) + dt * skew["C"] + dt**2 * skew["K"]
     for solver in (vc.Volume(), vc.Condensed(Lemke())):
@@ -274,13 +274,13 @@ def test_mass_of_rotations():
     """Redistributed mass has no place for rotations; rotations without mass only beside contact nodes without any."""
     system = beam()
     problem = vc.ContactProblem(system, vc.contact_points(system, [6], [0.0, -1.0]))
-    with pytest.raises(InputError, match=r"no place for the inertia of rotations.*mass=ConsistentMass\(\)"):
+    with pytest.raises(InputError, match=r"has the inertia of rotations.*mass=ConsistentMass\(\)"):
         marched(problem, dt=1e-3)
     lumped = beam(M=np.tile([1.0, 1.0, 0.0], 7))
     assert lumped.massless.sum() == 6
     for scheme in (vc.MoreauJean(), vc.Trapezoidal()):
         problem = vc.ContactProblem(lumped, vc.contact_points(lumped, [6], [0.0, -1.0]), mass=vc.ConsistentMass())
-        with pytest.raises(InputError, match="rows of M are zero and contact nodes have mass: condense"):
+        with pytest.raises(InputError, match="rows of M are zero while contact nodes have mass: condense"):
             marched(problem, scheme=scheme, dt=1e-3)
 
 
@@ -343,7 +343,7 @@ def test_frames_for_paraview(tmp_path):
         assert np.array_equal(frame["u"][:], u) and frame["v"].shape == frame["a"].shape == (7, 3)
         assert frame["contact_pressure"][6] == found.state.r_n[0] / 0.01 and not frame["contact_pressure"][:6].any()
         assert frame["contact_status"][:6].tolist() == [0] * 6 and frame["contact_status"][6] in (1, 2, 3)
-    with pytest.raises(InputError, match="or of points: there is nothing to deform"):
+    with pytest.raises(InputError, match="has bars or points only"):
         plots.plot_deformed(vc.read_run(tmp_path), tmp_path / "deformed.png")
 
 
@@ -380,12 +380,12 @@ def test_bad_matrices(given, said):
 
 @pytest.mark.parametrize(("given", "said"), [
     ({"nodes": []}, "nodes is empty"),
-    ({"nodes": [7]}, "nodes has node 7, which the system has not"),
+    ({"nodes": [7]}, "nodes has node 7, which the system does not have"),
     ({"nodes": [0.5]}, "give whole numbers"),
     ({"normals": [0.0, 0.0]}, "the normal of node 6 is zero"),
     ({"normals": [1.0, 0.0, 0.0]}, r"normals has shape \(3,\)"),
     ({"gap0": -1e-3}, "penetrates its obstacle by 0.001 m"),
-    ({"obstacle": vc.Touching(), "gap0": 0.1}, "an obstacle says its own gaps"),
+    ({"obstacle": vc.Touching(), "gap0": 0.1}, "the obstacle gives the gaps"),
     ({"obstacle": vc.HalfSpace((0.0, -1.0), (0.0, -1.0))}, "points into the body"),
     ({"opposite": [6]}, "side 1 of one contact pair and on side 2"),
     ({"nodes": [0]}, "is also prescribed along its contact direction"),
@@ -398,5 +398,5 @@ def test_bad_contact(given, said):
 
 def test_contact_needs_nodes():
     system = beam().changed(space=SimpleNamespace(dimension=2, ids=np.arange(18)))
-    with pytest.raises(InputError, match="contact_points needs a system of own matrices"):
+    with pytest.raises(InputError, match="contact_points is for systems of own matrices"):
         vc.contact_points(system, [2], [1.0])

@@ -50,6 +50,7 @@ def same(one: Any, two: Any, rel: float) -> bool:
     return all(np.abs(a - b).max() <= rel * np.abs(a).max() for a, b in zip(one, two, strict=True))
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("scheme", [vc.Trapezoidal(), vc.MoreauJean()])
 @pytest.mark.parametrize("d", [2, 3])
 def test_exported_matrices_march_as_the_system_they_are_of(d, scheme):
@@ -73,6 +74,7 @@ def test_exported_matrices_march_as_the_system_they_are_of(d, scheme):
         assert same(wanted, history(problem, body.space.find_nodes(points), scheme=scheme), 1e-12)
 
 
+@pytest.mark.two_ranks
 def test_other_matrices_on_the_unknowns_of_a_body():
     """A matrix of all components, reduced to the free ones, takes the place of K: surfaces fit, no factor is old."""
     mesh, tags = fem.build_mesh(meshes.BlockMesh(lengths=(2.0, 1.0), divisions=(4, 2)), COMM)
@@ -173,6 +175,7 @@ def test_stiffness_that_is_not_symmetric_on_ranks():
     assert all(same(runs[0], other, 1e-9) for other in runs[1:])
 
 
+@pytest.mark.two_ranks
 def test_function_space_in_place_of_coordinates():
     """Nodes of any degree: the block of a space is a node. Numbers are found by points."""
     system, _ = block(2)
@@ -183,6 +186,7 @@ def test_function_space_in_place_of_coordinates():
     assert surface.everywhere(surface.points) == pytest.approx(np.array([[2.0, 0.0]]))
 
 
+@pytest.mark.two_ranks
 def test_bad_matrices():
     """One sentence, on all ranks, before any work."""
     system, _ = block(2)

@@ -75,6 +75,7 @@ def pressed_down(x: Array) -> Array:
     return x * strain
 
 
+@pytest.mark.two_ranks
 @shapes
 @curved
 def test_a_uniform_pressure_is_exact_at_every_node_of_a_rigid_support(name: str, curved: bool) -> None:
@@ -123,6 +124,7 @@ def test_a_uniform_pressure_goes_through_the_nodes_between_two_bodies(name: str,
     assert np.allclose(problem.cartesian(state.u), exact, rtol=0.0, atol=1e-10 * 2.0 * PRESSURE / SOFT.E)
 
 
+@pytest.mark.two_ranks
 def test_conditions_that_do_not_serve_are_refused() -> None:
     both = blocks(2)
     mesh, tags = build_mesh(both, COMM)
@@ -142,6 +144,7 @@ def bent_interface(x: Array) -> Array:
     return np.column_stack([x[:, 0], x[:, 1] + wave * (1.0 - np.abs(x[:, 1] - 1.0)), x[:, 2:]])
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("name", PAIRS)
 def test_an_even_pressure_from_all_sides_goes_through_a_curved_interface(name: str) -> None:
     """Reactions are p times the length of ∫ n phi_i, the strain is the same all over both bodies; r_n over the weight

@@ -79,6 +79,7 @@ def test_fields_have_all_nodes_in_the_order_of_vtk(name: str, curved: bool, shar
     assert read_frames(shared_tmp / "run").cells.shape[1] == len(vertices)
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("name", ["triangles", "hexahedra"])
 def test_functions_and_pressure(name: str) -> None:
     """The stress of a quadratic displacement is projected exactly (cells with straight sides), the contact pressure is
@@ -117,7 +118,7 @@ def test_reactions_and_sections_balance_the_loads() -> None:
     assert cut["N_a"] == pytest.approx(-2.4e4 * 0.5 * 2.5, rel=1e-9)
     assert abs(cut["V_a"]) == pytest.approx(3.0e3 * 2.5, rel=1e-9)
     assert abs(cut["M_a"]) == pytest.approx(0.5 * 3.0e3 * 2.5**2, rel=1e-9)
-    with pytest.raises(InputError, match="section 'a' goes through cells of degree 2"):
+    with pytest.raises(InputError, match="section 'a' cuts cells of degree 2"):
         fem.SectionForces({"a": ((0.0, 1.6), (0.5, 1.6))}, loads=loads).start(problem, state)
 
 
@@ -177,6 +178,7 @@ def test_mass_of_contact_nodes_is_handed_on(curved: bool) -> None:
     assert np.abs(moved.M @ bottom).max(initial=0.0) <= 1e-9 * np.abs(system.M @ x).max(initial=1.0)
 
 
+@pytest.mark.two_ranks
 def test_tied_sides_and_dashpots() -> None:
     """A layer with tied sides in shear moves as a column does; dashpots resist a motion of the whole side by the
     impedance times its length."""
@@ -193,15 +195,17 @@ def test_tied_sides_and_dashpots() -> None:
     assert resists == pytest.approx([2.0 * CONCRETE.rho * c for c in (CONCRETE.c_p, CONCRETE.c_s)], rel=1e-12)
 
 
+@pytest.mark.two_ranks
 def test_what_knows_first_order_only_says_so() -> None:
     mesh, tags = block(COMM, lengths=(2.0, 1.5), divisions=(3, 3))
     side = FreeField(tags["left"], base=vc.Harmonic(1.0, 2.0, direction=(1.0, 0.0)))
-    with pytest.raises(InputError, match="FreeField has a column of first-order elements: give assemble degree=1"):
+    with pytest.raises(InputError, match="FreeField has a soil column of first order: give assemble degree=1"):
         fem.assemble(mesh, CONCRETE, degree=2, clamped=tags["bottom"], dashpots=side)
     with pytest.raises(InputError, match="a mesh of second order cannot be cut or welded"):
         fem.build_mesh(CutOpen(mesh_of("triangles", curved=True), "bottom"), COMM)
 
 
+@pytest.mark.two_ranks
 @curved
 def test_reactions_hold_what_contact_does_to_held_edges(curved: bool) -> None:
     """A block clamped beside its contact: loads, contact, friction and reactions are in balance, at rest and in steps,
@@ -248,6 +252,7 @@ def test_reactions_of_both_sides_of_a_pair(degree: int) -> None:
         assert above["reaction_y_upper"] == pytest.approx(total - pressed, rel=1e-9)
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("points", [None, [(1.0, 0.0, 0.6), (2.0, 0.0, 1.2)]], ids=["all", "listed"])
 def test_the_pressure_of_tetrahedra_has_the_contact_force(points: Any) -> None:
     """∫ p = sum r_n, also where contact facets have vertices without a condition, clamped or not listed."""

@@ -33,6 +33,7 @@ def test_initial_values():
     assert np.array_equal(field(system, system.v0)[1][~clamped], np.tile([3.0, -4.0], ((~clamped).sum(), 1)))
 
 
+@pytest.mark.two_ranks
 def test_rollers_hold_one_component():
     """A roller keeps one component at zero and leaves the others free, in number and in the solution."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0, 1.0), divisions=(2, 2, 2))
@@ -45,6 +46,7 @@ def test_rollers_hold_one_component():
     assert np.all(values[left & ~bottom][:, 1:] != 0.0) and np.all(values[bottom & ~left][:, 0] != 0.0)
 
 
+@pytest.mark.two_ranks
 def test_where_conditions_meet_the_later_one_counts():
     """Corner nodes of two prescribed sides."""
     mesh, tags = block(COMM, lengths=(1.0, 1.0), divisions=(2, 2))
@@ -82,6 +84,7 @@ def moving_base(mesh, tags, damping=None, material=CONCRETE) -> SemiDiscreteSyst
     return assemble(mesh, material, prescribed=Prescribed(tags["bottom"], *motions), damping=damping)
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("damping", [None, Rayleigh(alpha=0.0, beta=1e-3)])
 def test_moving_base_is_the_body_force_of_the_relative_frame(damping):
     """With u = r U(t) + w the pull of the moving base is K r U + C r U' minus the inertia of the whole body, rho U''
@@ -119,6 +122,7 @@ def test_moving_base_and_relative_frame_converge_to_one_motion():
     assert np.log2(differences[1] / differences[2]) == pytest.approx(2.0, abs=0.1)
 
 
+@pytest.mark.two_ranks
 def test_inertia_load_of_an_excitation_is_the_body_force_of_the_relative_frame():
     """The inertia load of an excitation counts the mass that elements share with the base: -rho U'' per volume, to
     round-off. Without that mass, as in the reference of V4.1, h/6 of the height is missing: an effect of h²."""

@@ -44,6 +44,7 @@ def ring(n: int, *, simplices: bool = False) -> tuple[Any, Any]:
 
 # Nodes, weights, normals ----------------------------------------------------------------------------------------------
 
+@pytest.mark.two_ranks
 @bodies
 def test_weights_and_normals_of_a_flat_side(name):
     """Weights sum to the area, all normals are the side's, every node of the side is there once and in the order of the
@@ -76,6 +77,7 @@ def test_weights_are_tributary_lengths():
     assert seen(listed).weights == pytest.approx(0.2 * h * np.array([0.5, 0.5, 1.0]), rel=1e-13)
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("simplices", [False, True])
 def test_normals_of_a_curved_side_are_those_of_the_chords(simplices):
     """∫ phi_i n over a polygon is half the sum of the two chord normals times their lengths: on an arc with equal
@@ -118,6 +120,7 @@ def test_gaps_of_obstacles():
     assert seen(own).gap0.tolist() == [0.25] * seen(own).count
 
 
+@pytest.mark.two_ranks
 def test_gap_of_round_off_is_no_penetration():
     """A plane that cuts the boundary by 1e-13 of the body's size counts as touching; 1e-6 is refused below."""
     system, tags = body()
@@ -197,7 +200,7 @@ def test_rollers_beside_an_oblique_contact_in_space(angle):
 def test_no_contact_nodes():
     system, tags = body(clamped=())
     nothing = Facets("nothing", np.zeros(0, dtype=np.int32), system.space.mesh)
-    with pytest.raises(InputError, match="no contact nodes: boundary group 'nothing' is empty, choose a group"):
+    with pytest.raises(InputError, match="no contact nodes: boundary group 'nothing' is empty: choose a group"):
         contact_surface(system, nothing)
     with pytest.raises(InputError, match="no contact nodes: the list of contact points on 'right' is empty"):
         contact_surface(system, tags["right"], points=[])
@@ -218,6 +221,7 @@ def test_clamped_contact_nodes():
         contact_surface(clamped, tags["right"], points=[(2.0, 1.5), (2.0, 0.0)])
 
 
+@pytest.mark.two_ranks
 def test_contact_direction_partly_prescribed():
     """Held along the contact direction is refused (on all ranks, whoever owns the node); held across it is fine."""
     mesh, tags = block(COMM, **BODIES["quadrilaterals"])
@@ -242,6 +246,7 @@ def test_points_off_the_boundary():
             contact_surface(system, tags["right"], points=points)
 
 
+@pytest.mark.two_ranks
 def test_obstacles_that_cannot_be():
     system, tags = body()
     bottom = tags["bottom"]
@@ -257,6 +262,7 @@ def test_obstacles_that_cannot_be():
             contact_surface(system, bottom, obstacle=obstacle)
 
 
+@pytest.mark.two_ranks
 def test_initial_displacement_into_the_obstacle():
     mesh, tags = block(COMM, **BODIES["quadrilaterals"])
     system = assemble(mesh, CONCRETE, initial_displacement=(0.0, -0.03))
@@ -267,6 +273,7 @@ def test_initial_displacement_into_the_obstacle():
     assert not initial_state(ContactProblem(system, contact_surface(system, tags["bottom"], obstacle=apart))).r_n.any()
 
 
+@pytest.mark.two_ranks
 def test_support_stiffness():
     system, tags = body()
     surface = contact_surface(system, tags["bottom"], obstacle=Touching())
@@ -275,6 +282,7 @@ def test_support_stiffness():
             surface.on_springs(stiffness)
 
 
+@pytest.mark.two_ranks
 def test_system_of_another_kind():
     from chain import chain_system
 
@@ -283,6 +291,7 @@ def test_system_of_another_kind():
         contact_surface(chain_system(3), tags["bottom"])
 
 
+@pytest.mark.two_ranks
 def test_a_listed_point_between_nodes_is_told(caplog: pytest.LogCaptureFixture) -> None:
     """It stands for the nearest node, and rank 0 says how far that is; a point on a node is not mentioned."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(8, 4))
@@ -290,4 +299,4 @@ def test_a_listed_point_between_nodes_is_told(caplog: pytest.LogCaptureFixture) 
     surface = contact_surface(system, tags["right"], points=[(2.0, 0.5), (2.0, 0.98)])
     assert np.allclose(seen(surface).points, [(2.0, 0.5), (2.0, 1.0)])
     told = [record.getMessage() for record in caplog.records if "nearest node" in record.getMessage()]
-    assert told == (["contact point (2, 0.98) stands for the nearest node, 0.02 m away"] if COMM.rank == 0 else [])
+    assert told == (["contact point (2, 0.98) is replaced by the nearest node, 0.02 m away"] if COMM.rank == 0 else [])

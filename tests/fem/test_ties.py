@@ -42,6 +42,7 @@ SHAKE_IN_SPACE = tuple(vc.Ricker(2.0, f, direction=tuple(e)) for f, e in zip((4.
 ROUND = [("left", "right"), ("back", "front")]  # pairs of vertical sides of a box
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("simplices, solver", [(False, vc.Condensed()), (True, vc.Iterative(tolerance=1e-12))])
 def test_tied_box_is_a_column(comm, simplices, solver):
     """All three components at once, two layers, damping: four vertical edges are one, and all is the column."""
@@ -84,6 +85,7 @@ def test_edges_of_a_box_move_as_one(comm):
     assert len(edge) == 4 and np.array_equal(edge, np.tile(edge[0], (4, 1)))
 
 
+@pytest.mark.two_ranks
 def test_forces_on_one_side_act_on_the_pair(comm):
     """A traction on the second side, which has no unknowns of its own, moves both; one component tied, one not."""
     mesh, tags = block(comm, lengths=(2.0, 1.0), divisions=(4, 3))
@@ -114,13 +116,14 @@ def test_contact_between_tied_sides(comm):
     surface = fem.contact_surface(system, tags["bottom"])
     state = vc.static_equilibrium(vc.ContactProblem(system, surface), solver=vc.Condensed())
     assert surface.total == 4 and surface.everywhere(state.r_n) == pytest.approx(np.full(4, 1e4), rel=1e-9)
-    with pytest.raises(InputError, match=r"\(2, 0\) of 'bottom' is tied .* or to one that is not in this contact: l"):
+    with pytest.raises(InputError, match=r"\(2, 0\) of 'bottom' is tied .* or to one outside this contact: l"):
         fem.contact_surface(system, tags["bottom"], points=[(2.0, 0.0), (1.0, 0.0)])
     system = fem.assemble(mesh, SOIL, tied=fem.Tied(tags["left"], tags["right"], components=(0,)))
     with pytest.raises(InputError, match=r"\(0, 0\) of 'bottom' is tied to another in some components only, or"):
         fem.contact_surface(system, tags["bottom"])
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("solver", [vc.Condensed(), vc.Iterative(tolerance=1e-12)])
 def test_contact_with_a_boundary_that_is_tied_at_its_edges(comm, solver):
     """A box pressed on all of a tied layer, meshes that do not match: confined compression, exact at the nodes of the
@@ -145,6 +148,7 @@ def test_contact_with_a_boundary_that_is_tied_at_its_edges(comm, solver):
     assert problem.surface.everywhere(state.r_n / problem.surface.weights) == pytest.approx(np.full(9, 2e4), rel=1e-9)
 
 
+@pytest.mark.two_ranks
 def test_mass_beside_a_tie_is_handed_over_alike(comm):
     """A periodic block falls on a plane: left and right contact points press alike, tied ones too; mass is kept."""
     mesh, tags = block(comm, lengths=(2.0, 1.0), divisions=(4, 4))
@@ -162,6 +166,7 @@ def test_mass_beside_a_tie_is_handed_over_alike(comm):
         assert np.abs(reactions[:, 0] - reactions[:, 2]).max() < 1e-10 * reactions.max()
 
 
+@pytest.mark.two_ranks
 def test_what_does_not_fit_is_refused(comm):
     """Sides meshed differently, held on one side only, not opposite, components that do not exist."""
     def bent(x):
@@ -177,7 +182,7 @@ def test_what_does_not_fit_is_refused(comm):
     tie = fem.Tied(tags["left"], tags["right"])
     with pytest.raises(InputError, match="prescribed on one side only"):
         fem.assemble(mesh, SOIL, tied=tie, clamped=tags["left"])
-    with pytest.raises(InputError, match=r"'left' and 'bottom' share the node \(0, 0\): tie opposite"):
+    with pytest.raises(InputError, match=r"'left' and 'bottom' share the node \(0, 0\): tie boundaries without"):
         fem.assemble(mesh, SOIL, tied=fem.Tied(tags["left"], tags["bottom"]))
     with pytest.raises(InputError, match="component 2 does not exist"):
         fem.assemble(mesh, SOIL, tied=fem.Tied(tags["left"], tags["right"], components=(2,)))

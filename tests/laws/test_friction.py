@@ -91,7 +91,7 @@ def test_coefficients_of_slip_rates():
     (lambda: ExponentialDecay(0.6, math.nan, 0.1), "kinetic coefficient mu_k is nan"),
     (lambda: ExponentialDecay(0.6, 0.3, 0.0), "v_c .* is 0.0; give a positive speed"),
     (lambda: StaticKinetic(0.3, 0.6), "give mu_s >= mu_k"),
-    (lambda: StaticKinetic((0.3, 0.6), (0.1, 0.1, 0.1)), "2 static and 3 kinetic coefficients"),
+    (lambda: StaticKinetic((0.3, 0.6), (0.1, 0.1, 0.1)), "2 mu_s and 3 mu_k; give as many"),
     (lambda: ExponentialDecay((0.6, 0.5), 0.3, 0.1)(np.zeros(4)), "has 2 values but there are 4 contact points"),
 ])
 @pytest.mark.filterwarnings("ignore:invalid value")

@@ -62,6 +62,7 @@ def test_only_the_contact_nodes_lose_their_mass(name: str, friction: Any) -> Non
     assert np.linalg.eigvalsh(M[np.ix_(~none, ~none)])[0] > 0.0
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("friction", [None, pytest.param(Coulomb(0.3), marks=pytest.mark.slow)])
 @pytest.mark.parametrize("simplices", [False, True])
 def test_the_axes_do_not_matter(simplices: bool, friction: Any) -> None:
@@ -83,6 +84,7 @@ def test_the_axes_do_not_matter(simplices: bool, friction: Any) -> None:
     assert found[0] == pytest.approx(found[1], rel=1e-11)
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("name", [name for name in FINER if name != "bar"])
 def test_rigid_motions_are_not_damped(name: str) -> None:
     """Stiffness-proportional damping on redistributed mass leaves every rigid motion alone, as on consistent mass."""
@@ -118,6 +120,7 @@ def test_two_sides_that_meet_in_a_corner() -> None:
     assert np.abs(inertia(moved) - inertia(plain)).max() <= 1e-12 * np.abs(inertia(plain)).max()
 
 
+@pytest.mark.two_ranks
 def test_the_default_leaves_the_mass_alone() -> None:
     """ConsistentMass is M as assembled; a problem without contact has nothing to redistribute."""
     given = thrown(10)
@@ -126,6 +129,7 @@ def test_the_default_leaves_the_mass_alone() -> None:
     assert np.array_equal(same.M.csr.toarray(), given.equations.M.csr.toarray())
 
 
+@pytest.mark.two_ranks
 def test_translation_of_the_whole_body_feels_the_whole_mass() -> None:
     """The inertia load -M* r a_g has the resultant of -M r a_g: shaken and free, every body moves with the ground."""
     given = problem("tetrahedra", mass=Redistributed(), impact=None)
@@ -137,11 +141,12 @@ def test_translation_of_the_whole_body_feels_the_whole_mass() -> None:
     assert total == pytest.approx(2400.0 * 2.0 * 1.5 * 1.2 * direction, rel=1e-12, abs=1e-9)
 
 
+@pytest.mark.two_ranks
 def test_refusals() -> None:
     """One sentence each: lumping out of range, a mass with nowhere to go, a mesh too coarse, an impact law."""
     with pytest.raises(InputError, match="lumping is 1.5: give a share"):
         Redistributed(1.5)
-    with pytest.raises(InputError, match="nowhere to go.*ConsistentMass"):
+    with pytest.raises(InputError, match="cannot be moved.*ConsistentMass"):
         _ = replace(chain_problem(4), mass=Redistributed()).equations  # lumped masses know no neighbours
     with pytest.raises(InputError, match="too coarse for redistributed mass.*refine"):
         _ = bar(2, mass=Redistributed()).equations

@@ -214,5 +214,5 @@ def test_massless_contact_nodes_are_refused():
 
 def test_a_projection_that_cannot_be_certified_is_a_failure_with_a_sentence(monkeypatch):
     monkeypatch.setattr(contact_stabilised, "TOLERANCE", -1.0)
-    with pytest.raises(StepFailure, match="predictor could not be projected .* step 151 .* certificate tolerance"):
+    with pytest.raises(StepFailure, match="predictor could not be brought out .* step 151 .* certificate tolerance"):
         list(run(thrown(**MASS), STABILISED, dt=1 / 300, steps=200))

@@ -72,13 +72,13 @@ def test_V93_weights_that_create_energy_are_refused(theta, e):
     [
         (thrown(mass=Redistributed()), "MoreauJean needs mass at the contact nodes"),
         (thrown(impact=Inelastic(), **MASS), "has its own restitution coefficient"),
-        (chain(gap=0.01), "springs do not"),
+        (chain(gap=0.01), "do not fit elastic supports"),
         (chain(gap=0.01), "bilateral points"),
     ],
 )
 def test_what_cannot_work_is_refused(problem, words):
     surface = problem.surface
-    if "springs" in words:
+    if "supports" in words:
         problem = replace(problem, surface=surface.on_springs(1e4))
     if "bilateral" in words:
         problem = replace(problem, surface=surface.bilateral_everywhere())
@@ -90,7 +90,7 @@ def test_what_cannot_work_is_refused(problem, words):
 def test_order_and_stability_without_contact(theta, order):
     """Second order at theta = ½, else first, with damping, constant load and base motion; stable at every frequency."""
     scheme = MoreauJean(theta)
-    assert observed_order(scheme) == pytest.approx(order, abs=0.06)
+    assert observed_order(scheme, steps=200 if order > 1 else 400) == pytest.approx(order, abs=0.06)
     for frequency in np.logspace(-2, 4, 13):
         for damping in (0.0, 0.3):
             radius = np.abs(np.linalg.eigvals(amplification(scheme, frequency=frequency, damping=damping)))

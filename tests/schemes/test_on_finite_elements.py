@@ -49,6 +49,7 @@ def scheme(request: pytest.FixtureRequest) -> Any:
     return request.param
 
 
+@pytest.mark.two_ranks
 def test_volume_and_condensed_routes_take_the_same_steps(scheme: Any) -> None:
     """V4.0, step by step: bounds on displacements and, where contact is predicted, on velocities (+inf elsewhere)."""
     solvers = (Condensed(), Volume(method=ReducedNewton()))

@@ -38,7 +38,7 @@ def test_unconditionally_stable(phi, damping):
 @pytest.mark.parametrize(("phi", "order"), [(0.5, 2.0), (0.6, 1.0), (1.0, 1.0)])
 def test_order(phi, order):
     """Second order at phi = ½, else first, with damping, constant load and base motion."""
-    assert observed_order(ZienkiewiczWoodTaylor(phi)) == pytest.approx(order, abs=0.06)
+    assert observed_order(ZienkiewiczWoodTaylor(phi), steps=200 if order > 1 else 400) == pytest.approx(order, abs=0.06)
 
 
 def test_exact_motion_is_what_it_converges_to():

@@ -177,7 +177,7 @@ def test_results_tell_method_and_iterations():
 
 def test_friction_that_cannot_act_is_refused_not_ignored():
     """A chain moves in one dimension only."""
-    with pytest.raises(InputError, match=r"Condensed would ignore Coulomb\(mu=0.3\): a body in one dimension"):
+    with pytest.raises(InputError, match=r"Condensed cannot use Coulomb\(mu=0.3\): a body in one dimension"):
         Condensed().check(replace(shaken(), friction=Coulomb(0.3)))
     Condensed().check(replace(shaken(), friction=Frictionless()))
 

@@ -99,8 +99,9 @@ def _self() -> Any:
     return MPI.COMM_SELF
 
 
+@pytest.mark.serial
 @pytest.mark.slow
-@pytest.mark.parametrize("d", [2, pytest.param(3, marks=pytest.mark.serial)])
+@pytest.mark.parametrize("d", [2, 3])
 def test_gauss_seidel_agrees(comm: Any, d: int) -> None:
     """An independent method for the small problem: the same run to 1e-8 of the largest displacement."""
     scheme, mass = SCHEMES[1]

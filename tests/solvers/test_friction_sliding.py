@@ -65,6 +65,7 @@ def along(problem: ContactProblem, x: Array, angle: float = SLOPE) -> float:
     return float(-total @ turned((1.0, 0.0), angle) / mass[0])
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("scale", [1.0, pytest.param(0.1, marks=pytest.mark.slow), 0.01])
 def test_incline_sticks(comm: Any, scale: float) -> None:
     """tan 30° = 0.577 < mu = 0.6: the static stage stands, and the block stays where it is, in every length unit."""
@@ -93,6 +94,7 @@ def slid(comm: Any, scale: float, *, cells: int = 4, steps: int = 300) -> tuple[
     return float((v[-1] - v[-51]) / (50 * dt)), float(friction), u[49::50]
 
 
+@pytest.mark.serial
 @pytest.mark.slow
 def test_incline_slides_alike_in_every_unit(comm: Any) -> None:
     """g (sin - mu cos) to 1e-9 at 1, 0.1 and 0.01 times the length; the same dimensionless motion to 1e-9."""
@@ -114,12 +116,12 @@ def test_friction_force_does_not_depend_on_the_number_of_points(comm: Any) -> No
 
 
 LAWS = [Coulomb(0.2), SlipRateCoulomb(ExponentialDecay(0.3, 0.15, 0.05))]
-PERIOD, CYCLES = 100, 9  # steps
+PERIOD = 100  # steps
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("friction", LAWS, ids=["constant", "slip rate"])
-def test_loop_area_is_friction_work(comm: Any, friction: FrictionLaw) -> None:
+@pytest.mark.parametrize(("friction", "cycles"), zip(LAWS, (9, 6), strict=True), ids=["constant", "slip rate"])
+def test_loop_area_is_friction_work(comm: Any, friction: FrictionLaw, cycles: int) -> None:
     """A block on a table that shakes with 0.4 g and 2 Hz. The last cycle: the area inside the closed loops of
     tangential reaction over slip, point by point, is the friction work of the ledger, to 1e-8. The whole run: the work
     of the shaking force on the mean displacement is friction, damping and what the energy gained, to 1e-8."""
@@ -129,7 +131,7 @@ def test_loop_area_is_friction_work(comm: Any, friction: FrictionLaw) -> None:
     ledger = vc.Energy()
     rows, drive = [dict(ledger.start(problem, start))], 0.0
     slips, forces = [problem.surface.tangential_values(start.u)], []
-    for state, report in march(problem, scheme=MIDPOINT, dt=dt, steps=PERIOD * CYCLES, state=start):
+    for state, report in march(problem, scheme=MIDPOINT, dt=dt, steps=PERIOD * cycles, state=start):
         assert report.certificate.worst <= 1e-9
         rows.append(dict(ledger.row(report)))
         slips.append(problem.surface.tangential_values(state.u))
@@ -152,6 +154,7 @@ def loops(slips: Array, forces: Array) -> float:
     return float(0.5 * np.sum((f + np.roll(f, -1, axis=0)) * (np.roll(s, -1, axis=0) - s)))
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("d", [2, 3])
 def test_all_methods_agree_on_a_finite_element_step(comm: Any, d: int) -> None:
     """The step with the most closed points of a thrown box, sticking and slipping: FrictionNewton and all others to

@@ -121,12 +121,14 @@ def test_disks_agree_with_the_condensed_route(parallel: bool, kind: str, law: An
     assert all(total > 0 for total in np.sum(seen, axis=0))
 
 
+@pytest.mark.two_ranks
 def test_agrees_with_the_reference_in_the_volume(parallel: bool) -> None:
     for law in (Coulomb(1.2), Tresca(0.1)):
         c, _ = spatial(law, 3, parallel=parallel)
         agree(c, solve(c), solve(c, Volume(ReducedNewton())))
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("mu", [
     ExponentialDecay(0.8, 0.2, 0.5), ExponentialDecay(0.2, 0.8, 0.5), StaticKinetic(0.6, 0.4), lambda v: 0.1 + 0.2 * v,
 ], ids=["weakening", "strengthening", "static and kinetic", "viscous"])
@@ -140,6 +142,7 @@ def test_rates_in_space(parallel: bool, mu: Any) -> None:
         sound(c, result)
 
 
+@pytest.mark.two_ranks
 def test_newton_in_circles_goes_on_with_given_limits(parallel: bool) -> None:
     """mu = 2 on ten points that hardly stand alone: Tresca problems lead out of the circle, and the answer is right."""
     c, _ = spatial(Coulomb(2.0), 7, parallel=parallel, m=10, alone=0.01)
@@ -150,6 +153,7 @@ def test_newton_in_circles_goes_on_with_given_limits(parallel: bool) -> None:
     assert solver.work.fallbacks == 1 and result.iterations > 15
 
 
+@pytest.mark.two_ranks
 def test_answers_do_not_depend_on_steps_before(parallel: bool) -> None:
     """One prepared solver over many steps, and a new one for each; Tresca, Coulomb and frictionless steps mixed."""
     cases = [random_case(law, seed=seed, parallel=parallel) for seed in range(3) for law in (Coulomb(0.4), Tresca(0.2))]
@@ -161,6 +165,7 @@ def test_answers_do_not_depend_on_steps_before(parallel: bool) -> None:
         assert np.max(np.abs(c.all(one.x - other.x))) <= 1e-9 * np.max(np.abs(c.all(other.x)))
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("length, force", [(1e-6, 1e6), (1e6, 1e-6)])
 def test_units_do_not_matter(parallel: bool, length: float, force: float) -> None:
     """The same case in other units of length and force: the same numbers, and the same work."""
@@ -174,6 +179,7 @@ def test_units_do_not_matter(parallel: bool, length: float, force: float) -> Non
     assert first.work.products == second.work.products
 
 
+@pytest.mark.two_ranks
 def test_the_mirrored_problem_has_the_mirrored_answer(parallel: bool) -> None:
     """Tangents that point the other way."""
     rng = np.random.default_rng(5)
@@ -236,6 +242,7 @@ def test_not_a_number_is_a_sentence(parallel: bool) -> None:
         prepared(c).solve(replace(c.step, b=np.full_like(c.step.b, np.nan)))
 
 
+@pytest.mark.two_ranks
 def test_stagnation_is_a_sentence_with_the_history(parallel: bool) -> None:
     """A tolerance below round-off is reached by no step."""
     c = random_case(Coulomb(0.4), parallel=parallel)

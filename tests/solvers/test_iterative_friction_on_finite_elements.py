@@ -38,6 +38,7 @@ def checked(problem: vc.ContactProblem, dt: float, steps: int, kind: str = "icc"
     return compared, problem.surface.comm.sum(counts)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("law", [*ROUGH_ON_ONE_SIDE, RATES], ids=["coulomb", "tresca", "slip rate"])
 def test_a_tipped_block(law: Any) -> None:
     """Open, sticking and slipping points in the same step, mu up to 1.2 on one side."""
@@ -114,6 +115,7 @@ def test_newton_steps_are_few_and_reductions_short() -> None:
     assert prepared[0].work.newton_steps > 8 and 0 < max(lengths) <= 12
 
 
+@pytest.mark.two_ranks
 def test_a_body_in_one_dimension_cannot_slide() -> None:
     with pytest.raises(InputError, match="a body in one dimension cannot slide"):
         vc.simulate(replace(chain_problem(3), friction=vc.Coulomb(0.3)), solver=Iterative(), dt=1e-3, steps=1)

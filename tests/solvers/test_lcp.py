@@ -66,7 +66,7 @@ def test_residual_without_violation_is_still_finite():
 def test_a_problem_checks_its_numbers_when_it_is_made():
     with pytest.raises(InputError, match="square"):
         LCP(np.ones((2, 3)), np.ones(2), UNILATERAL)
-    with pytest.raises(InputError, match="boolean mask"):
+    with pytest.raises(InputError, match="'bilateral' is no mask: give booleans"):
         LCP(np.eye(2), np.ones(2), np.array([0, 1]))  # type: ignore[arg-type]
     with pytest.raises(InputError, match="NaN"):
         LCP(np.eye(2), np.array([np.nan, 0.0]), UNILATERAL)

@@ -84,7 +84,7 @@ def test_other_matrices_have_a_solution_several_or_none(G, q, count):
     if exact:
         assert any(lemke(G, q) == pytest.approx(one, abs=1e-12) for one in exact)
     else:
-        with pytest.raises(StepFailure, match=r"on a ray after \d pivots: no solution was found, G is not copositive"):
+        with pytest.raises(StepFailure, match=r"on a ray after \d pivots: there is no solution, or G is not"):
             lemke(G, q)
 
 
@@ -165,7 +165,7 @@ def test_units_do_not_matter():
 def test_refused():
     """Bilateral rows that depend on each other; NaN; what the others say of matrices that are not symmetric."""
     both = np.ones(2, dtype=bool)
-    with pytest.raises(InputError, match="Bilateral rows of the Delassus operator depend"):
+    with pytest.raises(InputError, match="bilateral rows of the Delassus operator depend"):
         Lemke().prepare(np.ones((2, 2)), both)
     with pytest.raises(InputError, match="NaN"):
         Lemke().prepare(np.full((2, 2), np.nan), both)

@@ -154,8 +154,8 @@ def test_wrong_input_is_refused_with_a_reason(method):
     G, q, unilateral = np.eye(2), -np.ones(2), np.zeros(2, dtype=bool)
     for matrix, gap, words in (
         (np.ones((2, 3)), q, "square"),
-        (np.eye(3), q, "boolean mask of the 3 rows"),
-        (np.diag([1.0, 0.0]), q, "Row 1 cannot move"),
+        (np.eye(3), q, "booleans for the 3 rows"),
+        (np.diag([1.0, 0.0]), q, "row 1 cannot move"),
         (G, np.ones(3), "q has shape"),
         (G, np.array([np.nan, 1.0]), "q contains NaN"),
         (G, np.array([-np.inf, 1.0]), "q contains NaN"),

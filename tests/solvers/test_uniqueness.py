@@ -49,6 +49,6 @@ def test_units_and_wrong_numbers():
     assert p_matrix(np.zeros((0, 0))).holds
     assert p_matrix([[1.0, 5.0], [0.0, 1.0]]).holds  # type: ignore[arg-type]
     for wrong, words in ((np.full((2, 2), np.nan), "finite numbers"), (np.ones(3), "has shape"),
-                         (np.ones((2, 3)), "must be square"), ([[1.0], [1.0, 2.0]], "real numbers"), ("G", "is 'G'")):
+                         (np.ones((2, 3)), "give a square"), ([[1.0], [1.0, 2.0]], "real numbers"), ("G", "is 'G'")):
         with pytest.raises(InputError, match=words):
             p_matrix(wrong)  # type: ignore[arg-type]

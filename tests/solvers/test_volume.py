@@ -74,6 +74,7 @@ def test_agrees_with_brute_force(parallel: bool, method: Any, options: dict[str,
     agree(c, solve(c, method), exact)
 
 
+@pytest.mark.two_ranks
 def test_springs_far_from_the_stiffness_of_the_body(parallel: bool) -> None:
     """Springs 1e6 times stiffer and softer than the body: only the reduced method is up to these."""
     c = pushed_block(parallel=parallel, seed=0, compliance=10.0 ** np.linspace(-6.0, 6.0, M))
@@ -119,6 +120,7 @@ def test_no_contact_surface_is_a_linear_solve(parallel: bool, method: Any) -> No
     assert np.max(np.abs(c.all(result.x) - exact)) <= 1e-9 * np.max(np.abs(exact))
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("options", [OPTIONS["rigid"], OPTIONS["springs and bilateral"]], ids=["rigid", "springs"])
 def test_warm_start_at_the_solution_costs_no_iteration(parallel: bool, method: Any, options: dict[str, Any]) -> None:
     """P2: PETSc's own test would not stop there (solver notes 3d)."""
@@ -130,6 +132,7 @@ def test_warm_start_at_the_solution_costs_no_iteration(parallel: bool, method: A
     agree(c, again, c.exact())
 
 
+@pytest.mark.two_ranks
 def test_wrong_prediction_is_corrected(parallel: bool, method: Any) -> None:
     """The solution does not depend on the predicted set."""
     c = pushed_block(parallel=parallel)
@@ -148,6 +151,7 @@ def test_one_solver_many_steps(parallel: bool, method: Any) -> None:
         agree(new, prepared.solve(new.step), new.exact())
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("force", [1e-6, 1.0, 1e6])
 @pytest.mark.parametrize("length", [1e-6, 1.0, 1e6])
 def test_units_do_not_matter(parallel: bool, method: Any, length: float, force: float) -> None:
@@ -161,6 +165,7 @@ def test_units_do_not_matter(parallel: bool, method: Any, length: float, force: 
     assert np.max(np.abs(result.r_n / force - exact.r_n)) <= 1e-9 * np.max(exact.r_n)
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("unit", [1e-6, 1e6])
 def test_units_do_not_matter_when_nothing_gives_the_scale(parallel: bool, method: Any, unit: float) -> None:
     """P18: from rest and in touch, only A and b tell how large the displacements are."""
@@ -170,6 +175,7 @@ def test_units_do_not_matter_when_nothing_gives_the_scale(parallel: bool, method
     assert other.iterations == pytest.approx(one.iterations, abs=2)
 
 
+@pytest.mark.two_ranks
 def test_a_start_below_the_tolerance_is_still_improved(parallel: bool, method: Any) -> None:
     """A small residual is not a small error: what can be solved to round-off is, from a guess that is off by 1e-11."""
     c = pushed_block(parallel=parallel)
@@ -189,6 +195,7 @@ def test_held_points_stay_exactly_on_the_bound(parallel: bool) -> None:
         assert np.array_equal(on_bound, c.step.bound[result.active])
 
 
+@pytest.mark.two_ranks
 def test_a_wall_larger_than_brute_force(parallel: bool) -> None:
     """All methods agree with each other on 1600 unknowns and 40 points, statically, where A is worst conditioned."""
     body = block(19, 40)

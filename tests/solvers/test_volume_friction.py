@@ -91,6 +91,7 @@ def test_agrees_with_the_condensed_route(parallel: bool, law: Any, options: dict
     assert all(total > 0 for total in np.sum(seen, axis=0))
 
 
+@pytest.mark.two_ranks
 def test_large_friction(parallel: bool) -> None:
     """mu = 1.5: the fixed point needs its extrapolation, and Gauss-Seidel finds the same."""
     for seed in range(4):
@@ -110,6 +111,7 @@ def test_units_do_not_matter(parallel: bool, length: float, force: float) -> Non
     assert np.max(np.abs(other.x / length - one.x)) <= 1e-9 * np.max(np.abs(one.x))
 
 
+@pytest.mark.two_ranks
 def test_answers_do_not_depend_on_steps_before(parallel: bool) -> None:
     """One prepared solver over many steps, and a new one for each; Tresca, Coulomb and frictionless steps mixed."""
     cases = [random_case(law, seed=seed, parallel=parallel) for seed in range(3) for law in (Coulomb(0.4), Tresca(0.2))]
@@ -135,6 +137,7 @@ def test_infinite_bounds_and_nothing(parallel: bool) -> None:
         assert nothing.iterations == 0 and not np.any(nothing.x) and not np.any(nothing.r_t)
 
 
+@pytest.mark.two_ranks
 def test_history_is_that_of_the_thresholds(parallel: bool) -> None:
     """Coulomb: relative changes of the thresholds of every Tresca problem, decreasing to 1e-10; Tresca: none."""
     history = solve(random_case(Coulomb(0.4), parallel=parallel)).history
@@ -162,6 +165,7 @@ def test_disks_agree_with_the_condensed_route(parallel: bool, law: Any) -> None:
 # PETSc ---------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
@@ -176,6 +180,7 @@ def test_unsound_options_are_refused(parallel: bool, options: dict[str, str], re
         solve(random_case(Coulomb(0.4), parallel=parallel), Volume(method=ReducedNewton(), petsc_options=options))
 
 
+@pytest.mark.two_ranks
 def test_a_limit_of_iterations_is_told(parallel: bool) -> None:
     with pytest.raises(StepFailure, match="iteration limit"):
         solve(random_case(Coulomb(0.4), parallel=parallel), Volume(method=ReducedNewton(),

@@ -56,8 +56,9 @@ def test_routes_agree_in_the_plane(comm: Any, friction: FrictionLaw, simplices: 
     assert checked.report()["Volume(ReducedNewton)"]["r_t"] == found.relative["r_t"]
 
 
+@pytest.mark.serial
 @pytest.mark.slow
-@pytest.mark.parametrize("friction", [Coulomb(0.3), pytest.param(Tresca(2e3), marks=pytest.mark.serial)], ids=repr)
+@pytest.mark.parametrize("friction", [Coulomb(0.3), Tresca(2e3)], ids=repr)
 def test_routes_agree_in_space(comm: Any, friction: FrictionLaw) -> None:
     """The circular cone on an inclined plane, another scheme: to 1e-9."""
     box = thrown_box(comm, angle=0.3, simplices=True, divisions=(4, 3, 3))

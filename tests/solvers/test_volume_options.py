@@ -63,6 +63,7 @@ class Rubbing:
         self.system = c.step.A  # for its algebra
 
 
+@pytest.mark.two_ranks
 def test_friction_is_refused_with_the_methods_that_carry_it(pushed: Case) -> None:
     """Bounds on displacements cannot express |r_t| <= limit, and there is no energy to minimise; nor is there slip in
     one dimension."""
@@ -99,6 +100,7 @@ REFUSED = [
 ]
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize(("method", "options", "reason"), REFUSED)
 def test_unsound_options_are_refused(pushed: Case, method: Any, options: dict[str, str], reason: str) -> None:
     """P5, P6, P8, P18."""
@@ -106,6 +108,7 @@ def test_unsound_options_are_refused(pushed: Case, method: Any, options: dict[st
         prepare(pushed, Volume(method=method, petsc_options=options))
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize(("method", "options", "reason"), REFUSED[::4])
 def test_unsound_options_of_the_command_line_are_refused(
     pushed: Case, database: Any, method: Any, options: dict[str, str], reason: str
@@ -116,6 +119,7 @@ def test_unsound_options_of_the_command_line_are_refused(
         prepare(pushed, Volume(method=method))
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("kind", ["cp", "none", "bt"])
 def test_line_searches(pushed: Case, kind: str) -> None:
     """P20: PETSc before 3.23 forgets the bounds in the slope of `cp`."""
@@ -136,6 +140,7 @@ def test_iterative_linear_solver(pushed: Case, pc: str) -> None:
     assert (prepared.snes.ksp.getType(), prepared.snes.ksp.pc.getType()) == ("cg", pc)
 
 
+@pytest.mark.two_ranks
 def test_petsc_objects_are_reachable(pushed: Case) -> None:
     for method in METHODS:
         prepared = prepare(pushed, Volume(method=method))
@@ -147,6 +152,7 @@ def test_petsc_objects_are_reachable(pushed: Case) -> None:
         assert prepared.snes is None and prepared.tao is None
 
 
+@pytest.mark.two_ranks
 def test_option_layers(pushed: Case, database: Any) -> None:
     """Defaults, then the settings, then the command line; ours are gone from the database after every call."""
     before = database.getAll()
@@ -159,6 +165,7 @@ def test_option_layers(pushed: Case, database: Any) -> None:
     assert database.getAll() == {**before, PREFIX + "snes_max_it": "9"}
 
 
+@pytest.mark.two_ranks
 def test_prefix(pushed: Case, database: Any) -> None:
     database["mine_snes_max_it"] = 9
     assert prepare(pushed, Volume(prefix="mine_")).snes.getTolerances()[3] == 9
@@ -172,6 +179,7 @@ def test_monitor_option(capfd: pytest.CaptureFixture[str]) -> None:
     assert "SNES Function norm" in capfd.readouterr().out
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("key", ["snes_rtol", "snes_atol"])
 def test_the_users_tolerance_stops_earlier(pushed: Case, key: str) -> None:
     """A tolerance given by the user counts relative to |b|; the certificate then says what it cost."""
@@ -182,12 +190,14 @@ def test_the_users_tolerance_stops_earlier(pushed: Case, key: str) -> None:
     assert 1e-9 < kkt_residual(pushed.step, early).worst < 1e-2
 
 
+@pytest.mark.two_ranks
 def test_tao_tolerance_of_the_user(pushed: Case) -> None:
     early = prepare(pushed, Volume(method=TaoTron(), petsc_options={"tao_gatol": 1e-4})).solve(pushed.step)
     full = prepare(pushed, Volume(method=TaoTron())).solve(pushed.step)
     assert early.iterations < full.iterations
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("method", [ReducedNewton(), SemismoothNewton(), TaoTron()])
 def test_iteration_limit_is_a_failure_in_words(pushed: Case, method: Any) -> None:
     """The text has PETSc's reason, iterations, residual and advice; the same solver can go on afterwards."""

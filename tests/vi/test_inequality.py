@@ -59,6 +59,7 @@ def test_a_linear_problem_on_every_route(comm: Any, method: Any) -> None:
     assert result.method == name_of(method) and result.iterations == 1 and result.u is known.u
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize(("element", "cell", "width", "form"), [
     (("Lagrange", 2), "quadrilateral", 1, laplace), (("Lagrange", 1), "triangle", 2, elastic),
     (("Lagrange", 1), "triangle", 1, convection),
@@ -71,11 +72,28 @@ def test_other_elements_and_forms(comm: Any, element: Any, cell: str, width: int
     assert result.iterations == 1 and result.method == ("ReducedNewton" if form is convection else "TaoTron")
 
 
+@pytest.mark.two_ranks
 def test_convection_by_the_semismooth_method(comm: Any) -> None:
     known = Known(space(square(comm, 10), ("Lagrange", 1)), convection)
     result = vi.solve(known.linear, known.u, lower=known.lower, upper=known.upper, bcs=[known.bc],
                       method=SemismoothNewton())
     known.check(result, error=1e-10)
+
+
+@pytest.mark.parametrize("method", METHODS, ids=name_of)
+def test_no_load_but_what_rounding_leaves_of_it(comm: Any, method: Any) -> None:
+    """A field that is held at 1 along a line and pushed by nothing, as the crack of demos/crack.py that is alone: from
+    guesses with noise, for which J u - F(u) is round-off and tells no size of forces."""
+    u = fem.Function(space(square(comm, 8), ("Lagrange", 1)))
+    v, lower = ufl.TestFunction(u.function_space), fem.Function(u.function_space)
+    lower.interpolate(lambda x: 1.0 * (np.abs(x[0] - 0.5) < 0.01))
+    noise = np.random.default_rng(comm.rank)
+    for _ in range(4):
+        u.x.array[:] = noise.random(len(u.x.array))
+        u.x.scatter_forward()
+        result = vi.solve(laplace(u, v) + 20.0 * u * v * ufl.dx, u, lower=lower, upper=1.0, method=method)
+        assert result.certificate.worst <= 1e-9
+        assert owned(u).min() > 0.05 and np.all(owned(u)[owned(lower) == 1.0] == 1.0)
 
 
 @pytest.mark.parametrize("form", [conducting, film], ids=["unsymmetric", "soap film"])
@@ -87,6 +105,7 @@ def test_problems_that_are_not_linear(comm: Any, form: Any) -> None:
     assert 2 <= result.iterations <= 12
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize(("tiny", "force"), [(1e-9, 1e6), (1e7, 1e-5)])
 def test_units_change_nothing(comm: Any, tiny: float, force: float) -> None:
     """PETSc's own zero tolerance, 1e-8 in the unit of u, leaves the active set to chance in the first."""
@@ -96,6 +115,7 @@ def test_units_change_nothing(comm: Any, tiny: float, force: float) -> None:
                              method=method), error=1e-11)
 
 
+@pytest.mark.two_ranks
 def test_at_the_solution_nothing_is_left_to_do(comm: Any) -> None:
     known = Known(space(square(comm, 12), ("Lagrange", 1)), laplace)
     known.u.x.array[:] = known.exact.x.array
@@ -104,6 +124,7 @@ def test_at_the_solution_nothing_is_left_to_do(comm: Any) -> None:
     assert (result.iterations, result.inner) == (0, 0)
 
 
+@pytest.mark.two_ranks
 def test_projection_of_constants_on_cells(comm: Any) -> None:
     """DG0 without conditions: every cell by itself, u = mid(-0.1, target, 0.1), also with bounds given as numbers,
     Constants and infinity; and a bound that nobody reaches, as wide as users write it, disturbs nothing."""
@@ -137,6 +158,7 @@ def test_nothing_is_free_or_nothing_acts(comm: Any) -> None:
     assert total == pytest.approx(3.0, rel=1e-13)
 
 
+@pytest.mark.two_ranks
 def test_a_string_above_a_floor(comm: Any) -> None:
     """-u'' = -8, u(0) = u(1) = 0, u >= -¼: it lies on the floor from ¼ to ¾, and linear elements are exact at nodes."""
     V = space(mesh.create_interval(comm, 32, [0.0, 1.0]), ("Lagrange", 1))
@@ -190,6 +212,7 @@ def test_a_failure_is_one_sentence_and_keeps_the_best(comm: Any) -> None:
         vi.solve(laplace(known.u, v) + ufl.sqrt(known.u - 10.0) * v * ufl.dx, known.u, bcs=[known.bc])
 
 
+@pytest.mark.two_ranks
 def test_steps_that_are_too_long_are_shortened(comm: Any) -> None:
     """The p-Laplacian, p = 6, from a rough guess: Newton's steps are too long, and the search shortens them."""
     V = space(square(comm, 8), ("Lagrange", 1))

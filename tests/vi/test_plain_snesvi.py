@@ -11,6 +11,7 @@ import pytest
 
 pytest.importorskip("dolfinx")
 
+pytestmark = [pytest.mark.slow, pytest.mark.serial]  # what PETSc does alone; test_inequality.py has our routes on ranks
 ROOT = Path(__file__).resolve().parents[2]
 KEYS = {"unknowns", "ranks", "route", "cpu_seconds", "iterations", "certificate", "active", "ratio", "difference",
         "plain_cpu_seconds", "plain_iterations", "plain_reason", "snesvi_by_default"}

@@ -279,7 +279,7 @@ class SerialAlgebra:
 def serial(matrix: Matrix) -> SerialMatrix:
     """Return the matrix as a SerialMatrix; TypeError when it belongs to another algebra."""
     if not isinstance(matrix, SerialMatrix):
-        raise TypeError(f"SerialAlgebra got a {type(matrix).__name__}")
+        raise TypeError(f"SerialAlgebra got a {type(matrix).__name__}; give a SerialMatrix")
     return matrix
 
 

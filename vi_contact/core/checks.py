@@ -95,7 +95,7 @@ def column_name(kind: str, name: Any) -> str:
     """Return a name that columns may carry; InputError unless it is made of letters, digits and underscores."""
     if isinstance(name, str | int) and re.fullmatch(r"\w+", str(name), re.ASCII):
         return str(name)
-    raise InputError(f"{kind} {shown(name)}: use letters, digits and underscores, it names columns")
+    raise InputError(f"{kind} {shown(name)}: use letters, digits and underscores for names of columns")
 
 
 def several(owner: str, meaning: str, value: Any, remedy: str) -> tuple[Any, ...]:

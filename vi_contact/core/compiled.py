@@ -36,7 +36,7 @@ def _library() -> Any:
         return _loaded(compiled())
     except (OSError, RuntimeError, subprocess.SubprocessError) as problem:  # RuntimeError: nobody's home is known
         said = (getattr(problem, "stderr", None) or str(problem)).strip().splitlines() or [repr(problem)]
-        log.info("PETSc factorises, without contact unknowns last, which needs a C compiler and CHOLMOD: %s", said[0])
+        log.info("PETSc factorises, because the quicker way needs a C compiler and CHOLMOD: %s", said[0])
         return None
 
 

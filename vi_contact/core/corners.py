@@ -69,9 +69,9 @@ def refuse_rubbing(surface: ContactSurface) -> None:
     every = [one for part in from_each(surface.comm, first) for one in part]
     if every:
         where = at(min(every, key=lambda one: one[0])[1])
-        raise InputError(f"{len(every)} contact nodes, the first at {where}, have several contact directions, and how "
-                         "they rub on two faces at once is not modelled: let them slide freely (surface."
-                         "with_frictionless_corners()), or take the corner for smooth (a larger feature_angle=)")
+        raise InputError(f"{len(every)} contact nodes, the first at {where}, have several contact directions, and "
+                         "friction on two faces at once is not modelled: let them slide freely (surface."
+                         "with_frictionless_corners()), or treat the corner as smooth (a larger feature_angle=)")
 
 
 def with_open_faces(surface: ContactSurface, v: Array, target: Array) -> Array:

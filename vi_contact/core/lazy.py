@@ -3,8 +3,9 @@
 import ast
 import sys
 from collections.abc import Callable
+from functools import cache
 from importlib import import_module
-from os.path import splitext
+from os.path import dirname, splitext
 from types import ModuleType
 from typing import Any
 
@@ -27,7 +28,7 @@ def lazy(package: str, file: str) -> tuple[list[str], Callable[[str], Any], Call
 
     def get(name: str) -> Any:
         if name not in home:
-            raise AttributeError(f"module '{package}' has no attribute '{name}'")
+            raise AttributeError(f"module '{package}' has no attribute '{name}'{since(package, name)}")
         return getattr(import_module(home[name]), name)
 
     class Room(ModuleType):
@@ -39,3 +40,18 @@ def lazy(package: str, file: str) -> tuple[list[str], Callable[[str], Any], Call
 
     sys.modules[package].__class__ = Room
     return public, get, lambda: public
+
+
+def since(package: str, name: str) -> str:
+    """Return the end of a sentence about a name of version 0.1 that is another one now; empty for all else."""
+    now = retired().get(package, {}).get(name)
+    return f": since 0.2.0 it is {now}" if now else ""
+
+
+@cache
+def retired() -> dict[str, Any]:
+    """Return core/retired.toml, read once: Python and its tools often ask a package for names that it has not."""
+    import tomllib
+
+    with open(f"{dirname(__file__)}/retired.toml", "rb") as table:
+        return tomllib.load(table)

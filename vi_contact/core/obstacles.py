@@ -41,7 +41,7 @@ class Touching:
 
 @dataclass(frozen=True)
 class HalfSpace:
-    """Fill the half-space behind the plane through ``point`` with ``normal`` pointing out of it, towards the body.
+    """Describe a rigid half-space behind the plane through ``point``, whose ``normal`` points towards the body.
 
     The condition is exact for any boundary shape: (X + u - point)·normal >= 0, so the contact direction is -normal.
     """

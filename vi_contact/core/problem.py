@@ -19,12 +19,12 @@ from .system import SemiDiscreteSystem
 
 @dataclass(frozen=True)
 class ContactProblem:
-    """Pose a problem: a semi-discrete system, a contact surface, what shakes it and how it rubs and rebounds.
+    """Pose a problem: a semi-discrete system, its contact surface, its excitation, and the laws of friction and impact.
 
-    The system is turned into the surface's nodal frames once, here. ``impact=None`` leaves velocities alone;
-    ``mass=None`` leaves the choice of the mass matrix to the time scheme. InputError, on all ranks, for parts of the
-    wrong kind or size, and for a surface that was made for another system. A friction law that is a dataclass may hold
-    tuples with a value for every contact point: this rank's, or those of all by their numbers. Collective.
+    The system is turned into the nodal frames of the surface here, once. ``impact=None`` leaves velocities unchanged.
+    ``mass=None`` leaves the choice of the mass matrix to the time scheme. InputError is raised on all ranks for parts
+    of the wrong kind or size, and for a surface of another system. A friction law that is a dataclass may hold tuples
+    with a value for every contact point: of this rank, or of all ranks by their numbers. Collective.
     """
 
     system: SemiDiscreteSystem
@@ -152,11 +152,11 @@ def check_parts(problem: Any) -> None:
     for excitation in excitations:
         _check_excitation(excitation, system)
     if system.absolute and excitations:
-        raise InputError("a compliant base is shaken by its own upgoing motion: leave the excitation of the problem "
-                         "out, its inertia load is that of a rigid base")
+        raise InputError("a compliant base is shaken by its own upgoing motion: leave out the excitation of the "
+                         "problem, whose inertia load belongs to a rigid base")
     if surface.space is not None and surface.space is not system.space:
-        raise InputError("ContactProblem: the contact surface was made for another system, whose unknowns are others: "
-                         "make it for this one, fem.contact_surface(system, …)")
+        raise InputError("ContactProblem: the contact surface was made for another system with other unknowns: make "
+                         "it for this one by fem.contact_surface(system, …)")
     if surface.comm.size != system.algebra.comm.size:
         raise InputError(f"ContactProblem: the surface is shared by {surface.comm.size} ranks and the system by "
                          f"{system.algebra.comm.size}: make both on the same ranks")
@@ -206,10 +206,10 @@ def _of_surface(surface: ContactSurface, system: SemiDiscreteSystem, total: int)
         values = getattr(surface, name)
         if np.size(values) and not (least <= np.min(values) and np.max(values) < most):
             yield (f"the contact surface has {name} from {np.min(values)} to {np.max(values)}, outside {least} to "
-                   f"{most - 1}: it was made for a system of another size")
+                   f"{most - 1}: make the surface for this system, which has another size")
     if np.any(np.diff(surface.slots) <= 0):
         yield "the contact surface has slots that do not ascend: number its conditions in the order of their rows"
     if np.isnan(np.sum(surface.gap0)):
         yield "the contact surface has NaN in gap0: check the obstacle's gap function"
     if not (np.all(surface.weights > 0.0) and np.all(surface.compliance >= 0.0)):
-        yield "the contact surface has weights that are not above zero, or a compliance below: give lengths or areas"
+        yield "the contact surface has weights of zero or less, or a compliance below zero: give lengths or areas"

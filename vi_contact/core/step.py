@@ -40,9 +40,9 @@ from .surfaces import ContactSurface
 class State:
     """Hold displacement u (n,) [m], velocity v (n,) [m/s] and contact at time t = t_k [s], in the rotated basis.
 
-    ``r_n`` (m,), ``r_t`` (m, d - 1) [N] are the reactions of the step that led here (mean or end values, as the scheme
-    says); ``active`` (m,) the closed conditions; ``memory`` holds what a scheme carries besides u and v: vectors (n,),
-    and arrays that are the same on every rank.
+    ``r_n`` (m,), ``r_t`` (m, d - 1) [N] are the reactions of the step that led here, mean or end values as the scheme
+    says. ``active`` (m,) are the closed conditions. ``memory`` holds what a scheme carries besides u and v: vectors
+    (n,), and arrays that are the same on every rank.
     """
 
     t: float
@@ -106,7 +106,7 @@ class StepResult:
     """Answer a step: x (n,), r_n (m,) and r_t (m, d - 1), ``scale`` times newtons, and the closed conditions (m,).
 
     ``iterations`` count changes of the active set, sweeps or Newton steps, as ``method`` says.
-    ``history``: what the method with friction logs of its convergence, see there. ``aim``: the residual at which an
+    ``history``: how the method converged, in a measure of its own. ``aim``: the residual at which an
     iterative method stopped because it was told to, 0 for one that goes on to round-off.
     """
 

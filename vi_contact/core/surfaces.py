@@ -49,7 +49,7 @@ class ContactSurface:
         space: of the systems that it was made for; None when it was made by hand.
         companions: motions of the obstacle that are marched beside the run, with its scheme and time steps.
         nodes: (m,) numbers of the nodes, to be told apart only: several conditions may be of one. None: one each.
-        frictionless_corners: True when nodes with several conditions are allowed beside friction, see there.
+        frictionless_corners: True when nodes with several conditions are allowed beside friction.
     """
 
     comm: Comm
@@ -212,7 +212,7 @@ class ContactSurface:
         """
         corners = total(self.comm, len(self.corners))
         if corners and self.comm.rank == 0:
-            log.info("%d contact nodes with several directions slide freely over their faces", corners)
+            log.info("%d contact nodes with several contact directions slide without friction", corners)
         return replace(self, frictionless_corners=True)
 
     def on_springs(self, stiffness: float) -> "ContactSurface":

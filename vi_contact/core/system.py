@@ -76,7 +76,7 @@ class Load:
                 if name != "separable":
                     function("Load", f"a part of {name}", part, "give a function of the time [s]")
                 elif len(several("Load", "a part of separable", part, PAIR)) != 2:
-                    raise InputError(f"Load: a part of separable has {len(part)} members; {PAIR}")
+                    raise InputError(f"Load: an item of separable has {len(part)} members; {PAIR}")
 
     def __call__(self, t: float) -> Array:
         total = self.at_rest(t)

@@ -21,7 +21,7 @@ ROUNDED = 1e-5  # of |A||x|, and of what friction is compared with: see Certific
 
 
 def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
-    """Return how well (x, r_n) satisfies the inequality problem of a step; definitions: ``Certificate``."""
+    """Return how well (x, r_n) satisfies the inequality problem of a step. ``Certificate`` defines the residuals."""
     return _judged(step, result, _sizes(step, result)[0])
 
 

@@ -53,28 +53,28 @@ def assemble(mesh: Any, material: Materials | None = None, *, forms: Forms | Non
     """Assemble the system of a body, on the free unknowns.
 
     Args:
-        mesh: DOLFINx mesh (``read_mesh``), cells of first order or, with degree 2, of second order too.
-        degree: of the displacement in each cell: 1 for P1 or Q1, 2 for P2 or Q2 (docs/guide/second_order.md).
+        mesh: DOLFINx mesh (``read_mesh``) with cells of first order or, with degree 2, of second order too.
+        degree: degree of the displacement in each cell: 1 for P1 or Q1, 2 for P2 or Q2 (docs/guide/second_order.md).
         material: LinearElastic, Orthotropic or fem.Heterogeneous, or (cells, material) pairs that cover the mesh.
         forms: the user's own weak forms, ``fem.Forms``; a material beside them gives the density where they have no
-            mass, and the wave speeds that dashpots and free fields ask for.
+            mass, and the wave speeds that dashpots and free fields need.
         section: PlaneStrain() by default in 2D (Solid() in 3D); PlaneStress(thickness) for panels.
-        space: the user's own DOLFINx space V of the displacement; its degree counts. bcs: ``dirichletbc`` objects on V,
-            a space like it, or V.sub(i), at rest with the values they have now; where conditions meet the last counts.
+        space: the user's own DOLFINx space V of the displacement, which sets the degree. bcs: ``dirichletbc`` objects
+            on V, a space like it, or V.sub(i). They keep their present values; where two meet, the last one counts.
         clamped: facets with u = 0; prescribed: facets that move (eq. 3) or are held in some components.
         dashpots: absorbing boundaries: Dashpots, CompliantBase, soil.FreeField. Their loss counts as damping.
         tied: boundaries whose opposite nodes move together; damping: NoDamping() by default, MassProportional(c)
             (eq. 7), Rayleigh or KelvinVoigt; loads: tractions (eqs. 4, 6), body forces, InitialStrain, LinearForm.
-        base_inertia: whether a ground motion's inertia load counts the mass that elements share with prescribed nodes,
-            as it must to be the motion seen from the ground; False is the load of docs/start/first_wall.md.
-        integration: "full", or "selective" for nearly incompressible bodies of quadrilaterals or hexahedra: each cell
-            takes tr eps as its mean (``fem.dilatation``).
+        base_inertia: whether the inertia load of a ground motion counts the mass that elements share with prescribed
+            nodes. True is right for motions relative to the ground; False is the load of docs/start/first_wall.md.
+        integration: "full", or "selective" for nearly incompressible bodies of quadrilaterals or hexahedra, where each
+            cell has one mean value of tr eps (``fem.dilatation``).
         initial_displacement, initial_velocity: constant or points (k, d) -> (k, d) (eqs. 10, 10a), or (cells, value)
-            pairs for several bodies; the later pair counts where cells meet, zero where there are none.
-        quadrature_degree: of all integrals; None is UFL's estimate, which is exact on cells with parallel sides.
+            pairs for several bodies. Where cells meet, the later pair counts; cells without a pair start from zero.
+        quadrature_degree: degree of all integrals; None means UFL's estimate, exact on cells with parallel sides.
     Raises:
-        InputError: cells without material, of an order that the degree does not suit, or folded; NaN in data,
-            components that do not exist, dashpots on what is held, groups of another mesh or kind, contradictions.
+        InputError: cells without a material, of an order that does not fit the degree, or folded; NaN in data,
+            components that do not exist, dashpots on held facets, groups of another mesh or kind, contradictions.
     """
     V, degree = taken_space(mesh, space, as_tuple(bcs), degree)
     section, damping = check_body(mesh, material, forms, section, damping, base_inertia, degree, integration)

@@ -57,11 +57,11 @@ def check_body(mesh: Any, material: Any, forms: Any, section: Any, damping: Any,
                          "Solid(), or leave it out")
     provides(OWNER, "damping", damping, ("coefficients",), "give Rayleigh(alpha, beta), MassProportional(c) or None")
     if forms is not None and not (isinstance(damping, Rayleigh | NoDamping) or hasattr(damping, "viscosities")):
-        raise InputError(f"assemble: {damping} beside forms=…, which have no density of a material to go by; give "
+        raise InputError(f"assemble: {damping} needs the density of a material and forms=… have none; give "
                          "Rayleigh(alpha, beta), KelvinVoigt(…), or Forms(…, damping=)")
     if isinstance(section, PlaneStress) and any(getattr(damping, "viscosities", ())):
-        raise InputError(f"assemble: {damping} in PlaneStress, where the strain across the panel would have a motion "
-                         "of its own; give Rayleigh(0, beta), or another section")
+        raise InputError(f"assemble: {damping} does not go with PlaneStress, where the strain across the panel would "
+                         "need its own motion; give Rayleigh(0, beta), or another section")
     flag(OWNER, "base_inertia", base_inertia)
     found = [material] if material is None or isinstance(material, KINDS) else [one for _, one in material]
     _check_integration(mesh, found if forms is None else [forms], section, damping, degree, integration)
@@ -87,7 +87,7 @@ def _check_degree(mesh: Mesh, degree: Any) -> None:
     if not is_curved(mesh):
         return
     if degree == 1:
-        raise InputError("assemble: the mesh has cells of second order; give degree=2, or mesh it with first order")
+        raise InputError("assemble: the mesh has cells of second order; give degree=2, or mesh it in first order")
     if compat.geometry_dofmap(mesh).shape[1] != compat.cell_blocks(compat.vector_space(mesh, 2)).shape[1]:
         raise InputError("assemble: the mesh has cells of an order above 2 or without all mid-points; mesh it with "
                          "complete cells of first or second order")
@@ -107,10 +107,10 @@ def _check_integration(mesh: Mesh, materials: Sequence[Any], section: Section, d
     if integration == "full":
         return
     if mesh.topology.cell_type.name not in ("quadrilateral", "hexahedron"):
-        raise InputError("assemble: integration='selective' needs quadrilaterals or hexahedra, and these cells lock "
-                         "with it as without; take degree=2")
+        raise InputError("assemble: integration='selective' needs quadrilaterals or hexahedra, because other cells "
+                         "lock with it too; take degree=2")
     if degree == 2 or isinstance(section, PlaneStress):
-        raise InputError("assemble: integration='selective' is for degree=1 and bodies that cannot thin out: neither "
+        raise InputError("assemble: integration='selective' is for degree=1 in plane strain or in space: neither "
                          "degree=2 nor plane stress locks; leave it out")
     if any(getattr(damping, "viscosities", ())) or not all(isinstance(one, LinearElastic) for one in materials):
         raise InputError("assemble: integration='selective' is for LinearElastic materials without KelvinVoigt "
@@ -121,7 +121,7 @@ def _tell_locking(materials: Sequence[LinearElastic]) -> None:
     """Warn of materials that first-order cells cannot deform without changing their volume."""
     stiff = max((one.nu for one in materials), default=0.0)
     if stiff > LOCKING:
-        log.warning("Poisson's ratio %.10g locks first-order cells, displacements come out too small: give at most %g, "
+        log.warning("Poisson's ratio %.10g locks first-order cells, so displacements are too small: give at most %g, "
                     "integration='selective' (quadrilaterals and hexahedra) or degree=2", stiff, LOCKING)
 
 
@@ -149,12 +149,12 @@ def _contradictions(held: Sequence[Prescribed], tied: Sequence[Tied], damped: Se
     for one, two in combinations(held, 2):
         if not one.same_motion(two) and len(np.intersect1d(one.facets.indices, two.facets.indices)):
             yield (f"assemble: boundary groups '{one.facets.name}' and '{two.facets.name}' share facets on which "
-                   "different displacements are prescribed: leave out the one or the other")
+                   "different displacements are prescribed: leave out one of the two")
     sides = [side for tie in tied if tie.components is None for side in (tie.first, tie.second)]
     for side, absorbing in product(sides, damped):
         if len(np.intersect1d(side.indices, absorbing.facets.indices)):
-            yield (f"assemble: boundary '{side.name}' is tied and has dashpots, which would brake what goes on through "
-                   "the ties: leave out the one or the other")
+            yield (f"assemble: boundary '{side.name}' is tied and has dashpots, which would brake the waves through "
+                   "the ties: leave out one of the two")
 
 
 def check_initial(mesh: Mesh, **values: Any) -> None:

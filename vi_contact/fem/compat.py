@@ -61,7 +61,8 @@ def create_mesh(comm: MPI.Comm, cell: str, cells: npt.NDArray[np.int64], x: npt.
         domain = ufl.Mesh(element("Lagrange", cell, degree, shape=(gdim,)))
         return _mesh.create_mesh(comm, cells=cells, x=x, e=domain, partitioner=told)
     domain = ufl.Mesh(ufl.VectorElement("Lagrange", ufl.Cell(cell, geometric_dimension=gdim), degree))
-    return _mesh.create_mesh(comm, cells, x, domain, ghost_mode=GhostMode.shared_facet, partitioner=told)
+    rows = dolfinx.cpp.graph.AdjacencyList_int64(cells)  # it tries an array first, and its error prints all arguments
+    return _mesh.create_mesh(comm, rows, x, domain, ghost_mode=GhostMode.shared_facet, partitioner=told)
 
 
 def geometry_dofmap(mesh: Mesh) -> Indices:

@@ -73,7 +73,7 @@ class Dashpots:
     @property
     def expects(self) -> str:
         """Return the words for the log that say which motion this boundary expects."""
-        return "takes no motion: waves leave, nothing comes in"
+        return "takes no motion: waves leave the body and none come in"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,7 +108,7 @@ class DashpotMatrix:
         self.space, self.dashpots = space, dashpots
         own = dashpots.material is not None
         if not own and not forms.fields:
-            raise InputError(f"dashpots on '{dashpots.facets.name}' need a density and wave speeds, and forms=… tell "
+            raise InputError(f"dashpots on '{dashpots.facets.name}' need a density and wave speeds, and forms=… have "
                              f"none: give {type(dashpots).__name__}(…, material=), or a material beside the forms")
         cells = compat.cell_space(space.mesh) if own else forms.fields["rho"].function_space
         moduli = (0.0 if own else forms.fields[name].x.array for name in ("lame", "shear", "rho"))  # times thickness
@@ -137,7 +137,7 @@ class DashpotMatrix:
     def _refuse_held(self) -> None:
         name, total = self.dashpots.facets.name, self._resistance(self.mat).sum()
         if np.isnan(total):
-            raise InputError(f"dashpots on '{name}' stand beside orthotropic cells, whose waves have no one speed: "
+            raise InputError(f"dashpots on '{name}' stand beside orthotropic cells, whose waves have several speeds: "
                              f"give {type(self.dashpots).__name__}(…, material=)")
         if total == 0.0:
             raise InputError(f"dashpots on '{name}' resist nothing: choose facets of the outer boundary and a positive "
@@ -149,8 +149,8 @@ class DashpotMatrix:
                 resisted = self._resistance(self._matrix(both)) > NO_RESISTANCE * total
                 if any(resisted[c] for c in held):
                     raise InputError(f"boundary '{name}' has dashpots in a direction that is prescribed on "
-                                     f"'{condition.name}': never hold and damp one component, leave out the one or "
-                                     "the other")
+                                     f"'{condition.name}': a component is either prescribed or damped, so leave "
+                                     "out one of the two")
 
     def moved_by(self, motion: Callable[[float], Array], factor: float) -> Callable[[float], Array]:
         """Return the load factor Pᵀ D v(t), v the same at all nodes."""

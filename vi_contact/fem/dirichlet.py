@@ -68,7 +68,7 @@ def taken_space(mesh: Any, V: Any, bcs: Sequence[Any], degree: int) -> tuple[Any
         if V.ufl_element() == known.ufl_element() and _block_of(known, V) is not None and not len(V.component()):
             return V, k
     raise InputError(f"assemble: space is one of {V.ufl_element()}; give the Lagrange space of degree 1 or 2 with "
-                     f"{mesh.geometry.dim} components, not a part of another one")
+                     f"{mesh.geometry.dim} components, not a part of another space")
 
 
 def taken(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[GivenValues, ...]:
@@ -84,10 +84,10 @@ def taken(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[GivenValues, ...]:
         where = block[dofs[known] // d], dofs[known] % d
         mask, given = np.zeros((2, V.dofmap.index_map.size_local + V.dofmap.index_map.num_ghosts, d))
         mask[where], given[where] = 1.0, values[known]
-        defect = "" if np.all(np.isfinite(values)) else f"assemble: {name} contains NaN or infinite values"
+        defect = "" if np.all(np.isfinite(values)) else f"assemble: {name} has NaN or infinite values; correct them"
         refuse([defect], comm)
         if not largest(comm, len(dofs)):
-            raise InputError(f"assemble: {name} holds no unknown on any rank; look how its dofs were located")
+            raise InputError(f"assemble: {name} prescribes no unknown on any rank; check how its dofs were located")
         found.append(GivenValues(name, mask > 0.0, given, bool(largest(comm, max_abs(values)))))
     return tuple(found)
 
@@ -107,7 +107,7 @@ def refuse_contradictions(space: Any) -> None:
         both, *each = space.comm.sum(np.array([np.isfinite(one).sum() for one in (apart, held[i], held[j])]))
         if both and both in each and (moves or largest(space.comm, np.nanmax(apart, initial=0.0))):
             raise InputError(f"assemble: {space.prescribed[j].name} and what is prescribed on "
-                             f"'{space.prescribed[i].name}' hold the same at different values: leave one of them out")
+                             f"'{space.prescribed[i].name}' differ at an unknown of both: leave one of them out")
 
 
 def _block_of(V: Any, S: Any) -> Indices | None:

@@ -46,8 +46,8 @@ def form_of(said: str, call: Callable[..., Any], space: FemSpace, *arguments: An
     form = on_all(space.comm, said, lambda: call(*arguments))
     instance(said, "what it returns", form, ufl.Form, "return an integral, such as ufl.inner(…, …) * ufl.dx")
     if set(on_all(space.comm, said, form.arguments)) != set(arguments):
-        raise InputError(f"{said} is no form in the trial and test functions it is given; return one that is not zero "
-                         "and linear in each of them")
+        raise InputError(f"{said} is not a form in the given trial and test functions; return one that is not zero and "
+                         "is linear in each of them")
     on_all(space.comm, said, lambda: refuse_not_linear(said, form))
     own = space.mesh.ufl_domain().ufl_id()
     functions = (getattr(one, "function_space", space.V) for one in form.coefficients())
@@ -92,8 +92,8 @@ def refuse_masses(matrix: Any, space: FemSpace) -> None:
     motions = [*space.translations, *(probe(_numbers(space), j) for j in range(PROBES))]
     energies = [space.comm.sum(np.array([w @ (M @ w)]))[0] for w in motions]
     if not (least > 0.0 and min(energies) > 0.0):
-        raise InputError("Forms: mass is not positive, some motion would have no kinetic energy or less; give a "
-                         "density above zero everywhere")
+        raise InputError("Forms: mass is not positive: some motion would have a kinetic energy of zero or less; "
+                         "give a density above zero everywhere")
 
 
 def _numbers(space: FemSpace) -> Any:

@@ -197,7 +197,7 @@ def _anisotropic(
 ) -> Any:
     """The matrix of all cells (see ``Orthotropic.matrix``) times the thickness, as a function."""
     if d == 1:
-        raise InputError("Orthotropic has no meaning on a line: give a LinearElastic")
+        raise InputError("Orthotropic is for bodies in the plane or in space: give a LinearElastic here")
     n, trace = len(VOIGT[d]), np.array([float(i == j) for i, j in VOIGT[d]])
     rows = n + (d == 2)  # the last one is that of the strain and the stress across the plane
     found = compat.function(compat.lagrange(cells.mesh, degree, (rows, rows), continuous=False))
@@ -228,7 +228,7 @@ def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, Material]]
     own = covered[: cell_map.size_local]
     missing, twice = mesh.comm.allreduce(np.array([np.sum(own == 0), np.sum(own > 1)]))
     if twice:
-        raise InputError(f"{twice} cells have more than one material: cell groups with a material must not overlap")
+        raise InputError(f"{twice} cells have more than one material: give cell groups that do not overlap")
     if missing:
         raise InputError(
             f"{missing} cells have no material: give a (cells, material) pair for every cell group of the mesh"

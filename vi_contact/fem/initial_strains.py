@@ -32,11 +32,11 @@ class InitialStrain(ActingLoad):
     Args:
         value: the strain of all directions, across the plane too, or a tensor, of which the symmetric part counts,
             (d, d) or in the plane (3, 3); or a function of points (k, d) [m] and the time [s] -> (k,), (k, d, d) or in
-            the plane (k, 3, 3), which is asked at t = 0 s when a body is assembled.
+            the plane (k, 3, 3), which is asked at t = 0 s when a body is assembled. A bar is held sideways: warming
+            then lengthens it by (1 + nu)/(1 - nu) alpha (T - T_0); nu = 0 is a bar with free sides.
         history: factor s(t) of the value at t = 0 s; cells: the part of the body that is strained.
     Raises:
-        InputError: values of other shapes, NaN; beside forms=… of the user's own, which do not tell C.
-    """
+        InputError: values of other shapes, NaN; beside forms=… of the user's own, which do not tell C."""
 
     value: float | Sequence[Sequence[float]] | Callable[[Array, float], Array]  # type: ignore[assignment]  # as given
     history: Callable[[float], float] | None = None
@@ -56,6 +56,9 @@ class InitialStrain(ActingLoad):
         found = _tensors(f"InitialStrain at t = {t:g} s", value, at_points, points.shape[1:])
         whole = np.zeros((len(points), 3, 3))
         whole[:, : found.shape[-1], : found.shape[-1]] = found
+        if points.shape[1] == 2 and (whole + whole.swapaxes(1, 2))[:, 2, :2].any():
+            raise InputError("InitialStrain: value shears across the plane (xz or yz), where a body in the plane does "
+                             "not move; give zero there, or a body in space")
         return whole.reshape(room.shape)
 
 
@@ -88,8 +91,12 @@ class InitialStrains:
 
     def _split(self, eps: Any) -> tuple[Any, Any]:
         """(Strain (d, d), that across the plane, none in plane stress) of tensors."""
-        d = self._space.dimension
-        free = d != 2 or isinstance(self._body.section, PlaneStress)
+        d, panel = self._space.dimension, isinstance(self._body.section, PlaneStress)
+        free = d != 2 or panel
+        if d == 1:  # a bar cannot strain sideways, as its stiffness says: what is held there presses along it
+            lame, shear = self._body.fields["lame"], self._body.fields["shear"]
+            sides = eps[1, 1] if panel else eps[1, 1] + eps[2, 2]
+            return ufl.as_tensor([[eps[0, 0] + lame / (lame + 2 * shear) * sides]]), 0.0
         return ufl.sym(ufl.as_tensor([[eps[i, j] for j in range(d)] for i in range(d)])), 0.0 if free else eps[2, 2]
 
     def against(self, r: Any, inside: Any) -> Any:

@@ -22,7 +22,7 @@ NAME = "LinearForm"
 
 @dataclass(frozen=True)
 class LinearForm:
-    """Apply the load whose virtual work is L(v) = ∫ f·v dx + ∫ g·v ds + …, as UFL with measures: v -> ufl.Form.
+    """Apply the load whose virtual work is L(v), as UFL with measures: v -> ufl.Form, such as ∫ f·v dx + ∫ g·v ds.
 
     f in N/m³ and g in Pa push along +v; what the form gives is multiplied by the section's thickness, as other loads
     are. The form may hold DOLFINx Functions and Constants of this mesh, gradients of v and Measures with the user's own
@@ -50,7 +50,7 @@ class LinearForm:
         for name in ("history", "update"):
             optional(function, NAME, name, getattr(self, name), "give a function of the time [s], or None")
         if self.history is not None and self.update is not None:
-            raise InputError(f"{NAME} has a history and an update; give one of them, a factor or all that changes")
+            raise InputError(f"{NAME} has a history and an update; give one of the two only")
 
     @property
     def is_constant(self) -> bool:

@@ -55,7 +55,7 @@ def _zero(points: Array, t: float) -> Array:
 
 @dataclass(frozen=True)
 class Prescribed:
-    """Prescribe u_i = U_i(x, t) on facets (eq. 3), with the velocity and acceleration of the same motion.
+    """Prescribe u_i = U_i(x, t) on facets, with the velocity and acceleration of the same motion.
 
     ``components``: which displacement components are prescribed (all when None); the others stay free (rollers).
     The mass and damping of the boundary nodes enter the equations, so all three time functions are needed;
@@ -156,7 +156,7 @@ class ActingLoad:
 
 @dataclass(frozen=True)
 class Traction(ActingLoad):
-    """Apply S_i = F_i(x, t) [Pa] on facets (eq. 4). ``history``: a factor f(t) of a value that is constant in time.
+    """Apply the traction S_i = F_i(x, t) [Pa] on facets. ``history`` is a factor f(t) of a value constant in time.
 
     With a history, or with a tuple, the load is assembled once; a callable without history is evaluated every step.
     """
@@ -175,7 +175,7 @@ class Traction(ActingLoad):
 
 @dataclass(frozen=True)
 class TangentialTraction(Traction):
-    """Apply the tangential traction S_T = C_T(x, t) (eq. 6) on the contact boundary: ``value`` less its normal part."""
+    """Apply the tangential traction S_T = C_T(x, t) on the contact boundary: ``value`` less its normal part."""
 
     def acting(self, g: Any, mesh: Mesh) -> Any:
         n = ufl.FacetNormal(mesh)
@@ -213,7 +213,7 @@ class Pressure(Traction):
 
 @dataclass(frozen=True)
 class BodyForce(ActingLoad):
-    """Apply a volume force f_i(x, t) [N/m³] (eq. 7). Weight of a material is BodyForce((0, -rho * 9.80665))."""
+    """Apply a volume force f_i(x, t) [N/m³]. The weight of a material is BodyForce((0, -rho * 9.80665))."""
 
     value: Value
     history: Callable[[float], float] | None = None

@@ -156,18 +156,18 @@ def alone() -> MPI.Comm:
 def read_mesh(path: str | Path, comm: MPI.Comm) -> tuple[Mesh, Tags]:
     """Read a mesh of intervals, triangles, quadrilaterals, tetrahedra or hexahedra and its physical groups.
 
-    Cells of second order, which may be curved, want ``assemble(…, degree=2)``. Coordinates in metres; a file in Gmsh's
-    own format, MSH 2 to 4, text or binary. InputError, the same on every rank, if the file is missing, a script, or no
-    usable mesh (reasons: `vi_contact.meshes.extract.extract`). Collective.
+    Cells of second order, which may be curved, need ``assemble(…, degree=2)``. Coordinates are in metres. The file is
+    in Gmsh's own format, MSH 2 to 4, text or binary. InputError is raised on every rank if the file is missing, is a
+    script, or is not a usable mesh (`vi_contact.meshes.extract.extract` lists the reasons). Collective.
     """
     instance("read_mesh", "path", path, (str, Path), "give the path of a mesh file")
     return _distribute(comm, lambda: arrays_from_file(path))
 
 
 def build_mesh(mesh: MeshScript, comm: MPI.Comm) -> tuple[Mesh, Tags]:
-    """Build the mesh of a script of the folder meshes, or of anything with `build(gmsh)`, without a file.
+    """Build a mesh without a file from a script of ``vi_contact.meshes``, or from any object with `build(gmsh)`.
 
-    Raises like `read_mesh`. Collective.
+    It raises the errors of `read_mesh`. Collective.
     """
     provides("build_mesh", "mesh", mesh, ("build",), "give a script of vi_contact.meshes, BlockMesh(…) for example")
     return _distribute(comm, lambda: arrays_from_script(mesh))

@@ -105,11 +105,11 @@ class OwnForms(ElasticForms):
         return h * ufl.as_tensor([[sigma[i, j] for j in range(d)] for i in range(d)]), across
 
     def hooke(self, eps: Any, across: Any, trace: Any) -> tuple[Any, Any]:
-        raise InputError("InitialStrain beside forms=…, which tell no C; give a LinearForm, and stress= less C eps_0")
+        raise InputError("InitialStrain needs the C of a material; give a LinearForm, and stress= less C eps_0")
 
     def _stress(self, u: Any) -> Any:
         if self._given.stress is None:
-            raise InputError("forms=… of the system tell no stress: give fem.Forms(…, stress=)")
+            raise InputError("forms=… of the system have no stress: give fem.Forms(…, stress=)")
         return self._given.stress(u)
 
     def bilinear(self, name: str) -> Any:

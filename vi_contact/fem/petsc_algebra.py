@@ -19,7 +19,7 @@ from .petsc_rows import aij_of, rows_of
 PREFIX = "vi_contact_factor_"
 OWN_FACTOR = {"ksp_type": "preonly", "pc_type": "cholesky", "pc_factor_mat_solver_type": "petsc",
               "pc_factor_mat_ordering_type": "amd"}
-DEFAULTS = ("redundant_", "mat_mumps_icntl_20")  # options that are set here
+DEFAULTS = ("redundant_", "mat_mumps_icntl_14", "mat_mumps_icntl_20")  # options that are set here
 FULL_ROW = 40.0  # entries of a row: 2D meshes have fewer, 3D meshes more
 FEW_ROWS = 10_000  # with full rows: beyond, MUMPS' dense blocks pay
 COPIED_ROWS = 300_000  # with sparse rows: a copy of the factor on every rank takes about 0.5 GB here
@@ -103,8 +103,8 @@ class PetscFactor:
         if self._by_blocks:
             self._pc.setType(kind)
             self._pc.setFactorSolverType("mumps")
-            # MUMPS may crash on distributed right-hand sides, and only the options database reaches it in time
-            _default_options({"mat_mumps_icntl_20": 0})
+            # MUMPS may crash on distributed right-hand sides; on busy ranks 20 % of spare room may be too little (-9)
+            _default_options({"mat_mumps_icntl_14": 100, "mat_mumps_icntl_20": 0})
         elif mat.comm.size == 1:
             self._pc.setType("cholesky")
             self._pc.setFactorSolverType("petsc")
@@ -125,7 +125,7 @@ class PetscFactor:
         except PETSc.Error:
             failed = True
         if failed:
-            raise InputError("the effective matrix cannot be factorised: it is singular or contains NaN; check the "
+            raise InputError("the effective matrix cannot be factorised: it is singular or contains NaN: check the "
                              "materials, and that every part of the body is clamped or has mass")
 
     @property
@@ -213,7 +213,7 @@ class PetscAlgebra:
                 if not own:
                     mat.destroy()
         if total is None:
-            raise ValueError("combine needs at least one term")
+            raise ValueError("combine: give at least one term")
         return self.held(total)
 
     def held(self, mat: Any) -> PetscMatrix:
@@ -294,5 +294,5 @@ def triple_product(K: Any, P: Any) -> Any:
 def as_petsc(matrix: Matrix) -> PetscMatrix:
     """Return the matrix as a PetscMatrix; TypeError when it belongs to another algebra."""
     if not isinstance(matrix, PetscMatrix):
-        raise TypeError(f"PetscAlgebra got a {type(matrix).__name__}")
+        raise TypeError(f"PetscAlgebra got a {type(matrix).__name__}; give a PetscMatrix")
     return matrix

@@ -55,10 +55,10 @@ def release(static: ContactProblem, state: State, problem: ContactProblem, *,
 def _spaces(static: ContactProblem, problem: ContactProblem) -> tuple[FemSpace, FemSpace]:
     before, after = static.system.space, problem.system.space
     if not isinstance(before, FemSpace) or not isinstance(after, FemSpace) or before.mesh is not after.mesh:
-        raise InputError("release needs two problems of fem.assemble on one mesh")
+        raise InputError("release: give two problems of fem.assemble on one mesh")
     if largest(before.comm, not np.array_equal(static.surface.points, problem.surface.points)):
-        raise InputError("the static stage has other contact points than the problem, as clamped nodes are none: name "
-                         "the same ones for both (points=)")
+        raise InputError("the static stage and the problem have different contact points, perhaps because clamped "
+                         "nodes are left out: name the same points for both (points=)")
     return before, after
 
 
@@ -97,7 +97,7 @@ def _missing(problem: ContactProblem, u0: Array, state: State, was_held: Mask) -
     if missing[0] > BALANCED * max(missing[1:]):
         raise InputError(f"{missing[0]:.3g} N are missing where no support was released: give both stages the same "
                          "materials, loads and friction, and a motion that starts from rest")
-    log.info("supports released: their reactions go on as nodal forces, the largest %.4g N", missing[2])
+    log.info("supports released: their reactions remain as nodal forces, the largest %.4g N", missing[2])
     return force
 
 

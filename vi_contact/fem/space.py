@@ -59,7 +59,7 @@ def bodies_of(system: SemiDiscreteSystem, cells: Cells) -> tuple[int, ...]:
     inside = np.isin(np.arange(len(body)), cells.indices)
     mine, rest = (np.unique(np.concatenate(from_each(space.comm, body[part]))) for part in (inside, ~inside))
     if np.isin(mine, rest).any():
-        raise InputError(f"bodies_of: the cell group '{cells.name}' is a part of a body, and shares nodes with other "
+        raise InputError(f"bodies_of: the cell group '{cells.name}' is a part of a body and shares nodes with other "
                          "cells; give a group of whole bodies")
     return tuple(mine.tolist())
 
@@ -71,7 +71,7 @@ def known_matrices(owner: str, system: SemiDiscreteSystem, names: str) -> None:
     """
     found = system.space.forms.foreign(system, names)  # type: ignore[attr-defined]
     if found and system.algebra.comm.rank == 0:
-        log.warning("%s: %s of the system is not the one that fem.assemble made: this output goes by the materials, "
+        log.warning("%s: %s of the system is not the one that fem.assemble made: this output uses the materials, "
                     "section and damping given there", owner, " and ".join(found))
 
 

@@ -80,7 +80,7 @@ def _pairs(tie: Tied, dimension: int, near: float, nodes: NodesOf) -> tuple[Indi
     if len(first[0]) != len(second[0]) or not len(first[0]):
         raise InputError(f"tied boundaries {names} have {len(first[0])} and {len(second[0])} nodes: mesh them alike")
     for shared in first[1][np.isin(first[0], second[0])]:
-        raise InputError(f"tied boundaries {names} share the node {at(shared)}: tie opposite boundaries")
+        raise InputError(f"tied boundaries {names} share the node {at(shared)}: tie boundaries without common nodes")
     from scipy.spatial import cKDTree
 
     apart = second[1].mean(axis=0) - first[1].mean(axis=0)

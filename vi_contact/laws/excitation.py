@@ -21,7 +21,7 @@ from ..core.protocols import check_excitation, finite_tuple, vector
 
 @dataclass(frozen=True)
 class Harmonic:
-    """Shake with a(t) = amplitude · sin(2 pi frequency t + phase), for ever.
+    """Shake with a(t) = amplitude · sin(2 pi frequency t + phase) at all times.
 
     amplitude [m/s²]; frequency [Hz] > 0; phase [rad]. Raises InputError for values out of range or not finite.
     """
@@ -136,7 +136,7 @@ class Tabulated:
         for name in ("times", "values"):
             object.__setattr__(self, name, finite_tuple("Tabulated", name, getattr(self, name)))
         if len(self.times) != len(self.values) or len(self.times) < 2:
-            raise InputError(f"Tabulated: {len(self.times)} times and {len(self.values)} values; "
+            raise InputError(f"Tabulated: there are {len(self.times)} times and {len(self.values)} values; "
                              "give one value per time and at least two of each")
         for k, (before, after) in enumerate(pairwise(self.times)):
             if after <= before:

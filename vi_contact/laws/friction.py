@@ -51,8 +51,8 @@ class Tresca:
 class Coulomb:
     """Bound dry friction by a coefficient mu >= 0: limit = mu · r_n, zero for an open node.
 
-    ``mu``: a number, or one per contact point (then kept as a tuple). Raises InputError when one is negative or not a
-    finite number, and, when used, for a wrong count.
+    ``mu`` is a number, or has one per contact point (then kept as a tuple). InputError is raised when one is negative
+    or not a finite number, and, when the law is used, if their count is wrong.
     """
 
     mu: float | Array | tuple[float, ...]
@@ -124,7 +124,7 @@ class TwoCoefficients:
         for name, meaning in (("mu_s", "the static coefficient mu_s"), ("mu_k", "the kinetic coefficient mu_k")):
             object.__setattr__(self, name, _checked(type(self).__name__, meaning, getattr(self, name)))
         if isinstance(self.mu_s, tuple) and isinstance(self.mu_k, tuple) and len(self.mu_s) != len(self.mu_k):
-            raise InputError(f"{self}: {len(self.mu_s)} static and {len(self.mu_k)} kinetic coefficients; give as many")
+            raise InputError(f"{self}: there are {len(self.mu_s)} mu_s and {len(self.mu_k)} mu_k; give as many")
 
     def _nodal(self, count: int) -> list[Array]:
         """mu_s and mu_k as arrays that broadcast over the nodes."""
@@ -162,7 +162,7 @@ class StaticKinetic(TwoCoefficients):
     def __post_init__(self) -> None:
         super().__post_init__()
         if np.any(np.asarray(self.mu_s) < np.asarray(self.mu_k)):
-            raise InputError(f"{self}: moving points that rub more than resting ones have no rate; give mu_s >= mu_k")
+            raise InputError(f"{self}: friction that begins to grow with slip has no rate; give mu_s >= mu_k")
 
     def __call__(self, speed: Array) -> Array:
         """mu of each speed."""

@@ -68,11 +68,11 @@ class Redistributed:
         if system.space.hierarchy is not None:
             lumping = 0.0
         elif largest(algebra.comm, still.any()):
-            raise InputError("redistributed mass has no place for the inertia of rotations, or of what else is no "
-                             "displacement: give the problem mass=ConsistentMass()")
+            raise InputError("redistributed mass is for displacements only, and M has the inertia of rotations or of "
+                             "other unknowns: give the problem mass=ConsistentMass()")
         wrong = int(total(algebra.comm, np.sum(nodal < -LIGHT * own)))  # as of elements of higher order
         if wrong and lumping:
-            raise InputError(f"redistributed mass cannot lump negative row sums of M and {wrong} unknowns have such: "
+            raise InputError(f"redistributed mass cannot lump negative row sums of M and {wrong} unknowns have them: "
                              "give the problem mass=Redistributed(lumping=0.0) or ConsistentMass()")
         nodal = own if wrong else np.maximum(nodal, 0.0)
         inner = ~(contact | still)
@@ -144,8 +144,8 @@ def _inertia_correction(system: SemiDiscreteSystem, moved: Matrix, inner: Mask, 
     entries = [share if i is j else 0.5 * share for share, (i, j) in zip(shares, pairs, strict=True)]
     moved_most = largest(comm, max_abs(np.concatenate(entries)))
     if moved_most > LARGEST_CORRECTION:
-        raise InputError("the mesh is too coarse for redistributed mass, keeping the inertia would change nodal masses "
-                         f"by {100 * moved_most:.0f} %: refine it, or give the problem mass=ConsistentMass()")
+        raise InputError("the mesh is too coarse for redistributed mass, which would change nodal "
+                         f"masses by {100 * moved_most:.0f} %: refine it, or give the problem mass=ConsistentMass()")
     i, j = (np.concatenate([pair[side] for pair in pairs]) for side in (0, 1))
     value = 0.5 * np.concatenate(shares) * nodal[i]
     both = np.concatenate([i, j]), np.concatenate([j, i])

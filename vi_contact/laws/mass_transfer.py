@@ -43,7 +43,7 @@ def from_neighbours(system: SemiDiscreteSystem, massless: Mask, contact: Mask, n
         elif exact:
             exact, donors = False, donors | (tied & ~contact)  # too few to tell a rotation: translations will do
         else:
-            raise InputError("the mass of some contact nodes has nowhere to go, no node behind them carries any: "
+            raise InputError("the mass of some contact nodes cannot be moved, as no node behind them has mass: "
                              "refine the mesh across the body, or give the problem mass=ConsistentMass()")
     return levels[::-1]
 

@@ -18,7 +18,7 @@ class LinearElastic:
     """Describe isotropic elasticity, sigma = lame_lambda tr(eps) I + 2 shear_modulus eps.
 
     E: Young's modulus [Pa] > 0; nu: Poisson's ratio, -1 < nu < 1/2; rho: mass density [kg/m³] > 0.
-    Raises InputError when one of them is outside its range or not finite.
+    InputError is raised when one of them is outside its range or not finite.
     """
 
     E: float
@@ -34,7 +34,7 @@ class LinearElastic:
         number("LinearElastic", "Poisson's ratio nu", self.nu)
         number("LinearElastic", "the mass density rho [kg/m³]", self.rho, positive=True)
         if not (EXTREME**-1 <= self.E <= EXTREME and EXTREME**-1 <= self.rho <= EXTREME):
-            raise InputError(f"LinearElastic: E = {self.E:g} Pa and rho = {self.rho:g} kg/m³ are of no material; give "
+            raise InputError(f"LinearElastic: no material has E = {self.E:g} Pa and rho = {self.rho:g} kg/m³; give "
                              f"numbers between {1.0 / EXTREME:g} and {EXTREME:g}")
         if not -1.0 < self.nu < 0.5:
             raise InputError(f"LinearElastic: Poisson's ratio nu is {self.nu!r}; give a number between -1 and 0.5, "
@@ -51,7 +51,7 @@ class LinearElastic:
             number("LinearElastic.from_wave_speeds", name, speed, positive=True)
         if 3.0 * c_p**2 <= 4.0 * c_s**2:
             raise InputError(f"LinearElastic.from_wave_speeds: c_p = {c_p!r} is too slow for c_s = {c_s!r}; "
-                             "an elastic solid needs c_p > sqrt(4/3) c_s")
+                             "give c_p > sqrt(4/3) c_s, as an elastic solid has")
         nu = (c_p**2 - 2.0 * c_s**2) / (2.0 * (c_p**2 - c_s**2))
         return cls(E=2.0 * rho * c_s**2 * (1.0 + nu), nu=nu, rho=rho)
 
@@ -224,10 +224,10 @@ class Rayleigh:
 
 @dataclass(frozen=True)
 class DampingRatio:
-    """Damp by the ratio xi of each material (``fem.Heterogeneous(…, xi=…)``, zero of others), which may change from
-    cell to cell, at one frequency f1 [Hz] or at two: C = alpha M + beta K with w = 2 pi f and
+    """Damp by the ratio xi of each material at one frequency f1 [Hz], or at two. The ratio is that of
+    ``fem.Heterogeneous``, where it may change from cell to cell, and zero for other materials.
 
-        alpha = 2 xi w1 w2 / (w1 + w2),    beta = 2 xi / (w1 + w2)
+        C = alpha M + beta K,    alpha = 2 xi w1 w2 / (w1 + w2),    beta = 2 xi / (w1 + w2),    w = 2 pi f
 
     ``second`` is f2, or zero for damping of the stiffness alone: xi f/f1 at f. With two frequencies the ratio is less
     than xi between them and more outside, and alpha M also resists rigid rocking (see ``Rayleigh``).

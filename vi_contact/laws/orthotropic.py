@@ -60,7 +60,7 @@ class Orthotropic:
                              "sqrt(E_i / E_j)")
         Q = self._rotation
         if not np.allclose(Q.T @ Q, np.eye(3), atol=1e-9) or np.linalg.det(Q) < 0.0:
-            raise InputError("Orthotropic: axes is no rotation; give an angle [rad], or a matrix whose columns are "
+            raise InputError("Orthotropic: axes is not a rotation; give an angle [rad], or a matrix whose columns are "
                              "right-handed unit vectors at right angles")
 
     @property
@@ -95,12 +95,12 @@ class Orthotropic:
         (4, 3) in the plane, (6, 6) in space; InputError for material axes that leave the plane, and on a line.
         """
         if dimension not in VOIGT:
-            raise InputError("Orthotropic has no meaning on a line: give a LinearElastic")
+            raise InputError("Orthotropic is for bodies in the plane or in space: give a LinearElastic here")
         C = self.stiffness
         if dimension == 2:
             out = np.abs(C[:, :, :2, 2])[[0, 1, 0, 2], [0, 1, 1, 2]]  # shear across the plane by strains in it
             if out.max() > ROUND_OFF * C.max():
-                raise InputError("Orthotropic: a body in the plane would leave it, for z is none of the material axes; "
+                raise InputError("Orthotropic: z is not one of the material axes, so the body would leave its plane; "
                                  "give the angle of axis 1 in the plane")
             if isinstance(section, PlaneStress):
                 C = C - np.einsum("ij,kl->ijkl", C[:, :, 2, 2], C[2, 2]) / C[2, 2, 2, 2]

@@ -27,7 +27,7 @@ def with_weight(system: SemiDiscreteSystem, *, acceleration: float = STANDARD_GR
     down = (*(0.0,) * (d - 1), -1.0)
     way = array("with_weight", "direction", down if direction is None else direction, (None,))
     if way.shape != (d,) or not np.isclose(np.linalg.norm(way), 1.0):
-        raise InputError(f"the direction {tuple(way)} of gravity: give {d} components of a vector of length one")
+        raise InputError(f"the direction of gravity is {tuple(way)}: give {d} components of a vector of length one")
     if system.base_mass is None:
         raise InputError("the weight needs the mass at held nodes: assemble with base_inertia=True")
     weight = system.inertia(acceleration * way)

@@ -24,8 +24,8 @@ class SingleStep:
         """Raise InputError for unknowns without mass, as contact nodes: their forces would swing for ever."""
         _refuse_massless_elsewhere(problem)
         if problem.equations.massless is not None:
-            raise InputError(f"{type(self).__name__} needs mass at the contact nodes, whose forces would swing for "
-                             "ever: give the problem mass=ConsistentMass(), or use the default scheme Trapezoidal()")
+            raise InputError(f"{type(self).__name__} needs mass at the contact nodes, else their forces oscillate: "
+                             "give the problem mass=ConsistentMass(), or use the default scheme Trapezoidal()")
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
         """Return the state: there is nothing to prepare."""
@@ -41,7 +41,7 @@ class BalanceStep:
 
     @property
     def mass(self) -> MassLaw:
-        """Return the redistributed mass: with contact in the balance of forces, massless nodes cannot create energy."""
+        """Return the redistributed mass: with contact in the balance of forces, mass at its nodes creates energy."""
         return Redistributed()
 
     def check(self, problem: ContactProblem) -> None:
@@ -81,8 +81,8 @@ def check_balance(name: str, problem: ContactProblem) -> None:
     _refuse_massless_elsewhere(problem)
     massless, surface = problem.equations.massless is not None, problem.surface
     if massless and problem.impact is not None:
-        raise InputError(f"the impact law {problem.impact} acts on the mass of contact nodes and this problem has none "
-                         "there: leave the law out, or give the problem mass=ConsistentMass()")
+        raise InputError(f"the impact law {problem.impact} acts on the mass of contact nodes, which is zero in this "
+                         "problem: leave the law out, or give the problem mass=ConsistentMass()")
     if massless or not surface.some(~surface.bilateral & surface.rigid):
         return
     told = problem.equations.cached(f"told of {name}", list)
@@ -96,5 +96,5 @@ def _refuse_massless_elsewhere(problem: ContactProblem) -> None:
     """Raise InputError for unknowns without mass beside contact nodes with mass."""
     layer, surface = problem.equations.massless, problem.surface
     if layer is not None and surface.some(~layer[surface.owned]):
-        raise InputError("rows of M are zero and contact nodes have mass: condense these unknowns out of K, which is "
-                         "exact (rotations of a lumped beam), give them inertia, or use mass=Redistributed()")
+        raise InputError("rows of M are zero while contact nodes have mass: condense these unknowns out of K (it is "
+                         "exact, as for rotations of a lumped beam), give them mass, or use mass=Redistributed()")

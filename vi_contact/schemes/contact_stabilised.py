@@ -39,7 +39,7 @@ from .consistent_data import mass_matrix, rigid_part
 
 @dataclass(frozen=True)
 class ContactStabilisedNewmark(SingleStep):
-    """Step by the module's equations, which need mass at contact nodes. ``projected``: whether the predictor is
+    """Step by the module's equations. They need mass at contact nodes. ``projected``: whether the predictor is
     projected. StepFailure when the projection cannot be certified."""
 
     projected: bool = True
@@ -98,5 +98,5 @@ def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tu
     try:
         result, _, _ = solver.solve(step)
     except StepFailure as failure:
-        raise StepFailure(f"the predictor could not be projected onto the admissible set: {failure}") from failure
+        raise StepFailure(f"the predictor could not be brought out of the obstacle: {failure}") from failure
     return u + result.x, result.active

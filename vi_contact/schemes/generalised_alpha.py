@@ -16,9 +16,9 @@ alpha_m = (2 rho - 1)/(1 + rho), alpha_f = rho/(1 + rho), beta = ¼ (1 - alpha_m
 Start, and restart after every velocity jump: the acceleration that fits (``consistent_data``). Unknowns without mass
 (mass.Redistributed) have no acceleration, the mean velocity of the step, and are in equilibrium at its ends.
 Energy: the ledger closes with the weights of the equation above, its algorithmic part is the damping of high
-frequencies. Contact stands in the balance of forces and on consistent mass creates energy when it opens, which the
-damping makes up for only while dt does not resolve the highest frequency of the mesh: docs/guide/schemes.md has
-numbers.
+frequencies. Contact stands in the balance of forces and creates energy when it opens. Unless rho_inf is near 0 the
+damping does not make up for it where a wave crosses many elements in a step, nor on consistent mass where dt resolves
+the highest frequency of the mesh: docs/guide/schemes.md has numbers.
 Impulses: sum of dt r_n,f over a contact with free flight before and after is the change of momentum; in single steps it
 is not, unless the member is Newmark.
 Source: Chung and Hulbert, J. Appl. Mech. 60 (1993) 371-375.
@@ -122,7 +122,7 @@ def weighted(problem: ContactProblem, old: State, new: State, m: float, f: float
 
 @dataclass(frozen=True)
 class GeneralisedAlpha(AlphaStep):
-    """Step by the module's equations; take ``GeneralisedAlpha.spectral_radius(rho_inf)``. InputError unless stable."""
+    """Step by the module's equations. Take ``GeneralisedAlpha.spectral_radius(rho_inf)``. InputError unless stable."""
 
     alpha_m: float
     alpha_f: float

@@ -6,12 +6,13 @@
 Generalised-alpha with alpha_m = 0, alpha_f = -alpha (see there for equations, restart, energy and impulses).
 Order 2, unconditionally stable for -1/3 <= alpha <= 0; amplification (1 + alpha)/(1 - alpha) at infinite frequency: 1
 at alpha = 0, which is Newmark(¼, ½), and ½ at -1/3.
-On consistent mass the damping keeps the energy that contact creates in bounds only while dt does not resolve the
-highest frequency of the mesh: docs/guide/schemes.md has numbers.
+On massless contact nodes contact creates energy when a wave crosses many elements in a step, and the damping does not
+keep it in bounds; on consistent mass also when dt resolves the mesh: docs/guide/schemes.md has numbers.
 Source: Hilber, Hughes and Taylor, Earthquake Eng. Struct. Dyn. 5 (1977) 283-292.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from ..core.checks import between
 from .generalised_alpha import AlphaStep, GeneralisedAlpha
@@ -26,7 +27,7 @@ class HHT(AlphaStep):
     def __post_init__(self) -> None:
         between("HHT alpha", self.alpha, -1.0 / 3.0, 0.0, "give a number from -1/3 to 0, others are not stable")
 
-    @property
+    @cached_property
     def weights(self) -> GeneralisedAlpha:
         """Return the weights as a generalised-alpha member."""
         return GeneralisedAlpha(0.0, -self.alpha, 0.25 * (1.0 - self.alpha) ** 2, 0.5 - self.alpha)

@@ -38,7 +38,7 @@ DAMPING = (0.0, 0.1, 1.0)  # damping ratios, for the stability check
 
 @dataclass(frozen=True)
 class LinearMultistep(BalanceStep):
-    """Step with the coefficients of eqs. 11a,b, newest level first, all of the same length q + 1 >= 2.
+    """Step with the coefficients of a linear multistep method, newest level first, all of one length q + 1 >= 2.
 
     InputError for unequal lengths, b[0] = 0, or inconsistent operators (they must be exact for u = 1, t and t²).
     """
@@ -56,17 +56,17 @@ class LinearMultistep(BalanceStep):
         number("LinearMultistep", "mu", self.mu)
         q = len(self.a) - 1
         if q < 1 or len(self.b) != q + 1 or len(self.gamma) != q + 1:
-            raise InputError("LinearMultistep a, b and gamma must have the same length q + 1 >= 2 (levels p, ..., p-q)")
+            raise InputError("LinearMultistep: give a, b and gamma of one length q + 1 >= 2 (levels p, ..., p-q)")
         if self.b[0] == 0.0 or self.mu == 0.0 or self.gamma[0] == 0.0:
-            raise InputError("LinearMultistep needs b[0], gamma[0] and mu other than zero: only implicit members can "
-                             "hold contact")
+            raise InputError("LinearMultistep: give b[0], gamma[0] and mu other than zero, as only implicit schemes "
+                             "can hold contact")
         level = -np.arange(q + 1.0)
         a, b, gamma = (np.asarray(c, dtype=float) for c in (self.a, self.b, self.gamma))
         defects = (a.sum(), a @ level - b.sum(), gamma.sum(), gamma @ level, gamma @ level**2 - 2.0 * self.mu * b.sum())
         scale = np.abs(a).sum() + np.abs(b).sum() + np.abs(gamma).sum()
         if not np.max(np.abs(defects)) <= 1e-12 * scale * (q + 1) ** 2:
-            raise InputError("LinearMultistep coefficients are inconsistent: eq. 11a must be exact for u = 1, t and "
-                             "eq. 11b for u = 1, t, t²")
+            raise InputError("LinearMultistep coefficients are inconsistent: give some for which eq. 11a is exact for "
+                             "u = 1, t and eq. 11b for u = 1, t, t²")
         if self.spectral_radius() > 1.0 + 1e-6:
             raise InputError(f"LinearMultistep a={self.a}, b={self.b}, gamma={self.gamma} is not unconditionally "
                              "stable: contact has no highest frequency to choose dt by; take other coefficients, for "
@@ -85,7 +85,7 @@ class LinearMultistep(BalanceStep):
         for name, value in (("beta", beta), ("gamma", gamma)):
             number("LinearMultistep.newmark", name, value)
         if beta <= 0.0:
-            raise InputError(f"Newmark beta is {beta}: give beta > 0, the explicit member cannot hold contact")
+            raise InputError(f"Newmark beta is {beta}: give beta > 0, as the explicit scheme cannot hold contact")
         b = (beta, 0.5 + gamma - 2.0 * beta, 0.5 - gamma + beta)
         return cls(a=(gamma, 1.0 - 2.0 * gamma, gamma - 1.0), b=b, gamma=(1.0, -2.0, 1.0))
 

@@ -69,8 +69,8 @@ class MoreauJean(SingleStep):
         super().check(problem)
         surface = problem.surface
         if surface.some(surface.compliance > 0.0):
-            raise InputError("MoreauJean stops velocities and springs do not: use ContactStabilisedNewmark() or "
-                             "Midpoint() on elastic supports")
+            raise InputError("MoreauJean has unilateral velocities, which do not fit elastic supports: use "
+                             "ContactStabilisedNewmark() or Midpoint() there")
         if problem.impact is not None:
             raise InputError(f"MoreauJean has its own restitution coefficient and {problem.impact} would act on top of "
                              "it: leave the impact law out, and give MoreauJean(e=…)")

@@ -21,6 +21,7 @@ Source: Newmark, J. Eng. Mech. Div. ASCE 85 (1959) 67-94; Krenk, Comput. Methods
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from ..core.problem import ContactProblem
 from ..core.step import Balance, State
@@ -37,7 +38,7 @@ class Newmark(AlphaStep):
     def __post_init__(self) -> None:
         _ = self.weights
 
-    @property
+    @cached_property
     def weights(self) -> GeneralisedAlpha:
         """Return the weights as a generalised-alpha member."""
         return GeneralisedAlpha(0.0, 0.0, self.beta, self.gamma)

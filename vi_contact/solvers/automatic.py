@@ -30,12 +30,12 @@ TOLERANCE = 1e-12  # of conjugate gradients beside the steps: what starts a run 
 
 @dataclass(frozen=True)
 class Automatic:
-    """Solve by ``condensed`` or by ``iterative``, whichever the size of the problem makes the faster one.
+    """Solve by ``condensed`` or by ``iterative``: the one that is faster for the size of the problem.
 
-    The iterative route is taken in three dimensions from 50 000 unknowns on (20 000 on several ranks, or without
-    CHOLMOD), and wherever the small problem has more rows, contact points or with friction contact unknowns, than 4000
-    in space and 5000 in the plane; elsewhere, and without finite elements, the condensed one. The log says which.
-    ``iterative`` None is Iterative(), which needs PETSc.
+    ``iterative`` solves problems in space from 50 000 unknowns on (20 000 on several ranks, or without CHOLMOD), and
+    problems with more contact points (with friction: contact unknowns) than 4000 in space or 5000 in the plane.
+    ``condensed`` solves all others, and all problems without finite elements. The log says which one is used.
+    If ``iterative`` is None, it is Iterative(), which needs PETSc.
     """
 
     condensed: Solver = field(default_factory=Condensed)

@@ -24,7 +24,7 @@ from .correction import corrected
 TOLERANCE = 1e-9
 NEAR = 1e-2  # of the tolerance: round-off of ordinary steps stays a hundred times below, and is left as it is
 FAR = 1e-4  # residuals above are not round-off
-ADVICE = "try a smaller dt, another solver, or check the data of this time"
+ADVICE = "try a smaller dt or another solver, or check the data of this time"
 
 
 class CertifiedSolver:
@@ -79,9 +79,9 @@ def check_laws(owner: str, problem: ContactProblem, *, unsymmetric: bool = False
     surface, law = problem.surface, problem.friction
     if not unsymmetric and not problem.system.algebra.symmetric:
         raise InputError(f"{owner} needs symmetric matrices and those of the system are not: use "
-                         "Condensed(Lemke()) or solver=Volume(), whose ReducedNewton and SemismoothNewton do not")
+                         "Condensed(Lemke()), or Volume() with ReducedNewton() or SemismoothNewton()")
     if problem.frictional and surface.tangents.shape[1] == 0:
-        raise InputError(f"{owner} would ignore {law}: a body in one dimension cannot slide, use Frictionless()")
+        raise InputError(f"{owner} cannot use {law}: a body in one dimension cannot slide, so use Frictionless()")
     on_all(surface.comm, "the friction law", lambda: law.limit(np.zeros(surface.count), surface.weights, 1.0))
 
 

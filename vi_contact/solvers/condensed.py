@@ -49,11 +49,11 @@ class SmallMethod(Protocol):
 
 @dataclass(frozen=True)
 class Condensed:
-    """Condense onto the contact unknowns, with a method for the small problem; with or without friction, on any ranks.
+    """Condense each step onto its contact unknowns and solve this smaller problem, on any number of ranks.
 
     ``method`` solves it without friction: ActiveSet, Hildreth or Lemke. ``friction_method`` solves it with friction:
-    FrictionNewton, NSGS or FixedPoint or GivenForces; ``rates`` is the iteration around it for laws that depend on the
-    slip rate. Matrices that are not symmetric need Lemke. Contact sets too large for a dense G are for ``Iterative``.
+    FrictionNewton, NSGS, FixedPoint or GivenForces. ``rates`` is the iteration around it for laws that depend on the
+    slip rate. Matrices that are not symmetric need Lemke. For contact sets too large for a dense G use ``Iterative``.
     """
 
     method: SmallMethod = field(default_factory=ActiveSet)

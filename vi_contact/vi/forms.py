@@ -67,7 +67,7 @@ class Problem:
         self.comm = MpiComm(kept(space.mesh.comm))
         self.owned = space.dofmap.index_map_bs * space.dofmap.index_map.size_local
         if not isinstance(bcs, list | tuple) or not all(compat.constrains(bc, space) for bc in bcs):
-            raise refused("bcs is no list of dirichletbc objects on the space of u or its components: give one")
+            raise refused("bcs is wrong: give a list of dirichletbc objects on the space of u or its components")
         self._clamped, self._values = np.zeros(len(u.x.array), dtype=bool), np.zeros(len(u.x.array))
         for bc in bcs:
             held, values = compat.bc_values(bc, len(self._values))
@@ -126,11 +126,11 @@ class Problem:
         u, space = np.array(self.u.x.array[: self.owned]), self.u.function_space
         off = OFF * np.max([np.where(np.isfinite(one), np.abs(one), 0.0) for one in (low, high, u)], axis=0)
         defects = (
-            (~np.isfinite(u), "the first guess or bcs are not a number: correct them"),
+            (~np.isfinite(u), "the first guess or bcs are NaN or infinite: correct them"),
             (np.isnan(low) | np.isnan(high), "a bound is not a number: give None where there is none"),
             (low > high, "lower is above upper: give lower <= upper"),
-            ((low == np.inf) | (high == -np.inf), "no number is left: lower may be -inf and upper inf, or None"),
-            (~self.free & ((u < low - off) | (u > high + off)), "bcs prescribe another value: correct one"),
+            ((low == np.inf) | (high == -np.inf), "no number is allowed: give finite bounds, or None"),
+            (~self.free & ((u < low - off) | (u > high + off)), "bcs prescribe a value beyond a bound: correct it"),
         )
 
         def said(i: int, words: str) -> str:

@@ -33,7 +33,7 @@ REFINEMENTS = 5  # of a linear problem, at most
 
 @dataclass(frozen=True)
 class Result:
-    """Answer ``solve``: u, the Function given, and what is known of it.
+    """Hold the answer of ``solve``: u, the Function that was given, and what is known of it.
 
     ``lambda_lower``, ``lambda_upper``: Functions of the multipliers, forces at points in the unit of F >= 0. With F the
     vector of F(u; phi_i), F = lambda_lower - lambda_upper where bcs prescribe nothing, and zero off the bounds.
@@ -140,7 +140,7 @@ def solve(form: Any, u: Any, *, lower: Any = None, upper: Any = None, bcs: Seque
                     point, count = Point(problem, low, high), count + 1
                     best = min(best, point, key=lambda one: one.certificate.worst)
                 else:
-                    said = "no step in Newton's direction is an improvement: give a better first guess in u"
+                    said = "no step in Newton's direction improves u: give a better first guess"
     except StepFailure as failure:
         said = str(failure)
     finally:
@@ -148,7 +148,7 @@ def solve(form: Any, u: Any, *, lower: Any = None, upper: Any = None, bcs: Seque
     problem.put(best.x)
     reason = f"the certificate is {best.certificate.worst:.1e} after {count} Newton steps"
     if said:
-        raise StepFailure(f"vi.solve: {reason}, above {tolerance:g}: {said} (u holds the best so far)")
+        raise StepFailure(f"vi.solve: {reason}, above {tolerance:g}: {said} (u holds the best iterate)")
     active = [round(total(problem.comm, np.count_nonzero(push))) for push in best.push]
     pushes, seconds = [problem.spread(one) for one in best.push], time.process_time() - ready
     return Result(u, pushes[0], pushes[1], (active[0], active[1]), best.certificate, count, inner, used, reason,

@@ -9,8 +9,7 @@ on every facet, so that psi_i is a combination of its three hats and no gap asks
 Lagrange multipliers: Wohlmuth, SIAM J. Numer. Anal. 38 (2000), 989-1012; of first order on facets of second: Puso,
 Laursen and Solberg, Comput. Methods Appl. Mech. Eng. 197 (2008), 555-566). The weights ∫ psi_i = ∫ phi_i are positive,
 those of first order; a uniform pressure p gives r_i = p ∫ phi_i. On a flat facet of area A the integral of psi_i b_k is
-A / 5 for its edges at vertex i and -A / 15 for the other one; on curved ones it is a quadrature on the facet.
-"""
+A / 5 for its edges at vertex i and -A / 15 for the other one; on curved ones it is a quadrature on the facet."""
 
 from dataclasses import dataclass
 
@@ -92,8 +91,7 @@ def averaged(space: FemSpace, facets: Facets, nodes: Nodes, share: sp.csr_matrix
     with conditions or, where these face ``nodes``, the same on every rank, with ``share``, share times c_ik.
 
     Where a node has several conditions each facet belongs to the one with the normal nearest to its own. Collective.
-    InputError for a mid-point that is held while an end of its edge is free.
-    """
+    InputError for a mid-point that is held while an end of its edge is free."""
     if space.hierarchy is None:
         return ()
     found = _bubbles(space, space.hierarchy, facets, share is not None)

@@ -1,7 +1,6 @@
 """Cut convex polygons of a plane against one another, many at once, and integrate over what is left.
 
-Polygons are (k, m, 2), corners anticlockwise; one with fewer corners repeats some, one that is cut away has no area.
-"""
+Polygons are (k, m, 2), corners anticlockwise; one with fewer corners repeats some, one that is cut away has no area."""
 
 import numpy as np
 
@@ -99,8 +98,7 @@ def hats(corners: Array, points: Array) -> Array:
     these corners (k, v, 2) at points (k, p, 2) in it.
 
     Coordinates (x, y) of a point r = x b + y c + x y d from the first corner are roots of quadratic equations; neither
-    denominator vanishes in a convex facet, where the determinant of the map is positive at all corners.
-    """
+    denominator vanishes in a convex facet, where the determinant of the map is positive at all corners."""
     origin = corners[:, :1]
     r, b, c = points - origin, corners[:, 1:2] - origin, corners[:, -1:] - origin
     quadrilateral = corners.shape[1] == 4

@@ -2,8 +2,7 @@
 
 Facets round a node are one face there as long as each turns by no more than the angle from another one of them. A
 smooth node has one face, a node at an edge two, at a corner in space three. Normal and weight of a face at a node are
-those of the facets of this face. Facets are gathered on every rank only round nodes where they may turn so far.
-"""
+those of the facets of this face. Facets are gathered on every rank only round nodes where they may turn so far."""
 
 import logging
 from dataclasses import dataclass, replace
@@ -36,8 +35,7 @@ class Boundary:
 
     Attributes:
         vertices: (k, v) numbers of their nodes, mid-points too, ascending; normals: (k, v, d) outward there, unit ones.
-        local: this rank's facets of the group; place: their numbers among the k.
-    """
+        local: this rank's facets of the group; place: their numbers among the k."""
 
     vertices: Indices
     normals: Array
@@ -135,8 +133,7 @@ def outward(mesh: Any, facets: Any, geometry: Any) -> Array:
 def _curved(space: FemSpace, facets: Any, plane: Array) -> Array:
     """Outward unit normals (k, n, d) at the nodes of curved facets; ``plane``: those of the planes of their vertices.
 
-    At a vertex that of the tangents of its edges, at mid-points the mean of those of the vertices around.
-    """
+    At a vertex that of the tangents of its edges, at mid-points the mean of those of the vertices around."""
     x = space.mesh.geometry.x[compat.dof_to_node(space.V)[facet_rows(space.V, facets)]][:, :, : space.dimension]
     around = MID_POINTS[x.shape[1]]
     corners = x.shape[1] - len(around)
@@ -173,8 +170,7 @@ def integrals(space: FemSpace, indices: Any) -> Array:
 def split(space: FemSpace, around: Boundary, nodes: Nodes, angle: float) -> tuple[Nodes, Indices]:
     """Return (nodes, at corners one for each face with its normal and weight; a facet of the face, -1 elsewhere).
 
-    ``nodes``: of this rank or of all, the order is kept. Collective.
-    """
+    ``nodes``: of this rank or of all, the order is kept. Collective."""
     if not len(around.vertices):
         return nodes, np.full(len(nodes.numbers), -1)
     corners, labels = nodes.numbers[np.isin(nodes.numbers, around.vertices)], around.corner_faces(angle)
@@ -202,8 +198,7 @@ def split(space: FemSpace, around: Boundary, nodes: Nodes, angle: float) -> tupl
 def _of_faces(space: FemSpace, around: Boundary, labels: Indices, pairs: Indices) -> Array:
     """``integrals`` (pairs, 1 + d) at corner nodes over one of their faces, for pairs of node and face.
 
-    Facets are sorted into classes, in which those at one node are all of one face, and each class is integrated.
-    """
+    Facets are sorted into classes, in which those at one node are all of one face, and each class is integrated."""
     corners = np.unique(pairs[:, 0])
     classes, row_of = _classes(around.vertices, labels, corners), np.full(int(labels.max()) + 1, -1)
     row_of[pairs[:, 1]] = np.arange(len(pairs))
@@ -235,8 +230,7 @@ def _classes(vertices: Indices, labels: Indices, corners: Indices) -> Indices:
 def in_symmetry_planes(normals: Array, held: Mask) -> Array:
     """Return normals (k, d) without the prescribed components of their nodes, where that turns them by little.
 
-    On a symmetry plane the true normal lies in the plane; that of the facets on one side of it leans to that side.
-    """
+    On a symmetry plane the true normal lies in the plane; that of the facets on one side of it leans to that side."""
     inside = np.where(held, 0.0, normals)
     length = np.linalg.norm(inside, axis=1)[:, None]
     return np.asarray(np.where(length > LEANING, inside / np.maximum(length, LEANING), normals))

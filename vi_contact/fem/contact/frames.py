@@ -3,8 +3,7 @@
 A condition is a node, a contact direction and, between two bodies, what the node faces. Each node has one frame Q, with
 the directions of all its conditions among its vectors, and its unknowns are û = Qᵀu: every u·n is one of them. Forces
 are Q f̂ then, and u = T û with T = Q⁻ᵀ: Q itself, unless directions of the node are oblique. In space a node with two
-directions has the unit vector along its edge as the third. A rank holds the conditions of its own nodes.
-"""
+directions has the unit vector along its edge as the third. A rank holds the conditions of its own nodes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -63,8 +62,7 @@ class NodalFrames:
         rubs: (m, d-1) tangential vectors that belong to each condition; what a node with several of them has left, the
             direction of the edge in space, belongs to the first.
     Raises:
-        InputError: a contact direction that is partly prescribed; directions of one node that depend on one another.
-    """
+        InputError: a contact direction that is partly prescribed; directions of one node that depend on one another."""
 
     def __init__(self, numbers: Indices, points: Array, directions: Array, held: Mask) -> None:
         self.points, self.directions = points, directions
@@ -110,10 +108,10 @@ class NodalFrames:
         cosines = (directions @ directions.T)[np.triu_indices(k, 1)]
         if np.any(cosines > 1.0 - PARALLEL):
             raise InputError(f"{where} is on several contact surfaces with one contact direction: list every boundary "
-                             "and every pair once, and boundaries that continue one another as one group")
+                             "and every pair once, and join boundaries that continue one another in one group")
         if k > d or np.linalg.svd(directions, compute_uv=False)[-1] < INDEPENDENT:
             raise InputError(f"{where} has {k} contact directions, {'more than' if k > d else 'not independent in'} "
-                             f"its {d} dimensions: take the corner for smooth (a larger feature_angle=), or leave the "
+                             f"its {d} dimensions: treat the corner as smooth (a larger feature_angle=), or leave the "
                              "node out of some of its surfaces (points=)")
 
 
@@ -168,8 +166,7 @@ def _coupling(space: NodalSpace, parts: Sequence[NodalConditions], frames: Nodal
               index: Indices) -> Matrix | None:
     """R with û = R ǔ: to the unknowns of a node that faces others, q_c·u = ǔ_c + q_c·(sum_j P_sj u_j + sum_k P_sk e_k).
 
-    At nodes with several conditions each one's own vectors only are relative to what it faces.
-    """
+    At nodes with several conditions each one's own vectors only are relative to what it faces."""
     if all(part.facing is None and not part.bubbles for part in parts):
         return None
     _refuse_chains(space, parts)
@@ -229,7 +226,7 @@ def _refuse_chains(space: NodalSpace, parts: Sequence[NodalConditions]) -> None:
         if len(both):
             where = f"node {at(facing.nodes.points[both[0]])}"
             if space.hierarchy is not None:
-                raise InputError(f"{where} of P2 tetrahedra is on side 2 of a contact pair and has a condition "
-                                 "besides: leave it out of the other surface (points=), or exchange the sides")
+                raise InputError(f"{where} of P2 tetrahedra is on side 2 of a contact pair and of another "
+                                 "surface: leave it out of that surface (points=), or exchange the sides")
             raise InputError(f"{where} is on side 1 of one contact pair and on side 2 of another: exchange the "
                              "sides of one of them, or give it once if both are the same")

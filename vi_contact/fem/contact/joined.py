@@ -25,11 +25,10 @@ def joined_surfaces(*surfaces: ContactSurface) -> ContactSurface:
 
     Raises:
         InputError: surfaces of different systems; directions of a node that are parallel (a boundary or a pair listed
-            twice) or depend on one another; a node on side 1 of one pair and side 2 of another.
-    """
+            twice) or depend on one another; a node on side 1 of one pair and side 2 of another."""
     made = [surface for surface in surfaces if isinstance(surface, FemSurface)]
     if not made or len(made) < len(surfaces) or any(surface.space is not made[0].space for surface in made):
-        raise InputError("joined_surfaces needs surfaces of fem.contact_surface and contact_pair, all of one system")
+        raise InputError("joined_surfaces: give surfaces of fem.contact_surface and contact_pair of one system")
     names = ("gap0", "weights", "bilateral", "compliance")
     data: dict[str, Any] = {name: np.concatenate([getattr(surface, name) for surface in made]) for name in names}
     parts = [part for surface in made for part in surface.parts]

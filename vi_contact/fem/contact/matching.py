@@ -1,7 +1,6 @@
 """Find the nodes of side 2 that a contact node of side 1 faces: u_2 at the point opposite node s is sum_j P_sj u_j.
 
-The rows of P sum to one, so that a common translation of both bodies opens and closes nothing.
-"""
+The rows of P sum to one, so that a common translation of both bodies opens and closes nothing."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -60,8 +59,7 @@ class NodeToNode:
     """Match conforming sides: every node of side 1 has one node of side 2 at its place, or opposite along its normal.
 
     ``tolerance``: how far beside the normal the partner may lie, as a share of the distance to the next node of side 1.
-    InputError for nodes without a partner, two nodes with the same one, and sides that do not face each other.
-    """
+    InputError for nodes without a partner, two nodes with the same one, and sides that do not face each other."""
 
     tolerance: float = 0.01
 
@@ -120,8 +118,8 @@ def _opposite(one: Nodes, two: Nodes, places: Indices, reach: Array) -> tuple[In
 
 def refuse_same_way(one: str, two: str, point: Array) -> None:
     """Raise InputError for sides whose outward normals point the same way."""
-    raise InputError(f"'{two}' does not face '{one}' at {at(point)}, the outward normals of both point the same way "
-                     "there: choose the two boundaries between the bodies")
+    raise InputError(f"'{two}' does not face '{one}' at {at(point)}, where both outward normals point the same way: "
+                     "choose the two boundaries between the bodies")
 
 
 def _spacing(points: Array, size: float) -> Array:

@@ -17,8 +17,7 @@ facet share theirs and, which keeps P x_2 = x_1, pass ∫ psi_t to u_t: pressure
 what a multiplier of t would.
 
 Literature: Wohlmuth, SIAM J. Numer. Anal. 38 (2000); Hüeber and Wohlmuth, Comput. Methods Appl. Mech. Engrg. 194
-(2005); dual functions of partly covered segments: Cichosz and Bischoff, ibid. 200 (2011).
-"""
+(2005); dual functions of partly covered segments: Cichosz and Bischoff, ibid. 200 (2011)."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -38,12 +37,11 @@ CURVED = 0.05  # of a facet: what polygons of one curve may overlap
 
 @dataclass(frozen=True)
 class DualMortar:
-    """Match sides of plane and solid bodies with any meshes: dual Lagrange multipliers on side 1 (head of this file).
+    """Match sides of plane and solid bodies with any meshes by the mortar method with dual Lagrange multipliers.
 
     Nodes of side 1 at the ends of what is in front of side 2 keep their conditions, in the mean over that part.
     Initial gaps are means too; where polygons of the same curve overlap by up to 5 % of a facet the gap is zero.
-    InputError for bars, for sides that do not face each other, in space for facets that are slivers or not convex.
-    """
+    InputError for bars, for sides that do not face each other, in space for facets that are slivers or not convex."""
 
     partial: ClassVar[bool] = True  # parts of side 1 in front of nothing have no conditions
 

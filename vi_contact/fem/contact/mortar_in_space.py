@@ -8,8 +8,7 @@ out and integrated. On a facet
 
 with b = phi if that is all of it (biorthogonal functions, of distorted quadrilaterals too) and b = (1, x, y) if it is a
 part: bilinear functions, carried on from a strip of a facet to its far nodes, grow without bound as the strip thins.
-Both keep sum_s psi_s = 1, ∫ psi_s = D_s > 0 and ∫ psi_s x = D_s x_s, and are the same on triangles.
-"""
+Both keep sum_s psi_s = 1, ∫ psi_s = D_s > 0 and ∫ psi_s x = D_s x_s, and are the same on triangles."""
 
 from dataclasses import replace
 

@@ -3,8 +3,7 @@
 Conditions are numbered in the order of the nodes' original numbers, or of the list of points that asked for them: no
 number of ranks changes it. For that the numbers alone are gathered, 8 bytes a condition on every rank; what belongs to
 nodes stays with their owners, but for the two sides of a pair of bodies, which every rank searches for partners: some
-120 bytes a node in space with its share of facets, 25 MB for two sides of 10⁵ nodes (``pairs.side_of``).
-"""
+120 bytes a node in space with its share of facets, 25 MB for two sides of 10⁵ nodes (``pairs.side_of``)."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields

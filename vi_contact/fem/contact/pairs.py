@@ -7,8 +7,7 @@ unknowns û of the nodal frames are written in new ones ǔ,
 
 so that the relative normal displacement ǔ_n is one unknown again: ǔ_n <= gap0 is the condition, friction acts on ǔ_t,
 and the work of a reaction on ǔ is that of the pair of forces r on side 1 and -P_sjᵀ r on side 2: action is reaction.
-n is the outward normal of side 1, from side 1 to side 2. Displacements are small: nobody's partner changes.
-"""
+n is the outward normal of side 1, from side 1 to side 2. Displacements are small: nobody's partner changes."""
 
 import logging
 from collections.abc import Sequence
@@ -43,23 +42,22 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
                  feature_angle: float = FEATURE_ANGLE) -> ContactSurface:
     """Make the contact conditions between two boundaries of deformable bodies, or two faces of a crack.
 
-    They are those of the nodes of side 1: its normals, weights (times the section's thickness) and forces; r_n /
-    weights is the pressure. Side 1 should be the smaller and finer one, or the softer body. Initial gaps are measured
-    along the normals of side 1. Nodes that both sides share, at the tip of a crack, have no condition; nor have nodes
-    clamped on both sides. Nodes that are tied to one another have one. Prescribed nodes of side 2 move as they are
-    told: a moving obstacle.
+    Each node of side 1 has a condition, with the normals, weights (times the section's thickness) and forces of side 1;
+    r_n / weights is the pressure. Side 1 should be the smaller and finer one, or the softer body. Initial gaps are
+    measured along the normals of side 1. Nodes that both sides share, at the tip of a crack, have no condition, and
+    nodes that are clamped on both sides have none either. Nodes that are tied to one another share one. Prescribed
+    nodes of side 2 move as they are prescribed, like a moving obstacle.
 
     Where side 1 turns by more than the feature angle its faces are matched one by one, and a node on several of them
     has one condition for each, as if every face were a pair of its own, joined by ``joined_surfaces``.
 
     Args:
         matching: NodeToNode() by default, for sides meshed alike; DualMortar() for others.
-        points: (k, d) coordinates; only the nodes of side 1 nearest to them, in this order.
-        feature_angle: in radians; facets round a node that turn by less from one another are one smooth face.
+        points: (k, d) coordinates; only the nodes of side 1 nearest to them have conditions, in this order.
+        feature_angle: angle [rad]; facets around a node that turn by less from one another are one smooth face.
     Raises:
         InputError: sides that do not pair or do not face each other, bodies that overlap, sides of one and the same
-            boundary, contact directions that are partly prescribed, clamped nodes that face free ones.
-    """
+            boundary, contact directions that are partly prescribed, clamped nodes that face free ones."""
     space = contact_space("contact_pair", system, {"facets1": facets1, "facets2": facets2}, points)
     optional(provides, "contact_pair", "matching", matching, ("match",), "give NodeToNode() or DualMortar(), or None")
     angle = checked_angle("contact_pair", feature_angle)
@@ -110,8 +108,8 @@ def _refuse_common(one: Side, two: Side) -> None:
     own, others = number_alike(*(side.nodes.numbers[side.facets] for side in (one, two)))
     for facet in np.flatnonzero(np.isin(own, others))[:1]:
         where = at(one.nodes.points[one.facets[facet]].mean(axis=0))
-        raise InputError(f"a facet of both '{one.name}' and '{two.name}' at {where}: it cannot touch itself, list it "
-                         "on one side only")
+        raise InputError(f"a facet of both '{one.name}' and '{two.name}' at {where}: a facet cannot touch itself, "
+                         "so list it on one side only")
 
 
 def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[tuple[Side, Array]]:
@@ -128,7 +126,7 @@ def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[t
         if len(own.numbers) > len(used):
             again = own.points[1:][np.diff(own.numbers) == 0][0]
             raise InputError(f"'{one.name}' turns round and meets itself at {at(again)}: give it as two boundaries "
-                             "(fem.joined_surfaces), or take the corner for smooth (a larger feature_angle=)")
+                             "(fem.joined_surfaces), or treat the corner as smooth (a larger feature_angle=)")
         found.append((Side(one.name, own, np.searchsorted(used, facets)), one.nodes.normals[used]))
     return found
 
@@ -199,5 +197,5 @@ def _gap(space: FemSpace, name: str, two: Side, nodes: Nodes, directions: Array,
                          "bodies overlap there, or these are not the boundaries between them; move one body, or choose "
                          "the sides that face")
     if gap.min() < -1e-12 * space.size and space.comm.rank == 0:
-        log.warning("'%s' and '%s' overlap by up to %.3g m: taken as touching there", name, two.name, -gap.min())
+        log.warning("'%s' and '%s' overlap by up to %.3g m: they count as touching there", name, two.name, -gap.min())
     return np.maximum(gap, 0.0)

@@ -35,15 +35,14 @@ def contact_points(system: SemiDiscreteSystem, nodes: Any, normals: Any, *, weig
         opposite: (m,) numbers of nodes of another body, each of which the node faces: the gap is gap0 - (u - u_opp)·n.
     Raises:
         InputError: a system of another kind, nodes that do not exist, normals of no length or along components that
-            stand still, gaps below zero, directions of one node that depend on one another.
-    """
+            stand still, gaps below zero, directions of one node that depend on one another."""
     instance(OWNER, "system", system, SemiDiscreteSystem, "give a system, such as system_from_arrays returns")
     space = system.space
     if not isinstance(space, MatrixSpace):
-        raise InputError(f"{OWNER} needs a system of own matrices; fem.contact_surface(points=…) is for fem.assemble")
+        raise InputError(f"{OWNER} is for systems of own matrices; use fem.contact_surface(points=…) here")
     optional(provides, OWNER, "obstacle", obstacle, ("directions", "gap"), "give HalfSpace(…) or another")
     if obstacle is not None and (gap0 is not None or opposite is not None):
-        raise InputError(f"{OWNER}: an obstacle says its own gaps; leave gap0 and opposite out, or the obstacle")
+        raise InputError(f"{OWNER}: the obstacle gives the gaps; leave out gap0 and opposite, or the obstacle")
     numbers = integers(OWNER, "nodes", nodes, (None,))
     m, d = len(numbers), space.dimension
     if not m:
@@ -79,7 +78,7 @@ def _nodes(space: MatrixSpace, meaning: str, numbers: Indices, normals: Array, w
     d, own = space.dimension, np.column_stack([np.ones(len(space.nodes)), space.points, space.held, space.numbers])
     found = space.at_nodes(numbers, own)
     for number in numbers[found[:, 0] == 0.0]:
-        raise InputError(f"{OWNER}: {meaning} has node {number}, which the system has not; its nodes are numbered from "
-                         "0 on, in the order of their coordinates")
+        raise InputError(f"{OWNER}: {meaning} has node {number}, which the system does not have; give numbers from 0 "
+                         "on, in the order of its coordinates")
     points, held, unknowns = np.split(found[:, 1:], [d, 2 * d], axis=1)
     return Nodes(numbers, points, normals, weights, held > 0.0, unknowns.astype(np.int64))

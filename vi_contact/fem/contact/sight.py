@@ -1,8 +1,7 @@
 """Find what the nodes of side 1 see of side 2 in space, along their normals, as polygons of a plane.
 
 A facet of side 1 is seen along the normal of each of its nodes; where all nodes have its normal, on plane sides, they
-look at once. What a look shares with the facets in front of it is cut out; of several layers the nearest counts.
-"""
+look at once. What a look shares with the facets in front of it is cut out; of several layers the nearest counts."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -55,8 +54,8 @@ def facets_of(side: Side, sense: int) -> Facets:
     nodes, corners = np.take_along_axis(nodes, order, axis=1), np.take_along_axis(corners, order[:, :, None], axis=1)
     seen, reach = np.take_along_axis(seen, order[:, :, None], axis=1), np.linalg.norm(spokes, axis=2).max(axis=1)
     for bad in np.flatnonzero((turns(seen) <= SLIVER * reach[:, None] ** 2).any(axis=1)):
-        raise InputError(f"a facet of '{side.name}' at {at(middles[bad])} is a sliver or not convex: no normal can be "
-                         "trusted there, mesh this boundary anew")
+        raise InputError(f"a facet of '{side.name}' at {at(middles[bad])} is a sliver or not convex: its normal cannot "
+                         "be trusted, so mesh this boundary again")
     return Facets(nodes[:, ::sense], corners[:, ::sense], middles, normals, reach)
 
 
@@ -68,8 +67,7 @@ class Looks(Rows):
         nodes, middles, reach: of the facets, as in `Facets`; asking: for which of its nodes (k, v) each is seen.
         normals: along which they are seen; frames: two unit vectors (k, 3, 2) beside that; slant: its cosine to the
             facet's own normal, the share of the area that is seen.
-        polygons: the facets as they are seen (k, v, 2), from their middles.
-    """
+        polygons: the facets as they are seen (k, v, 2), from their middles."""
 
     nodes: Indices
     middles: Array
@@ -161,8 +159,7 @@ def complete(found: Pieces, looks: Looks, theirs: Facets, radius: Array) -> Mask
     """Return whether nothing that is nearer to a look than what was found can lie outside of its ball.
 
     Where one layer, at most h away along the normal, covers all of a look, a nearer facet has its middle at most h
-    along the normal and reach_1 + reach_2 beside it: within sqrt(h² + (reach_1 + reach_2)²) of the look's middle.
-    """
+    along the normal and reach_1 + reach_2 beside it: within sqrt(h² + (reach_1 + reach_2)²) of the look's middle."""
     covered, farthest = np.bincount(found.look, areas(found.polygons), len(radius)), np.zeros(len(radius))
     np.maximum.at(farthest, found.look, found.distances(found.polygons).max(axis=1, initial=0.0))
     whole = np.abs(covered / areas(looks.polygons) - 1.0) <= WHOLE

@@ -31,26 +31,25 @@ log = logging.getLogger(__name__)
 def contact_surface(system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obstacle | None = None,
                     points: Sequence[Sequence[float]] | None = None,
                     feature_angle: float = FEATURE_ANGLE) -> ContactSurface:
-    """Make the contact conditions of a boundary part, or only of listed points of it, as in case a of the wall.
+    """Make the contact conditions of a part of the boundary, or of listed points of it only.
 
-    Nodal weights are ∫ phi_i times the section's thickness (so that r_n / weights is in Pa), nodal normals the
-    direction of ∫ phi_i n over the facets, on rollers (a symmetry plane) without the component held there. Nodes of
-    the facets that are clamped in every component (where the boundary meets a clamped part) are left out. Nodes that
-    move as one (``fem.Tied`` in all components) have one condition, with the weights of all. P2 tetrahedra have theirs
-    at the vertices, for means of the gap round them (``fem.contact.bubbles``).
+    Nodal weights are ∫ phi_i times the thickness of the section, so that r_n / weights is in Pa. Nodal normals have the
+    direction of ∫ phi_i n over the facets; on rollers (a symmetry plane) the held component is left out. Nodes that are
+    clamped in every component, where the boundary meets a clamped part, are left out. Nodes that move as one
+    (``fem.Tied`` in all components) have one condition with the weights of all. P2 tetrahedra have their conditions at
+    the vertices, for means of the gap around them (``fem.contact.bubbles``).
 
     Where the facets turn by more than the feature angle the boundary has faces, and a node on several of them has one
     condition for each, with the normal and the weight of this face, at any angle between them (``fem.contact.faces``).
     Where the obstacle gives all faces of a node one direction, as a HalfSpace does, the node has one condition.
 
     Args:
-        obstacle: Touching() by default, HalfSpace, AnalyticGap or the user's own, asked for every face of a node.
-        points: (k, d) coordinates; each stands for the nearest node of the facets. The order is kept.
-        feature_angle: in radians; facets round a node that turn by less from one another are one smooth face.
+        obstacle: Touching() by default, HalfSpace, AnalyticGap or the user's own; it is asked for every face of a node.
+        points: (k, d) coordinates; each is replaced by the nearest node of the facets. The order is kept.
+        feature_angle: angle [rad]; facets around a node that turn by less from one another are one smooth face.
     Raises:
         InputError: no contact nodes, a listed point that is clamped or not on the facets, a contact direction that is
-            partly prescribed, initial penetration, a node with more faces than the body has dimensions.
-    """
+            partly prescribed, initial penetration, a node with more faces than the body has dimensions."""
     space = contact_space("contact_surface", system, {"facets": facets}, points)
     optional(provides, "contact_surface", "obstacle", obstacle, ("directions", "gap"), "give HalfSpace(…) or another")
     angle = checked_angle("contact_surface", feature_angle)
@@ -133,8 +132,7 @@ def _places(nodes: Nodes, chosen: Indices | None) -> Indices:
 def one_per_direction(whole: Nodes, nodes: Nodes, directions: Array, gap: Array) -> tuple[Nodes, Array, Array]:
     """Return (nodes, directions, gaps), faces of one direction at a node as one condition: weights added, smaller gap.
 
-    ``whole``: the nodes with the weights of all their faces.
-    """
+    ``whole``: the nodes with the weights of all their faces."""
     if len(nodes.numbers) == len(whole.numbers):
         return nodes, directions, gap
     weights, gap, kept = nodes.weights.copy(), gap.copy(), np.ones(len(nodes.numbers), dtype=bool)
@@ -175,7 +173,7 @@ def nodes_on(space: FemSpace, facets: Facets) -> Nodes:
     blocks = blocks[np.argsort(space.nodes[blocks])]
     weights, sums, held = values[blocks, 0], values[blocks, 1:], space.held[blocks]
     if not largest(space.comm, len(blocks)):
-        raise InputError(f"no contact nodes: boundary group '{facets.name}' is empty, choose a group that has facets")
+        raise InputError(f"no contact nodes: boundary group '{facets.name}' is empty: choose a group with facets")
     if largest(space.comm, not weights.all()):
         raise InputError(f"boundary group '{facets.name}' lies inside the body, where cells on both sides share its "
                          "nodes: cut the mesh open there (meshes.cut.CutOpen), or choose an outer boundary")
@@ -189,8 +187,8 @@ def free_nodes(space: FemSpace, nodes: Nodes, name: str) -> Nodes:
     clamped = nodes.held.all(axis=1)
     count = round(total(space.comm, clamped.sum()))
     if not largest(space.comm, (~clamped).any()):
-        raise InputError(f"no contact nodes: every node of boundary group '{name}' is also clamped, a point cannot be "
-                         "clamped and in contact; choose another boundary or clamp less")
+        raise InputError(f"no contact nodes: every node of boundary group '{name}' is also clamped, and a point cannot "
+                         "be clamped and in contact: choose another boundary or clamp less")
     if count:
         log.info("%d clamped nodes of '%s' are left out of the contact surface", count, name)
     return nodes.pick(~clamped)
@@ -209,7 +207,7 @@ def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], nam
             raise InputError(f"contact point {at(x)} is {distance[row]:.3g} m away from boundary group '{name}': "
                              "give a point on it")
         if distance[row] > 1e-6 * space.size and space.comm.rank == 0:
-            log.warning("contact point %s stands for the nearest node, %.3g m away", at(x), distance[row])
+            log.warning("contact point %s is replaced by the nearest node, %.3g m away", at(x), distance[row])
         if nodes.held[row].all():
             raise InputError(f"contact point {at(x)} is also clamped: leave it out, or clamp less")
         if row in rows:
@@ -217,7 +215,7 @@ def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], nam
                              "once")
         rows.append(row)
     if not rows:
-        raise InputError(f"no contact nodes: the list of contact points on '{name}' is empty")
+        raise InputError(f"no contact nodes: the list of contact points on '{name}' is empty: give points")
     return np.asarray(nodes.numbers[rows])
 
 
@@ -225,15 +223,14 @@ def merged(space: FemSpace, name: str, nodes: Nodes, directions: Array, angle: f
     """Return (nodes, directions, shares (k, m)) of the k conditions that are left of the m of all ranks when nodes that
     move as one (tied boundaries) have one for each face: sums of weights, means with shares by weight.
 
-    InputError for a node that is tied in some components only, or to one without such a condition.
-    """
+    InputError for a node that is tied in some components only, or to one without such a condition."""
     leaders, target = space.leaders(nodes.numbers), np.arange(len(nodes.numbers))
     for row in np.flatnonzero(np.isin(nodes.numbers, space.tied_nodes)):
         alike = np.flatnonzero(nodes.numbers == leaders[row])
         turn = directions[alike] @ directions[row]
         if turn.max(initial=-2.0) < np.cos(angle):
             raise InputError(f"contact node {at(nodes.points[row])} of '{name}' is tied to another in some components "
-                             "only, or to one that is not in this contact: leave it out (points=), or tie and take all")
+                             "only, or to one outside this contact: leave it out (points=), or tie and list all")
         target[row] = alike[turn.argmax()]
     kept, place = np.unique(target, return_inverse=True)
     sums = sp.csr_matrix((nodes.weights, (place.ravel(), np.arange(len(target)))))

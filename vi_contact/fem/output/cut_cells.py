@@ -1,8 +1,7 @@
 """Integrate over what lies on one side of a plane that goes through cells: parts of these cells and of their facets.
 
 They are cut as simplices, a quadrilateral as the 2 triangles and a hexahedron as the 6 tetrahedra round a diagonal, in
-which nodal values are taken for linear: exact for linear fields on cells with parallel sides.
-"""
+which nodal values are taken for linear: exact for linear fields on cells with parallel sides."""
 
 from collections.abc import Callable
 from itertools import permutations
@@ -24,8 +23,7 @@ def work_beyond(space: FemSpace, crossed: Mask, level: Callable[[Array], Array],
 
     The parts of ``crossed`` cells (local mask) where the ``level`` of points (…, d) is not positive. ``motion``: points
     (k, d) -> virtual displacements (motions, k, d), linear in them; ``density``: one for all or one of each local cell.
-    Collective.
-    """
+    Collective."""
     d = space.dimension
     cells, nodes = _entities(space.mesh, crossed, load.facets.indices if isinstance(load, Traction) else None)
     whole = space.mesh.geometry.x[nodes][:, :, :d]

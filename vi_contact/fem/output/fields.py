@@ -3,8 +3,7 @@
 Every file is replaced as a whole and the index names only frames that are complete, so that ParaView can open it at any
 moment, also while the run goes on or after it was killed. Nothing in the files depends on the number of ranks.
 
-What a frame holds: docs/reference/files.md. In the first one a is zero, and with friction all closed nodes stick.
-"""
+What a frame holds: docs/reference/files.md. In the first one a is zero, and with friction all closed nodes stick."""
 
 import logging
 from collections.abc import Mapping, Sequence
@@ -29,8 +28,7 @@ log = logging.getLogger(__name__)
 class VonMises:
     """Compute the mean von Mises stress of owned cells [Pa]: ∫ sqrt(3/2 s:s) / ∫ 1 over a cell, s = dev(sigma).
 
-    Plane strain has sigma_zz = lambda tr(eps), plane stress none, a bar uniaxial stress. Without viscous stresses.
-    """
+    Plane strain has sigma_zz = lambda tr(eps), plane stress none, a bar uniaxial stress. Without viscous stresses."""
 
     def __init__(self, forms: Any) -> None:
         """``forms``: the ElasticForms of a system, whose constants carry the thickness as a factor."""
@@ -278,7 +276,7 @@ def _cells_of_body(problem: ContactProblem) -> Cells:
     if space.forms.tells_stress:
         known_matrices("XDMF, von_mises", problem.system, "K")
     elif space.comm.rank == 0:
-        log.info("XDMF: forms=… tell no stress, so that frames have no von_mises: give fem.Forms(…, stress=)")
+        log.info("XDMF: forms=… have no stress, so frames have no von_mises: give fem.Forms(…, stress=)")
     mesh, stress = space.mesh, VonMises(space.forms) if space.forms.tells_stress else None
     dim = mesh.topology.dim
     rows = space.node_of_block[compat.cell_blocks(space.V)[: mesh.topology.index_map(dim).size_local]]

@@ -4,8 +4,7 @@ u and v are on the space of the system, ``system.space.V``, with the components 
 sigma(u), without viscous parts, is the L2 projection onto discontinuous fields: constant in a cell of triangles and
 tetrahedra, where that of P1 is so, (bi)linear in others; of P2 and Q2 one degree higher. The contact pressure
 r_n / weight is nodal, zero off the contact surface; of several faces of a node it is that of the one which is pressed
-most.
-"""
+most."""
 
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -36,8 +35,7 @@ def as_function(problem: ContactProblem, state: State, name: str, *, continuous:
 
     ``state``: of simulate, march, static_equilibrium or quasi_static of this problem. ``continuous``: the stress
     projected onto P1, Q1, P2 or Q2, ∫ sigma_h : tau = ∫ sigma(u) : tau. Every call makes a Function of its own.
-    Collective. InputError for a state of another problem, and a system without a mesh.
-    """
+    Collective. InputError for a state of another problem, and a system without a mesh."""
     space = _checked("as_function", problem, name, continuous)
     check_sizes("as_function", problem, state)
     if name != "contact_pressure":
@@ -51,8 +49,7 @@ def read_function(problem: ContactProblem, folder: str | Path, name: str, *, t: 
     """Return a frame in the folder of a run (``fields=fem.XDMF(…)``) as ``as_function`` returns a state.
 
     ``t``: its time [s]; ``frame``: its number in the order of time, 0 for the first and -1 for the last. The run may
-    have had any number of ranks. Collective. InputError for a time without a frame, and fields of another mesh.
-    """
+    have had any number of ranks. Collective. InputError for a time without a frame, and fields of another mesh."""
     space = _checked("read_function", problem, name, continuous)
     optional(number, "read_function", "t", t, unit="s")
     optional(instance, "read_function", "frame", frame, int, "give its number, 0 for the first and -1 for the last")
@@ -69,7 +66,7 @@ def _checked(owner: str, problem: Any, name: Any, continuous: Any) -> FemSpace:
     check_problem_given(owner, problem)
     flag(owner, "continuous", continuous)
     if name not in NAMES:
-        raise InputError(f"{owner}: {shown(name)} is no quantity; give one of {', '.join(map(repr, NAMES))}")
+        raise InputError(f"{owner}: {shown(name)} is not a quantity; give one of {', '.join(map(repr, NAMES))}")
     return space_of(owner, problem.system)
 
 
@@ -133,7 +130,7 @@ class Stress:
 def _stored(folder: Path, name: str, t: float | None, frame: int | None) -> tuple[Array, Array, float]:
     """Points of the mesh, a quantity of a frame at them, and its time."""
     if not (folder / FIELDS_INDEX).is_file():
-        raise InputError(f"'{folder}' has no {FIELDS_INDEX}: run it with out and fields=fem.XDMF(every=10)")
+        raise InputError(f"'{folder}' has no {FIELDS_INDEX}: run again with out and fields=fem.XDMF(every=10)")
     try:
         index: Any = ET.parse(folder / FIELDS_INDEX)
         places = sorted((float(grid.find("Time").get("Value")), grid.find(f"Attribute[@Name='{name}']/DataItem").text)
@@ -143,7 +140,7 @@ def _stored(folder: Path, name: str, t: float | None, frame: int | None) -> tupl
         with open_hdf5(folder / FIELDS / "mesh.h5") as mesh, open_hdf5(folder / file) as fields:
             return mesh["points"][()], fields[path][()], time
     except (ET.ParseError, OSError, KeyError, AttributeError, TypeError) as error:
-        raise InputError(f"the fields in '{folder}' are incomplete or damaged ({error}): restore them") from error
+        raise InputError(f"the fields in '{folder}' are incomplete or damaged ({error}): run again") from error
 
 
 def _chosen(times: list[float], t: float | None, frame: int | None) -> int:

@@ -19,8 +19,7 @@ class LargestStrain:
 
     gamma² = 2 dev(eps):dev(eps) of the mean eps of a cell, in the plane of the body or in space: in the plane the
     difference of the principal strains, in simple shear gamma_xy. Strains of the start, of gravity say, do not count.
-    InputError for a run that is continued, and for a body on a line.
-    """
+    InputError for a run that is continued, and for a body on a line."""
 
     values: Array
 
@@ -31,7 +30,7 @@ class LargestStrain:
     def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
         """Measure from this state on. Collective."""
         if resumed is not None:
-            raise InputError("LargestStrain does not know the strains before the checkpoint: run it from the start")
+            raise InputError("LargestStrain does not know the strains before the checkpoint: run from the start")
         self._problem, self._space = problem, space_of("LargestStrain", problem.system)
         V, d = self._space.V, self._space.dimension
         if d == 1:

@@ -2,8 +2,7 @@
 
 The nodal forces that hold a group of cells in its motion are q = K u + C v + M a - f, all of these cells alone, with a
 the absolute acceleration and f their loads. For a nodal field r, rᵀq is a number, and as K, C, M are symmetric it is
-(K r)ᵀu + (C r)ᵀv + (M r)ᵀa - rᵀf: three sparse products a step, however many cells there are.
-"""
+(K r)ᵀu + (C r)ᵀv + (M r)ᵀa - rᵀf: three sparse products a step, however many cells there are."""
 
 import logging
 from collections.abc import Callable, Sequence
@@ -49,8 +48,7 @@ class NodalWork:
         owner: what is recorded, for messages.
         problem: its system is made by ``fem.assemble``; InputError otherwise.
         loads: those given to ``fem.assemble``: what acts on cells of the group belongs to their balance.
-        gravity: acceleration (d,) [m/s²] of ``with_weight``, which acts on the mass of the cells.
-    """
+        gravity: acceleration (d,) [m/s²] of ``with_weight``, which acts on the mass of the cells."""
 
     def __init__(self, owner: str, problem: ContactProblem, loads: Loads, gravity: Sequence[float] | None) -> None:
         space = space_of("NodalWork", problem.system)
@@ -62,7 +60,7 @@ class NodalWork:
                 facets_of("NodalWork", "the facets of loads", facets, space.mesh)
         self._gravity = np.zeros(space.dimension) if gravity is None else np.asarray(gravity, dtype=float)
         if self._gravity.shape != (space.dimension,):
-            raise InputError(f"gravity has {self._gravity.size} components: give {space.dimension}")
+            raise InputError(f"gravity has {self._gravity.size} components: give {space.dimension} numbers")
         self._r, self._inside = compat.function(space.V), compat.function(compat.cell_space(space.mesh))
         self._forms = [space.compiled(space.forms.against(name, self._r, self._inside))
                        if name != "C" or space.forms.damped else None for name in ("K", "C", "M")]
@@ -84,18 +82,18 @@ class NodalWork:
         theirs = space.comm.sum(system.influence.T @ system.load.constant)
         if theirs.any() and not (self._loads or self._gravity.any() or self._initial) and space.comm.rank == 0:
             text = ", ".join(f"{x:.4g}" for x in theirs)
-            log.warning("%s: the system has constant loads of (%s) N in all and none were given: if they act on these "
-                        "elements give the loads of fem.assemble, or the gravity of with_weight", owner, text)
+            log.warning("%s: the system has constant loads of (%s) N in all, and none were given here: if they act on "
+                        "these elements, give the loads of fem.assemble or the gravity of with_weight", owner, text)
 
     def take(self, parts: Sequence[Rigid]) -> None:
         """Take the rigid motions of each part as r, one after the other. Collective."""
         if self._nodal and any(cells is not None or beyond is not None for _, _, cells, beyond in parts):
-            raise InputError("section forces: nobody knows which part of a LinearForm acts on the cells of a cut; give "
-                             "such loads as Traction and BodyForce, or record Reactions")
+            raise InputError("section forces: the part of a LinearForm on the cells of a cut is unknown; give these "
+                             "loads as Traction and BodyForce, or record Reactions")
         forms, ours = [*self._forms, *self._load_forms], self.space.forms
         if not ours.densities and any(beyond for *_, beyond in parts):
-            raise InputError("a section goes through elements, and forms=… do not tell the mass of their parts: let it "
-                             "run along element sides, or leave the mass to the density of a material beside the forms")
+            raise InputError("a section goes through elements, and with forms=… the mass of their parts is unknown: "
+                             "let it run along element sides, or give a material for the density in place of mass=")
         densities = [(ours.cellwise(name), None) if ours.densities else None for name in ("alpha_rho", "rho")]
         densities += [(ours.section.thickness, load) for load in self._loads]
         rows: list[list[Any]] = [[] for _ in forms]
@@ -130,8 +128,7 @@ class NodalWork:
     def of_step(self, report: Report) -> Array:
         """Return the work in a step's equation of motion (``Report.balance``), with absolute accelerations, (count,).
 
-        Loads, prescribed and ground motion are taken between the ends of the step where the balance has its u.
-        """
+        Loads, prescribed and ground motion are taken between the ends of the step where the balance has its u."""
         problem, space, balance = self._problem, self.space, report.balance
         late, t0, t1 = self._place(report), report.old.t, report.new.t
 

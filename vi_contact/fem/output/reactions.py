@@ -44,8 +44,7 @@ class Reactions:
         loads: those given to ``assemble``: their part on the held nodes goes straight into the support.
         gravity: acceleration (d,) [m/s²] of ``with_weight``, (0, -9.80665) for example: likewise.
     Raises:
-        InputError: nothing is prescribed on the facets, and they have no dashpots.
-    """
+        InputError: nothing is prescribed on the facets, and they have no dashpots."""
 
     name: str
     facets: Facets
@@ -75,7 +74,7 @@ class Reactions:
         self._work = NodalWork(owner, problem, self.loads, self.gravity)
         space: FemSpace = self._work.space
         if len(self.centre) != space.dimension:
-            raise InputError(f"{owner}: the centre has {len(self.centre)} coordinates, give {space.dimension}")
+            raise InputError(f"{owner}: the centre has {len(self.centre)} coordinates: give {space.dimension}")
         held = np.zeros_like(space.held)
         facets_of(owner, "facets", self.facets, space.mesh)
         blocks = space.facet_blocks(self.facets.indices)
@@ -83,8 +82,8 @@ class Reactions:
         for one in space.forms.boundaries:
             held[space.facet_blocks(np.intersect1d(self.facets.indices, one.facets.indices))] = True
         if not largest(space.comm, held.any()):
-            raise InputError(f"nothing is prescribed on boundary group '{self.facets.name}', and it has no dashpots: "
-                             "it has no reactions")
+            raise InputError(f"nothing is prescribed on boundary group '{self.facets.name}', and it has no dashpots, "
+                             "so it has no reactions: give a boundary that is held")
         self._parts = {1: ["x"], 2: ["x", "y", "M"], 3: ["x", "y", "z", "M_x", "M_y", "M_z"]}[space.dimension]
         self._work.take([(held, np.asarray(self.centre, dtype=float), None, None)])
         return self._named(self._work.at_rest(state))

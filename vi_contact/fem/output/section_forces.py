@@ -54,8 +54,7 @@ class SectionForces:
         loads: those given to ``assemble``. gravity: acceleration (d,) [m/s²] of ``with_weight``, if these cells weigh.
     Raises:
         InputError: a cut that leaves the group (in space: misses it) or ends inside it, or goes through cells of degree
-            2; corners of no rectangle.
-    """
+            2; corners of no rectangle."""
 
     cuts: Mapping[str, Sequence[Sequence[float]]]
     cells: Cells | None = None
@@ -99,12 +98,12 @@ def axes_of(name: str, corners: Array) -> tuple[Array, Array]:
     """Return ((d, d) unit vectors along the normal and the sides, lengths (d - 1,) of the sides) of a cut (d, d)."""
     size = np.linalg.norm(corners[1:] - corners[0], axis=1)
     if not size.all():
-        raise InputError(f"section '{name}': two of its ends or corners are the same point")
+        raise InputError(f"section '{name}' has the same point twice: give different ends or corners")
     along = (corners[1:] - corners[0]) / size[:, None]
     if len(along) == 1:
         return np.vstack([[-along[0, 1], along[0, 0]], along]), size
     if abs(along[0] @ along[1]) > ON_LINE:
-        raise InputError(f"section '{name}' is no rectangle: give corners a, b, c with a right angle at a")
+        raise InputError(f"section '{name}' is not a rectangle: give corners a, b, c with a right angle at a")
     return np.vstack([np.cross(*along), along]), size
 
 
@@ -113,8 +112,7 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
     work). InputError, on all ranks, unless the cut goes through all of the group that it reaches. Collective.
 
     The nodes on the cut and behind it move, and the cells before them hold them; the other way round where sides of
-    cells lie on the cut behind it only, as at a foot.
-    """
+    cells lie on the cut behind it only, as at a foot."""
     corners, mesh = np.asarray(given, dtype=float), space.mesh
     if len(corners) != space.dimension:
         raise InputError(f"section '{name}' has {len(corners)} corners: give 2 ends in the plane, 3 corners of a "
@@ -147,7 +145,7 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
     nodes = (sign * away < 0.0) & (space.degree < 2) | ((away == 0.0) & ((at >= -tol) & (at <= size + tol)).all(axis=1))
     crossed = inside & (level(x).max(axis=1) > 0.0) & (level(x).min(axis=1) < 0.0)
     if space.degree > 1 and space.comm.max(np.array([float(crossed.any())]))[0]:
-        raise InputError(f"section '{name}' goes through cells of degree 2: let it follow their plane sides")
+        raise InputError(f"section '{name}' cuts cells of degree 2: let it follow their plane sides")
     middle = corners[0] + 0.5 * (corners[1:] - corners[0]).sum(axis=0)
     motions = partial(rigid_motions, centre=middle)
     beyond = partial(work_beyond, space, crossed, lambda points: sign * level(points), motions) if through else None
@@ -160,8 +158,7 @@ class _Trace:
 
     left, right: cells with vertices before and behind the plane; touches: with a point of the cut; beyond: (2 (d - 1),
     cells) those of them that go on over one of its ends; cover: (3, cells) how much [m] of the cut (in space, [m²], of
-    boxes round it) sides of cells on its left, of cells on its right, and cells that it goes through cover.
-    """
+    boxes round it) sides of cells on its left, of cells on its right, and cells that it goes through cover."""
 
     def __init__(self, s: Array, d: Array, size: Array, tol: float) -> None:
         self.left, self.right = d.max(axis=1) > 0.0, d.min(axis=1) < 0.0

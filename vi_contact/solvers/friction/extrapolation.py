@@ -36,7 +36,7 @@ def accelerated(owner: str, value: Any) -> None:
 
 @dataclass(frozen=True)
 class Plain:
-    """Take the image itself."""
+    """Take the image itself: a plain iteration without extrapolation."""
 
     def start(self) -> Next:
         """Return the choice of the next point, which remembers nothing."""
@@ -45,7 +45,7 @@ class Plain:
 
 @dataclass(frozen=True)
 class Anderson:
-    """Combine the last ``depth`` differences, after ``after`` plain steps. InputError for depth < 1 or after < 0."""
+    """Extrapolate from the last ``depth`` steps, after ``after`` plain ones. InputError for depth < 1 or after < 0."""
 
     depth: int = 5
     after: int = 0

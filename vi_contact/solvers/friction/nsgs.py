@@ -22,7 +22,7 @@ from .problem import Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, 
 
 @dataclass(frozen=True)
 class NSGS(Settings):
-    """Hold the settings. ``tolerance``: largest |F| of the natural map relative to r = 0.
+    """Hold the settings. ``tolerance``: largest residual, that of r = 0 being 1.
 
     In the result ``iterations`` counts sweeps and ``history`` the residual after each.
     """

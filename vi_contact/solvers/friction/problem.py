@@ -173,7 +173,7 @@ class ScaledDelassus:
         m = len(bilateral)
         d = G.shape[0] // m if m else 1
         if G.ndim != 2 or G.shape != (m * d, m * d):
-            raise InputError(f"The Delassus operator has shape {G.shape} for {m} points: give m d rows, node by node.")
+            raise InputError(f"the Delassus operator has shape {G.shape} for {m} points: give m d rows, node by node")
         scale = energy_scale(G).reshape(m, d)
         if d > 1:
             scale[:, 1:] = np.mean(scale[:, 1:] ** -2.0, axis=1)[:, None] ** -0.5
@@ -213,7 +213,7 @@ class ScaledDelassus:
         """Return problem (1) in scaled numbers."""
         check_gap(q[:, 0], self.bilateral)
         if not np.isfinite(q[:, 1:]).all():
-            raise InputError("The slip without reactions contains NaN or infinity: check the loads of this step.")
+            raise InputError("the slip without reactions contains NaN or infinity: check the loads of this step")
         normal, tangential = self.scale[:, 0], self.scale[:, -1]
         return ScaledProblem(self, q * self.scale, cohesion / tangential, slope * (normal / tangential))
 

@@ -41,19 +41,19 @@ AUTO = "auto"
 
 @dataclass(frozen=True)
 class Iterative:
-    """Hold the settings of the iterative volume route, for any number of ranks.
+    """Solve each step on all unknowns by conjugate gradients, on any number of ranks, and hold the settings for it.
 
     Attributes:
         preconditioner: "jacobi", "icc" (incomplete Cholesky factors, one on each rank), "gamg" (algebraic multigrid
-            with rigid body modes), or "auto": by the Courant number that A shows, up to 0.5, 30, and beyond. PETSc's
-            options may name another.
-        petsc_options: of the preconditioner, without prefix, e.g. {"pc_gamg_threshold": 0.02}; ICC's sub_pc_…;
-            options of the command line go before them.
-        prefix: what these options are called on the command line and in PETSC_OPTIONS.
-        tolerance: at which it stops, of residuals, measured as the certificate, and of errors of the answer, estimated.
-        changes: of the contact set in a step without friction; after more, or when a set comes twice, projected
-            gradients go on.
-        patience: linear iterations within which the residual has to fall tenfold.
+            with rigid body modes), or "auto", which takes the first up to a Courant number of 0.5 in A, the second up
+            to 30, and the third beyond. PETSc's options may name another.
+        petsc_options: options of the preconditioner without prefix, e.g. {"pc_gamg_threshold": 0.02}; those of ICC
+            begin with sub_pc_. Options of the command line override them.
+        prefix: the prefix of these options on the command line and in PETSC_OPTIONS.
+        tolerance: it stops when the residual, measured as the certificate, and the estimated error are below this.
+        changes: number of changes of the contact set in a step without friction; after more, or when a set comes
+            twice, projected gradients continue.
+        patience: number of linear iterations within which the residual has to fall tenfold.
     """
 
     preconditioner: str = AUTO
@@ -133,7 +133,7 @@ class PreparedIterative:
                 return self._attempt(step)
         except StepFailure as error:
             if self._surface.comm.rank == 0:
-                log.info("%s: tried again with incomplete factors of a larger diagonal", error)
+                log.info("%s: the step is tried again with incomplete factors of a larger diagonal", error)
         self._raised = True
         self._take(Inverse(self._blocks, self._layers, RAISED))
         return self._attempt(step)

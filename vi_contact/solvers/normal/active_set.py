@@ -133,7 +133,7 @@ class _Sets:
             history.pop()
             advice = "take a smaller step of time or load, or raise max_iterations"
         elif residual > self.method.tolerance:
-            advice = "G is too ill-conditioned; remove contacts that nearly depend on others"
+            advice = "G is too ill-conditioned: remove contacts that nearly depend on others"
         else:
             return r, residual, len(history), history
         raise failure(self.method, iterations=len(history), residual=residual, advice=advice)

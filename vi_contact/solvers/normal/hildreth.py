@@ -1,4 +1,4 @@
-"""Solve row after row, to convergence: Hildreth and d'Esopo, for the quadratic program (49) of the boundary method.
+"""Solve the quadratic program of eq. 49 of the boundary method row after row, to convergence: Hildreth and d'Esopo.
 
 Primal (eqs. 46, 49 there; D = G⁻¹):   v_i <- min(bound_i, v_i + (z - D v)_i / D_ii)
 Dual (eq. 42 there; Hildreth 1957):    r_i <- max(0, r_i - (q + G r)_i / G_ii)
@@ -21,7 +21,7 @@ from .lcp import EPS, Found, PreparedLCP, ScaledLCP, cholesky, failure, scaled_d
 
 @dataclass(frozen=True)
 class Hildreth:
-    """Hold the settings. ``primal``: sweep over displacements (49) or over reactions (42).
+    """Hold the settings. ``primal``: sweep over displacements (eq. 49) or over reactions (eq. 42).
 
     Ends when the largest change of a sweep, relative to the largest unknown, and the residual are below ``tolerance``
     (or at rounding level). In the result ``iterations`` counts sweeps; with ``record``, ``history`` holds the objective
@@ -70,7 +70,7 @@ class _Sweeps:
             error = scaled.complementarity(r, gap + scaled.matrix @ r)
             if error <= max(method.tolerance * unit, self._rounding(x, r)):
                 return r, error / unit, sweeps, history
-        advice = "contacts are strongly coupled; use ActiveSet, or the other form of Hildreth"
+        advice = "the contacts are strongly coupled: use ActiveSet, or the other form of Hildreth"
         raise failure(method, iterations=method.max_sweeps, residual=error / unit, advice=advice)
 
     def _lower(self, gap: Array) -> list[float]:

@@ -57,8 +57,8 @@ class _Pivots:
         self.method, self._scaled = method, scaled
         G, b = scaled.matrix, scaled.bilateral
         if b.any() and np.linalg.cond(G[np.ix_(b, b)]) > 0.1 / EPS:
-            raise InputError("Bilateral rows of the Delassus operator depend on each other: remove constraints that "
-                             "act on the same motion twice.")
+            raise InputError("bilateral rows of the Delassus operator depend on each other: remove constraints that "
+                             "act on the same motion twice")
         self._carry = np.linalg.solve(G[np.ix_(b, b)].T, G[:, b].T).T
         self._matrix = G - self._carry @ G[b]
 
@@ -69,7 +69,7 @@ class _Pivots:
         if residual > min(self._scaled.rounding(r), self.method.tolerance * unit):  # huge r round to anything
             r, residual = self._on_set(self._closed(gap, unit, history), gap)
         if not residual <= self.method.tolerance * unit:
-            advice = "G is too ill-conditioned; remove contacts that nearly depend on others"
+            advice = "G is too ill-conditioned: remove contacts that nearly depend on others"
             raise failure(self.method, iterations=len(history), residual=residual / unit, advice=advice)
         return r, residual / unit, len(history), history
 
@@ -115,8 +115,8 @@ def _leaving(tableau: Array, basis: Indices, entering: int, pivots: int) -> int:
     m, column = len(tableau), tableau[:, entering]
     rows = np.flatnonzero(column > TINY * max_abs(column))
     if not rows.size:
-        raise StepFailure(f"Lemke's method ended on a ray after {pivots} pivots: no solution was found, G is not "
-                          "copositive-plus or there is none; take a smaller time step, a finer mesh, or a symmetric G")
+        raise StepFailure(f"Lemke's method ended on a ray after {pivots} pivots: there is no solution, or G is not "
+                          "copositive-plus; take a smaller time step, a finer mesh, or a symmetric G")
     for place in (-1, *range(m)):
         ratio = tableau[rows, place] / column[rows]
         rows = rows[ratio <= ratio.min() + TIED * max(1.0, abs(ratio.min()))]

@@ -19,7 +19,7 @@ NONE = "is no P-matrix, a principal minor is not positive: contact may have no s
 
 @dataclass(frozen=True)
 class PMatrix:
-    """Hold whether it is one, ``holds`` None where that is not known, and a ``sentence`` that says why."""
+    """Hold whether a matrix is a P-matrix (``holds``; None where that is not known), and the reason (``sentence``)."""
 
     holds: bool | None
     sentence: str

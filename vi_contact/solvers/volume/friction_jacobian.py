@@ -15,7 +15,7 @@ Entries = tuple[Any, Any, Array]  # rows of this rank, columns of all, values
 
 
 class FrictionJacobian:
-    """Hold the derivatives of ``ScaledFrictionStep.residual`` as an AIJ matrix; see there for the names."""
+    """Hold the derivatives of ``ScaledFrictionStep.residual`` as an AIJ matrix, with the names of that function."""
 
     def __init__(self, scaled: ScaledFrictionStep) -> None:
         self._system: FrictionSystem = scaled.friction

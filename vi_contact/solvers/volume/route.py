@@ -45,13 +45,13 @@ class Method(Protocol):
 
 @dataclass(frozen=True)
 class Volume:
-    """Hold the settings of the volume route.
+    """Solve each step on all unknowns of the body by PETSc, and hold the settings for it.
 
     Attributes:
         method: ReducedNewton (the reference), SemismoothNewton or TaoTron.
-        petsc_options: PETSc options without prefix, e.g. {"snes_monitor": None}; command-line options go before them.
-        prefix: what these options are called on the command line and in PETSC_OPTIONS.
-        tolerance: largest relative error accepted when a solver stops improving above round-off.
+        petsc_options: PETSc options without prefix, e.g. {"snes_monitor": None}; the command line overrides them.
+        prefix: the prefix of these options on the command line and in PETSC_OPTIONS.
+        tolerance: the largest relative error that is accepted when a solver stops improving above round-off.
     """
 
     method: Method = field(default_factory=ReducedNewton)

@@ -34,8 +34,8 @@ class ScaledStep:
         z_max, bound_max, b_max = system.max(max_abs(start), max_abs(reach), max_abs(self.b))
         if z_max == 0.0:
             z_max = self._along(self.b, b_max)
-        if b_max == 0.0:
-            b_max = float(system.max(max_abs(system.apply(start)))[0])
+        if b_max <= ROUND_OFF * self._norm * z_max:  # nothing, or what rounding left of it
+            b_max = max(b_max, float(system.max(max_abs(system.apply(start)))[0]))
         self.x_ref, self.r_ref = _power_of_two(max(z_max, bound_max)), _power_of_two(b_max)
         self.lower, self.upper = lower / self.x_ref, upper / self.x_ref
         self.start = start / self.x_ref

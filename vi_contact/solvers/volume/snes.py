@@ -151,7 +151,7 @@ class SemismoothJacobian(AssembledJacobian):
 
 @dataclass(frozen=True)
 class ReducedNewton:
-    """Solve by SNES VINEWTONRSLS, Cholesky by MUMPS on each reduced matrix, in every iteration: the reference.
+    """Solve by an active set method of PETSc, SNES VINEWTONRSLS, with a factor by MUMPS in every iteration.
 
     Other linear solvers by ``petsc_options``, e.g. {"ksp_type": "cg", "pc_type": "hypre"}; gamg, mg and fieldsplit are
     refused, they do not survive the reduction. With friction, and where A is not symmetric, LU in place of Cholesky.
@@ -180,9 +180,9 @@ class ReducedNewton:
 
 @dataclass(frozen=True)
 class SemismoothNewton:
-    """Solve by SNES VINEWTONSSLS, LU by MUMPS: a diagnostic. Iterates may penetrate by 1e-13 of the displacement.
+    """Solve by a semismooth Newton method of PETSc, SNES VINEWTONSSLS, with LU by MUMPS: a diagnostic.
 
-    With springs 1e6 times stiffer or softer than the body its line search fails or not, as rounding will have it.
+    Iterates may penetrate by 1e-13. With springs 1e6 times stiffer or softer than the body its line search may fail.
     """
 
     carries_friction: ClassVar[bool] = False
