@@ -1,4 +1,4 @@
-"""Write a mesh to a file: ``python3 meshes wall --height 9 --size 0.5 -o wall.msh``."""
+"""Write a mesh to a file, for example: ``python3 meshes wall --height 9 --size 0.5 -o wall.msh``."""
 
 import argparse
 import sys
@@ -26,7 +26,8 @@ def parser() -> argparse.ArgumentParser:
     top = argparse.ArgumentParser(prog="meshes", description=__doc__)
     commands = top.add_subparsers(dest="shape", required=True, metavar=f"{{{','.join(SHAPES)}}}")
     for shape, mesh in SHAPES.items():
-        one = commands.add_parser(shape, description=mesh.__doc__, argument_default=argparse.SUPPRESS)
+        first = (mesh.__doc__ or "").splitlines()[0].rstrip(".")
+        one = commands.add_parser(shape, help=first, description=mesh.__doc__, argument_default=argparse.SUPPRESS)
         for field in fields(mesh):
             option = f"--{field.name.replace('_', '-')}"
             kind = field.type.__name__ if isinstance(field.type, type) else str(field.type)
@@ -35,7 +36,7 @@ def parser() -> argparse.ArgumentParser:
             elif kind.startswith(("float", "tuple")):
                 one.add_argument(option, type=int if "int" in kind else float, required=field.default is MISSING,
                                  nargs="+" if kind.startswith("tuple") else None)
-        one.add_argument("-o", "--output", default=f"{shape}.msh")
+        one.add_argument("-o", "--output", default=f"{shape}.msh", help=f"file to write (default: {shape}.msh)")
     return top
 
 

@@ -35,9 +35,10 @@ _SIZES = {  # the size field alone decides
 class BallMesh:
     """Describe a mesh of a ball of `radius` [m].
 
-    Cells have about `size` [m] within the distance `foot` [m] of the origin, from there on `size` + `growth` times the
-    distance from the foot, but no more than `coarsest` (a quarter of the radius unless given). The sphere becomes a
-    polyhedron inside it: volume and mass are too small by about 0.35 (coarsest/radius)². InputError if it is no ball.
+    Cells have about `size` [m] within the distance `foot` [m] of the origin. Farther away they have about `size` plus
+    `growth` times the distance from the foot, but at most `coarsest` (a quarter of the radius unless given). The sphere
+    becomes a polyhedron inside it: volume and mass are too small by about 0.35 (coarsest/radius)². Raises InputError
+    for sizes that make no ball.
     """
 
     radius: float

@@ -25,10 +25,12 @@ from vi_contact.core.errors import InputError
 class RaftMesh:
     """Describe a building on soil; all lengths in metres.
 
-    `raft`: lengths along x and y, thickness; `core`: x and y of its middle, outer lengths along x and y; `wall`: its
-    thickness; `storeys`: their heights; `slab`: thickness of the floors, as wide as the raft, in the upper part of each
-    storey; `soil`: lengths along x and y, depth. Cells of the building have about `size`, those of the soil about
-    `soil_size` under the raft and `far` at its outer edges. InputError for what makes no such building.
+    `raft` has the lengths of the raft along x and y, and its thickness. `core` has x and y of the middle of the core,
+    and its outer lengths along x and y; `wall` is the thickness of its walls. `storeys` has the heights of the storeys.
+    `slab` is the thickness of the floors, which are as wide as the raft and lie in the upper part of each storey.
+    `soil` has the lengths of the soil along x and y, and its depth. Cells of the building have about `size`; cells of
+    the soil have about `soil_size` under the raft and `far` at the outer edges. Raises InputError for sizes that make
+    no such building.
     """
 
     raft: tuple[float, ...] = (12.0, 9.0, 1.5)

@@ -35,6 +35,7 @@ def row(problem: Any, state: Any, *parts: Any, **named: Any) -> dict[str, Any]:
     return dict(engineering.Resultants(*parts, **named).start(problem, state))
 
 
+@pytest.mark.two_ranks
 def test_thrust_of_soil_at_rest(comm: Any) -> None:
     """V2.13: K0 rho g H²/2 at H/3, on cells of height h at H/3 + h²/(6 H); pressures at the ends those of the cells
     there. The floor carries the weight; the corner is in both."""
@@ -94,6 +95,7 @@ def test_trapezoid_under_an_eccentric_load(comm: Any) -> None:
     assert abs(found["sliding_foot"]) < 1e-9
 
 
+@pytest.mark.serial
 def test_a_block_slides_until_its_speed_is_gone(comm: Any) -> None:
     """v²/(2 mu g) along the floor, nothing left of the friction on the way, all of it afterwards."""
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(2.0, 1.0), divisions=(4, 2)), comm)
@@ -161,6 +163,7 @@ part = [[0.0, 3.0], [4.0, 6.0]]
 """
 
 
+@pytest.mark.two_ranks
 def test_parts_in_a_case_file(shared_tmp: Path) -> None:
     """part = "NAME": a contact table, else a boundary group; or the corners of a box."""
     file = shared_tmp / "soil.toml"
@@ -184,7 +187,7 @@ def test_bad_parts_are_refused() -> None:
     problem, rest, tags = box_of_soil(MPI.COMM_SELF)
     for given, said in (
         ({"name": "a", "part": ((9.0, 9.0), (10.0, 10.0))}, "part 'a' has no contact points"),
-        ({"name": "a", "part": tags["top"]}, "part 'a': no facet of its group is in contact"),
+        ({"name": "a", "part": tags["top"]}, "part 'a': its group has no whole facet in contact"),
         ({"name": "a", "part": (1.0, 2.0)}, "part 'a': part, a box, has shape"),
         ({"name": "a", "part": tags["right"], "where": lambda x, n: n[:, 0] > 0}, "has both part and where"),
         ({}, "part name ''"),

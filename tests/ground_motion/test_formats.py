@@ -152,7 +152,7 @@ def test_knet_counts_become_accelerations_without_offset(direction, tmp_path):
     (knet().replace("Dir. ", "Dor. "), ["no line 'Dir.'"]),
     (knet(scale="3920/6182761"), ["line 14", "scale factor"]),
     (knet(scale="3920(counts)/6182761"), ["line 14", "'counts' is not a unit"]),
-    (knet().replace("100Hz", "many"), ["line 11", "no positive number"]),
+    (knet().replace("100Hz", "many"), ["line 11", "has no positive number"]),
     (knet().replace("  -9500", "  -95x0", 1), ["line 18", "'-95x0' is not a number"]),
 ], ids=lambda value: value[-1] if isinstance(value, list) else "")
 def test_bad_knet_is_refused_in_one_sentence(text, words, tmp_path):

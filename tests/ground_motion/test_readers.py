@@ -278,7 +278,7 @@ def test_even_records_are_resampled_on_request(tmp_path):
     ("0.0 1.0 5.0\n0.1 2.0 5.0\n", {}, ["line 1", "3 columns instead of 2"]),
     ("0.0 1.0\n0.1 2.0\n0.1 2.0\n", {}, ["line 3", "does not come after"]),
     ("0.0 1.0\n0.2 2.0\n0.1 2.0\n", {"resample_dt": 0.1}, ["line 3", "does not come after"]),
-    ("0.0 1.0\n", {}, ["1 samples", "at least two"]),
+    ("0.0 1.0\n", {}, ["1 samples", "two or more"]),
     ("# only a comment\n", {}, ["0 samples"]),
     ("0.0 1.0\n0.1 2.0\n", {"dt": 0.2}, ["0.1 s", "dt=0.2"]),
     ("0.0 1.0\n0.1 2.0\n0.25 1.0\n", {"resample_dt": -1.0}, ["resample_dt is -1.0"]),

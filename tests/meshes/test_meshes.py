@@ -98,8 +98,8 @@ def test_a_wall_takes_other_sizes_and_divisions():
         ({"width": float("nan")}, "positive"),
         ({"divisions": (8, 0)}, "at least 1"),
         ({"divisions": (8.5, 12)}, "whole numbers"),
-        ({"size": 0.0}, "cell size 0.0 m"),
-        ({"size": 7.0}, "no larger"),
+        ({"size": 0.0}, "cell size is 0.0 m"),
+        ({"size": 7.0}, "up to the wall"),
     ],
 )
 def test_a_wall_that_cannot_be_is_refused_with_a_sentence(bad, words):
@@ -171,7 +171,7 @@ def test_block_is_placed_bent_and_truly_turned():
         ({"lengths": (1.0, 1.0), "divisions": (1,)}, "1, 2 or 3"),
         ({"lengths": (1.0, math.inf)}, "positive"),
         ({"divisions": (0, 1)}, "at least 1"),
-        ({"corner": (1.0,)}, "needs 2 coordinates"),
+        ({"corner": (1.0,)}, "give 2 coordinates"),
         ({"lengths": (1.0,), "divisions": (1,), "angle": 0.1}, "cannot be turned"),
     ],
 )
@@ -183,7 +183,7 @@ def test_a_block_that_cannot_be_is_refused_with_a_sentence(bad, words):
 def test_a_map_that_folds_the_block_over_itself_is_refused():
     with pytest.raises(InputError, match="8 cells of BlockMesh have a neighbour on the same side"):
         arrays_from_script(BlockMesh(divisions=(4, 4), deform=lambda x: (x - [0.4, 0.0]) ** [2, 1]))
-    with pytest.raises(InputError, match=r"makes points \(25, 1\) of points \(25, 2\): give all coordinates"):
+    with pytest.raises(InputError, match=r"returned shape \(25, 1\) for points \(25, 2\): return that"):
         arrays_from_script(BlockMesh(divisions=(4, 4), deform=lambda x: x[:, :1]))
 
 
@@ -250,7 +250,7 @@ def test_every_shape_is_a_command(shape: str, words: str, kind: str, tmp_path):
 
 
 def test_meshes_explain_bad_input_in_one_line(tmp_path):
-    for words, said in ((("wall", "--size", -1), "cell size -1.0 m must be positive and no larger than the wall's"),
+    for words, said in ((("wall", "--size", -1), "cell size is -1.0 m: give one above 0 and up to the wall's"),
                         (("block", "-o", "nowhere/block.msh"), "nowhere does not exist")):
         done = run(SOURCE_TREE / "meshes", *words, cwd=tmp_path)
         assert done.returncode == 1

@@ -68,7 +68,7 @@ def test_blocks_turn_together_and_have_to_be_alike():
     straight, turned = (arrays_from_script(stacked(2, angle=angle)) for angle in (0.0, 0.3))
     c, s = np.cos(0.3), np.sin(0.3)
     assert turned.points == pytest.approx(straight.points @ np.array([[c, s], [-s, c]]), abs=1e-14)
-    with pytest.raises(InputError, match="blocks of one mesh need the same number of lengths and the same cells"):
+    with pytest.raises(InputError, match="give the blocks of one mesh the same number of lengths"):
         Blocks({"a": BlockMesh(), "b": BlockMesh(simplices=True)})
 
 
@@ -168,8 +168,8 @@ def test_refusals():
     arrays.cell_groups["half"] = arrays.points[arrays.cells][..., 0].max(axis=1) <= 1.0
     for act, sentence in (
         (lambda: cut_open(arrays, "seam", towards=(0, 1)), "mesh has no boundary group 'seam'; it has left, right"),
-        (lambda: cut_open(arrays, "line"), "say which side is the first, either inside=a cell group or towards"),
-        (lambda: cut_open(arrays, "left", towards=(1, 0)), "'left' is not between cells everywhere"),
+        (lambda: cut_open(arrays, "line"), "give its first side, either by inside=a cell group or by towards"),
+        (lambda: cut_open(arrays, "left", towards=(1, 0)), "'left' has facets without cells on both sides"),
         (lambda: cut_open(arrays, "line", inside="half"), "cell group 'half' is not on one side of 'line' only"),
         (lambda: cut_open(arrays, "line", inside="rock"), "mesh has no cell group 'rock'; it has block, half"),
         (lambda: cut_open(arrays, "line", towards=(1, 0)), r"towards=\(1.0, 0.0\) runs along 'line' somewhere"),

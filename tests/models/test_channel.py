@@ -92,10 +92,10 @@ def test_the_mesh_of_a_symmetric_layer_is_symmetric(triangles):
     "wrong, sentence",
     [
         ({"wall": 2.0}, "does not fit a layer 8.0 m deep"),
-        ({"height": 8.0}, "soil under it"),
+        ({"height": 8.0}, "soil below it"),
         ({"left": 20.0}, "needs soil on both sides"),
         ({"size": 0.0}, "size is 0.0; give a finite number above zero"),
-        ({"size": 0.5, "far": 0.25}, "at least those at it, 0.5 m"),
+        ({"size": 0.5, "far": 0.25}, "at least the cell size at the channel, 0.5 m"),
         ({"depth": float("nan")}, "depth is nan; give a finite"),
     ],
 )
@@ -130,6 +130,7 @@ def test_twenty_three_conditions():
         assert surface.weights[sides[side]].sum() == pytest.approx(length)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize(
     "sides", [TiedSides(), *(pytest.param(one, marks=serial) for one in (Rollers(), Rollers(component=0), Fixed()))],
     ids=str,
@@ -168,7 +169,7 @@ def test_bodies_of_a_cell_group():
     whole = fem.Cells.where("all", one.mesh, lambda x: np.isfinite(x[0]))
     half = fem.Cells.where("half", one.mesh, lambda x: x[0] < 12.1)
     assert fem.bodies_of(one.system, whole) == (0, 1)
-    with pytest.raises(InputError, match="the cell group 'half' is a part of a body, .* give a group of whole bodies"):
+    with pytest.raises(InputError, match="the cell group 'half' is a part of a body .* give a group of whole bodies"):
         fem.bodies_of(one.system, half)
 
 
@@ -182,6 +183,7 @@ def test_defaults_of_a_problem():
     assert other.mass is None and other.surface.bilateral.all() and other.frictional and other.excitations == ()
 
 
+@pytest.mark.serial
 def test_records_of_both_sides():
     """Channel minus soil at a point is its opening along the normal; the openings of the sides are their largest."""
     one = model()
@@ -231,6 +233,7 @@ def test_other_meshes(name):
 
 # Runs -----------------------------------------------------------------------------------------------------------------
 
+@pytest.mark.serial
 @pytest.mark.slow
 def test_the_command(shared_tmp, capsys):
     """vi-contact run channel: histories and fields in the folder, the summary on rank 0."""
@@ -247,6 +250,7 @@ def test_the_command(shared_tmp, capsys):
     assert np.abs(table["u_x_19"] - straight["u_x_19"]).max() < 1e-9 * np.abs(straight["u_x_19"]).max()
 
 
+@pytest.mark.serial
 def test_the_case_that_ships_is_the_channel_of_the_figures():
     """Shape, materials, points, harmonic and time step are those of the model, its reference that of the catalogue."""
     case = built_in()
@@ -338,6 +342,7 @@ def test_no_such_base():
         bedrock("relative", (), dt=None, rock=CHANNEL.concrete)
 
 
+@pytest.mark.serial
 def test_at_rest_before_the_shaking():
     """Python's way to the same: ends that hold no static load come after the gravity stage, and stay at rest."""
     model, firm = staged(Channel(ChannelMesh(size=1.0)), COMM, sides=DashpotSides(), weighing=("channel",), base=None)
@@ -354,7 +359,7 @@ def test_at_rest_before_the_shaking():
     "wrong, sentence",
     [
         ("friction.mu=0.3", r"\[friction\] has no type"),
-        ("friction.type=Coulomb", "lacks 'mu', which Coulomb needs"),
+        ("friction.type=Coulomb", "lacks the key 'mu', which Coulomb needs"),
         ("gravity.cells=moon", r"\[gravity\] cells is 'moon', but the mesh has no group 'moon'"),
         ("gravity.cells=bedrock", "a boundary group: give the name of a cell group"),
         ("mesh.wide=3", "unknown key 'wide' for ChannelMesh: did you mean width"),

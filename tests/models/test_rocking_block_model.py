@@ -24,6 +24,7 @@ def model() -> rocking.RockingModel:
     return rocking.build(rocking.RockingBlock(), COMM)
 
 
+@pytest.mark.serial
 def test_soft_or_coarse_blocks_are_refused():
     """V3.1 asks for sqrt(E/rho)/height >= 200 p: here E >= 2.77 GPa."""
     concrete = rocking.RockingBlock().material
@@ -34,6 +35,7 @@ def test_soft_or_coarse_blocks_are_refused():
         rocking.RockingBlock(divisions=(1, 2))
 
 
+@pytest.mark.serial
 def test_rigid_limit_is_housners_block_in_other_units():
     """p_eff² = p² h/R and b/h instead of p² and alpha; amplitudes at equal phi and the loss are the same."""
     block = rocking.RockingBlock()
@@ -62,6 +64,7 @@ def test_rest_is_an_equilibrium(model):
         assert abs(model.angle(state)) < 1e-12 and abs(model.spin(state)) < 1e-9
 
 
+@pytest.mark.serial
 def test_tilted_states(model):
     """A tilt is a rigid turn about the left corner: angle, spin and kinetic energy ½ (4/3) m R² rate² (the held base
     has no inertia sideways, which a turn about a base corner does not ask for)."""
@@ -72,6 +75,7 @@ def test_tilted_states(model):
     assert kinetic == pytest.approx(0.5 * 4.0 / 3.0 * 1920.0 * 1.04 * 0.09, rel=1e-12)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("n", [5, 10])
 def test_onset_of_the_mesh(n):
     """g b/h = 1.962 m/s² on every mesh: the inertia load counts the mass that elements share with the held base."""
@@ -79,6 +83,7 @@ def test_onset_of_the_mesh(n):
     assert model.onset_acceleration == pytest.approx(1.962, rel=1e-10)
 
 
+@pytest.mark.serial
 def test_weight_has_the_arm_of_the_tilted_block(model):
     """Work of the weight over a turn theta: m g (b theta - ½ h theta²), from the loads and the geometric stiffness."""
     system, theta = model.problem.equations, 0.15
@@ -88,6 +93,7 @@ def test_weight_has_the_arm_of_the_tilted_block(model):
     assert work == pytest.approx(-1920.0 * 9.81 * (0.2 * theta - 0.5 * theta**2), rel=1e-8)
 
 
+@pytest.mark.serial
 def test_impacts_of_a_history():
     """Zero crossings between rows by straight lines; chatter near zero is one impact."""
     history = {"t": np.arange(9.0), "theta": np.array([0.4, 0.2, -1e-5, 1e-5, -0.2, -0.3, -0.1, 0.1, 0.2])}

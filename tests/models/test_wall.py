@@ -53,6 +53,7 @@ def test_every_point_is_a_node_of_the_mesh():
     assert set(model.probes()) == {"4", "6", "7", "10", "12", "26"}
 
 
+@pytest.mark.serial
 def test_mass_section_and_damping():
     """rho · width · height · d as the mass, thickness in the contact weights, damping handed on."""
     wall = Wall(divisions=(4, 6), thickness=0.5, damping=Rayleigh(alpha=0.2, beta=0.0))
@@ -78,6 +79,7 @@ def test_cases(case):
     assert not surface.gap0.any() and np.all(surface.bilateral == (case == "bilateral"))
 
 
+@pytest.mark.serial
 def test_whole_face_and_unknown_case():
     model = build(Wall(), COMM)
     face = model.surface("face").whole()
@@ -98,6 +100,7 @@ def test_defaults_of_a_problem():
     assert other.excitations == () and other.impact == Elastic()
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize(
     "wall", [Wall(triangles=True), Wall(size=0.9), Wall(size=0.9, triangles=True), Wall(divisions=(5, 7))]
 )
@@ -113,6 +116,7 @@ def test_other_meshes_are_the_same_wall(wall):
     assert top.mean() == pytest.approx(sag, rel=5e-3)
 
 
+@pytest.mark.serial
 def test_contact_points_need_nodes_near_them():
     """Eleven contact points on six elements are refused: one by one too far away, or two on one node."""
     with pytest.raises(InputError, match=r"contact point \(6, 2.25\) is 0.75 m away from boundary group 'face'"):
@@ -151,6 +155,7 @@ def test_which_mass_a_run_shakes():
         built_in("system.base_inertia=half")
 
 
+@pytest.mark.serial
 def test_every_case_is_a_setting_of_the_one_that_ships():
     """Points, sides of the law and their number; what the model of before was set by names what is in its place."""
     points = [list(Wall().point(number)) for number in CASES["a"]]
@@ -188,6 +193,7 @@ def test_records_shake_the_whole_mass(shared_tmp, recorded):
     assert off < 1e-10 * size  # the other mass makes 1e-2
 
 
+@pytest.mark.serial
 def test_the_case_that_ships_is_the_wall_of_the_figures():
     """Its harmonic, time step and number of steps are those of the model, to the last bit."""
     case, model = built_in(), build(Wall(), COMM, base_inertia="catalogue")

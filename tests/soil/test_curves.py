@@ -58,7 +58,7 @@ def test_between_the_rows_and_beyond_them():
     (lambda: SoilCurves([1e-4, 1e-3], [0.7, 0.5], [0.05, 0.1]), "begin at smaller strains"),
     (lambda: SoilCurves([1e-5, 1e-3], [1.0, 0.0], [0.05, 0.1]), "stays above zero"),
     (lambda: SoilCurves([1e-5, 1e-3], [0.96, 0.98], [0.05, 0.1]), "falls from 1"),
-    (lambda: SoilCurves([1e-3, 1e-5], [1.0, 0.5], [0.05, 0.1]), "that rise"),
+    (lambda: SoilCurves([1e-3, 1e-5], [1.0, 0.5], [0.05, 0.1]), "rising"),
     (lambda: SoilCurves([1e-5, 1e-3], [1.0, 0.5], [1.0, 10.0]), "not per cent"),
     (lambda: SoilCurves([1e-5, 1e-3], [1.0, 0.5], [0.01]), r"give numbers of shape \(2,\)"),
     (lambda: SoilCurves.vucetic_dobry(250), "end at 200 %"),

@@ -94,5 +94,5 @@ def test_sides_that_cannot_be_are_refused(comm):
     with pytest.raises(InputError, match="held, but its base is compliant"):
         fem.assemble(mesh, SOIL, clamped=tags["bottom"], dashpots=soil.FreeField(tags["left"], base=base))
     mesh, tags = block(comm, lengths=(1.0, 1.0, 1.0), divisions=(1, 1, 1))
-    with pytest.raises(InputError, match="FreeField is for bodies in the plane: tie the sides of others"):
+    with pytest.raises(InputError, match="FreeField is for plane bodies: tie the sides of this one"):
         fem.assemble(mesh, SOIL, clamped=tags["bottom"], dashpots=soil.FreeField(tags["left"], base=SHAKE))

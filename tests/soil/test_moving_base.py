@@ -120,7 +120,8 @@ def difference(pair: tuple[Any, Any], scheme: Any, steps: int = 220, *, rest: bo
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["trapezoidal", "zwt", "newmark"])
+@pytest.mark.parametrize(
+    "name", ["trapezoidal", *(pytest.param(name, marks=pytest.mark.serial) for name in ("zwt", "newmark"))])
 def test_both_frames_give_the_same_contact_forces(comm, name):
     """Horizontal and vertical motion together, with stiffness damping; measured 1e-12."""
     pair = two_frames(comm, damping=vc.Rayleigh(0.0, 1e-4))
@@ -136,12 +137,14 @@ def test_other_schemes_too(comm, name):
     assert difference(pair, SCHEMES[name]) <= 1e-10
 
 
+@pytest.mark.serial
 def test_with_friction_on_an_obstacle_that_goes_along(comm):
     """Slip is measured against the moving wall."""
     pair = two_frames(comm, friction=vc.Coulomb(0.3))
     assert difference(pair, vc.Trapezoidal()) <= 1e-10
 
 
+@pytest.mark.serial
 @pytest.mark.slow
 def test_a_block_on_a_box_of_soil_whose_base_moves(comm):
     """In space, three components, sides tied both ways: a block rubs on the soil, is thrown off and comes down."""

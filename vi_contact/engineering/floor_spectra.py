@@ -36,11 +36,11 @@ def recorded_motion(history: Mapping[str, Array], column: str, *, relative: bool
     kind, _, rest = column.partition("_")
     axis = rest.partition("_")[2 if rest.startswith("g_") else 0]
     if kind not in ("a", "v") or "_" not in rest:
-        raise InputError(f"column '{column}' is no acceleration: record Probe(..., acceleration=True), "
-                         "and give a_x_<label>, or a_g_x for the ground")
+        raise InputError(f"column '{column}' is not an acceleration: record Probe(..., acceleration=True) "
+                         "and give a_x_<label>, or give a_g_x for the ground")
     values, t = column_of(history, column), column_of(history, "t")
     if len(t) < 3:
-        raise InputError(f"the history has {len(t)} rows: spectra need three or more")
+        raise InputError(f"the history has {len(t)} rows: give one of three or more")
     ground = np.asarray(history.get(f"a_g_{axis}", np.zeros(len(t))), dtype=float)
     ground = np.append(ground[:1], 0.5 * (ground[1:] + ground[:-1]))  # mean over the step, as probes have it
     if kind == "v":

@@ -20,7 +20,7 @@ def lowest_frequency(system: SemiDiscreteSystem, *, max_iterations: int = 2000) 
     instance("lowest_frequency", "system", system, SemiDiscreteSystem, "give a system, such as fem.assemble returns")
     whole("lowest_frequency", "max_iterations", max_iterations, least=1)
     if system.floating:
-        raise InputError("the body floats: its lowest frequency is zero; clamp a part of it")
+        raise InputError("the body is not held, so its lowest frequency is zero: clamp a part of it")
     dot = system.algebra.dot
     factor = system.algebra.factor(system.K)
     force = system.M @ (system.influence @ (1.0 + 0.1 * np.arange(system.influence.shape[1])))
@@ -34,7 +34,7 @@ def lowest_frequency(system: SemiDiscreteSystem, *, max_iterations: int = 2000) 
         if abs(square - last) <= 1e-15 * square:
             break
     if not abs(square - last) <= 1e-10 * square:
-        raise InputError("the lowest frequency did not settle: give the excitation frequency explicitly")
+        raise InputError("the lowest frequency did not settle: give a larger max_iterations, or the frequency")
     return float(np.sqrt(square)) / (2.0 * np.pi)
 
 

@@ -98,5 +98,5 @@ def column_of(history: Mapping[str, Array], name: str) -> Array:
         raise InputError(f"the history has no column '{name}': it has {', '.join(known)}")
     values = np.asarray(history[name], dtype=float)
     if values.ndim != 1:
-        raise InputError(f"column '{name}' holds arrays: choose one of numbers")
+        raise InputError(f"column '{name}' holds arrays: choose a column of numbers")
     return values

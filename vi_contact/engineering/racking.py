@@ -24,7 +24,7 @@ def racking(corners: ArrayLike, displacements: Array) -> tuple[Array, Array]:
     arms = x - x.mean(axis=0)
     gram = arms.T @ arms
     if np.linalg.eigvalsh(gram)[0] <= 1e-12 * np.trace(gram):
-        raise InputError("the four corners of a racking are on one line: give the corners of a frame")
+        raise InputError("Racking: the four corners are on one line: give the corners of a frame")
     gradient = np.einsum("...ki,kj->...ij", np.asarray(displacements, dtype=float), arms @ np.linalg.inv(gram))
     return gradient[..., 0, 1] + gradient[..., 1, 0], 0.5 * (gradient[..., 1, 0] - gradient[..., 0, 1])
 
@@ -60,7 +60,7 @@ class Racking:
         """Find the nodes."""
         self._problem, space = problem, problem.system.space
         if space.dimension != 2:
-            raise InputError(f"racking is of plane frames, the body has {space.dimension} dimensions")
+            raise InputError(f"Racking is for plane bodies and this one has {space.dimension} dimensions: leave it out")
         self._nodes = {k: space.find_nodes(np.asarray(corners, float)) for k, corners in self.frames.items()}
         return self._row(state)
 

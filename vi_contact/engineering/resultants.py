@@ -90,7 +90,7 @@ class Part:
         direction = array(f"part '{name}'", "normal", direction, self.centre.shape)
         size = float(np.linalg.norm(direction))
         if size <= 1e-6 * (self.weights.sum() if given is None else 1.0):
-            raise InputError(f"part '{name}': its contact directions cancel, give normal= the direction of N")
+            raise InputError(f"part '{name}': its contact directions cancel: give the direction of N by normal=")
         return np.asarray(direction / size)
 
     def _ends(self, points: Array) -> Array:
@@ -164,11 +164,12 @@ _MEANING = tomllib.loads(files(__package__).joinpath("resultants.toml").read_tex
 
 @dataclass
 class Resultants:
-    """Record columns <quantity>_<name> of a named part of the contact surface; the module's head lists the quantities.
+    """Record columns <quantity>_<name> of a named part of the contact surface, such as N_base.
 
-    uplift, opening, slip, force_x, force_y, N, T, M, e, height, theta, settlement (relative to the support); in space
-    also force_z, T_x, …, e_x, …, and M_x, …, theta_x, … in place of M and theta. level, sliding, pressure_low,
-    pressure_high and, with friction, margin. What has slid in the end is the last ``sliding`` less the first.
+    The quantities are uplift, opening, slip, force_x, force_y, N, T, M, e, height, theta, settlement (relative to the
+    support), level, sliding, pressure_low, pressure_high and, with friction, margin. In space there are also force_z
+    and the components of T and e, and those of M and theta take the place of M and theta, as M_x. What has slid in the
+    end is the last ``sliding`` less the first.
 
     Args:
         name: names the columns; that of the group ``part`` when left out. centre: (d,) the point of reference, of a
@@ -224,8 +225,8 @@ class Resultants:
             clamped = from_each(self._surface.comm, space.nodes[space.held.all(axis=1)])
             touching = np.isin(space.corners_of_facets(self.part.indices), np.concatenate([whole.nodes, *clamped]))
             if not largest(self._surface.comm, touching.all(axis=1).any()):
-                raise InputError(f"part '{self.name}': no facet of its group is in contact, single nodes at most: give "
-                                 "a group of the contact, or a box")
+                raise InputError(f"part '{self.name}': its group has no whole facet in contact: give a group of the "
+                                 "contact, or a box")
             alone = found.copy()
             for rows in whole.corners:
                 alone[rows] = False
@@ -277,7 +278,7 @@ def contact_summary(history: Mapping[str, Array], geometry: Geometry, *, centre:
     column_name("part name", name)
     missing = [column for column in ("pressure", "gap", "active") if column not in history]
     if missing:
-        raise InputError(f"the history has no column {missing[0]}: record Contact() and read history.h5")
+        raise InputError(f"the history has no column {missing[0]}: record Contact(), and read history.h5")
     geometry = geometry.whole() if isinstance(geometry, ContactSurface) else geometry
     part = Part(name, geometry, centre, where, normal)
     rows, m = len(history["t"]), len(geometry.weights)

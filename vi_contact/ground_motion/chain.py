@@ -39,7 +39,7 @@ class Processing:
     def __post_init__(self) -> None:
         asked = [name for name in ("scale", "pga", "arias", "psa") if getattr(self, name) is not None]
         if len(asked) > 1:
-            raise InputError(f"Processing: {' and '.join(asked)} were both asked for; scale a record once")
+            raise InputError(f"Processing: {' and '.join(asked)} were both given; scale a record only once")
 
     def __call__(self, record: Record) -> Record:
         """Return the processed record; its notes tell every step taken."""
@@ -96,5 +96,5 @@ def _ratio(record: Record, name: str, target: float, value: float) -> float:
     """Return target / value."""
     number(name, "target", target, positive=True)
     if value == 0.0:
-        raise InputError(f"{record.source or 'Record'}: every sample is zero and scaling stays so; use another record")
+        raise InputError(f"{record.source or 'Record'}: every sample is zero; scale another record")
     return target / value

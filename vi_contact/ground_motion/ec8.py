@@ -17,7 +17,7 @@ TYPES = dict(enumerate(_TABLES["type"], start=1))  # of spectra: 1, or 2 for wea
 
 @dataclass(frozen=True)
 class EC8Spectrum:
-    """Hold S_e(T), eqs. 3.2 to 3.5, of given parameters; `on_ground` and `vertical` take them from the tables.
+    """Hold the elastic spectrum of EN 1998-1, S_e(T) of eqs. 3.2 to 3.5. `on_ground` and `vertical` have its tables.
 
     ag: design ground acceleration on ground A, gamma_I a_gR [m/s²]; s: soil factor; tb, tc, td [s]; damping: ratio;
     plateau: 2.5, or 3.0 vertically. A National Annex may give other numbers.

@@ -11,8 +11,8 @@ from .record import Record
 class GroundMotion:
     """Describe a recorded motion: a(t) = scale · (straight lines between the samples of `record`, sample k at k · dt).
 
-    Zero before the first and after the last sample. scale: a factor; for a peak use `scaled_to_pga(record, pga)`.
-    Raises InputError unless scale is finite. Solve with a time step no longer than the record's, or resample it first.
+    It is zero before the first and after the last sample. scale: a factor; for a peak use `scaled_to_pga(record, pga)`.
+    InputError unless scale is finite. Use a time step no longer than that of the record, or resample the record first.
     """
 
     record: Record

@@ -97,7 +97,7 @@ def predominant_period(record: Record, *, damping: float = 0.05) -> float:
     """Return the period of the largest pseudo-acceleration from 0.02 (or ten steps of the record) to 10 s [s]."""
     periods = PREDOMINANT_PERIODS[PREDOMINANT_PERIODS / record.dt >= 10.0]
     if not periods.size:
-        raise InputError(f"predominant_period: a step of {record.dt:g} s resolves no period; use a finer record")
+        raise InputError(f"predominant_period: a step of {record.dt:g} s resolves no period; use a smaller step")
     return float(periods[np.argmax(response_spectrum(record, periods, damping=damping).psa)])
 
 
@@ -110,7 +110,7 @@ def mean_period(record: Record) -> float:
     inside = (frequencies >= 0.25) & (frequencies <= 20.0)
     power = amplitudes[inside] ** 2
     if not np.any(power > 0.0):
-        raise InputError("mean_period: the record holds nothing from 0.25 to 20 Hz; use a longer or finer one")
+        raise InputError("mean_period: the record has no motion from 0.25 to 20 Hz; use a longer or finer one")
     return float(np.sum(power / frequencies[inside]) / np.sum(power))
 
 

@@ -43,7 +43,7 @@ def resampled(record: Record, dt: float) -> Record:
     if ratio.numerator > LARGEST_RATIO or not exact:
         whole = min(round(max(record.dt / dt, dt / record.dt)), LARGEST_RATIO)
         near = record.dt / whole if dt < record.dt else record.dt * whole
-        raise InputError(f"resampled: {dt!r} s and the record's step {record.dt!r} s are in no ratio of whole numbers "
+        raise InputError(f"resampled: {dt!r} s and the record's step {record.dt!r} s have no ratio of whole numbers "
                          f"up to {LARGEST_RATIO}; choose a step such as {near!r} s")
     count = (record.acceleration.size - 1) * ratio.numerator // ratio.denominator + 1
     if count < 2:

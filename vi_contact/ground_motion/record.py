@@ -11,7 +11,7 @@ from ..core.units import STANDARD_GRAVITY
 
 UNITS = {"m/s2": 1.0, "cm/s2": 0.01, "gal": 0.01, "g": STANDARD_GRAVITY, "g/10": 0.1 * STANDARD_GRAVITY, "mm/s2": 0.001,
          "in/s2": 0.0254, "ft/s2": 0.3048}
-"""Accepted units of acceleration and their size in m/s²."""
+"""Name the accepted units of acceleration, and give their size in m/s²."""
 
 LARGEST_PEAK = 10.0 * STANDARD_GRAVITY
 """Peak acceleration [m/s²] beyond which units are doubted: the strongest ground motions on record reach half of it."""

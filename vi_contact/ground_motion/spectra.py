@@ -104,7 +104,7 @@ def response_spectrum(record: Record, periods: Array, *, damping: float = 0.05) 
         raise InputError(f"response_spectrum: damping is {damping!r}; give a ratio from 0 to below 1, 0.05 for 5 %")
     if record.dt > SHORTEST * row.min():
         raise InputError(f"response_spectrum: a period of {row.min():g} s is below a {SHORTEST}th of the step "
-                         f"{record.dt:g} s and feels the peak acceleration alone; begin with longer ones")
+                         f"{record.dt:g} s and has the peak acceleration alone; begin with longer periods")
     counted("response_spectrum", f"{row.size} periods", float(row.size) * record.acceleration.size, most=MOST)
     parts = np.maximum(PER_STEP, 2 ** np.ceil(np.log2(PER_PERIOD * record.dt / row))).astype(int)
     peaks = np.zeros((3, row.size))

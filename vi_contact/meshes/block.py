@@ -23,7 +23,7 @@ class BlockMesh:
     """Describe a mesh of a d-dimensional box, d = len(lengths) = 1, 2 or 3.
 
     A node starts at corner + (i lengths_x/n_x, ...), is moved by `deform`, then turned by `angle` [rad] about the
-    origin (the z axis for a box). `deform` takes and returns points (n, d) [m]. InputError for sizes that make no box.
+    origin (the z axis in space). `deform` takes and returns points (n, d) [m]. InputError if the sizes make no box.
     """
 
     lengths: tuple[float, ...] = (1.0, 1.0)
@@ -36,7 +36,7 @@ class BlockMesh:
     def __post_init__(self) -> None:
         check_box(self.lengths, self.divisions)
         if self.corner is not None and len(self.corner) != len(self.lengths):
-            raise InputError(f"block corner {self.corner} needs {len(self.lengths)} coordinates, one per length")
+            raise InputError(f"block corner is {self.corner}: give {len(self.lengths)} coordinates, one per length")
         if self.angle and len(self.lengths) == 1:
             raise InputError("a bar in one dimension cannot be turned: leave the angle out or give two lengths")
 
@@ -49,7 +49,7 @@ class BlockMesh:
             straight = nodes.reshape(-1, nodes.shape[-1])
             moved = np.asarray(self.deform(straight))
             if moved.shape != straight.shape:
-                raise InputError(f"deform makes points {moved.shape} of points {straight.shape}: give all coordinates")
+                raise InputError(f"deform returned shape {moved.shape} for points {straight.shape}: return that shape")
             nodes = moved.reshape(nodes.shape)
         if self.angle:
             x, y, c, s = nodes[..., 0], nodes[..., 1], math.cos(self.angle), math.sin(self.angle)
@@ -68,9 +68,9 @@ class BlockMesh:
 def check_box(lengths: Sequence[float], divisions: Sequence[int]) -> None:
     """Raise InputError unless there are 1 to 3 positive lengths [m], each with a positive number of divisions."""
     if not 1 <= len(lengths) <= 3 or len(divisions) != len(lengths):
-        raise InputError(f"lengths {tuple(lengths)} and divisions {tuple(divisions)} must both be 1, 2 or 3 numbers")
+        raise InputError(f"lengths {tuple(lengths)} and divisions {tuple(divisions)}: give 1, 2 or 3 numbers of both")
     if not all(math.isfinite(length) and length > 0.0 for length in lengths):
-        raise InputError(f"lengths {tuple(lengths)} must be positive numbers of metres")
+        raise InputError(f"lengths is {tuple(lengths)}: give positive numbers of metres")
     if not all(n == n // 1 and n >= 1 for n in divisions):
-        raise InputError(f"divisions {tuple(divisions)} must be whole numbers of cells, at least 1")
+        raise InputError(f"divisions is {tuple(divisions)}: give whole numbers of cells, at least 1")
     counted("mesh", f"divisions {tuple(divisions)}", math.prod(divisions), "cells", most=MOST_CELLS)

@@ -25,10 +25,10 @@ from vi_contact.meshes.rows import Mask, Rows
 class ChannelMesh:
     """Describe a layer, width x depth [m], and a channel in it, `outer_width` x `height`, of `wall` and `slab` [m].
 
-    `left`: x of the outer left side of the channel, by default in the middle. `size` [m]: of the cells, a grid of
-    rectangles or, with `triangles`, of their halves; every part is divided evenly into cells of about that size. With
-    `far` [m] an irregular mesh of triangles: those of `size` on the channel grow to `far` at bedrock and sides.
-    InputError for sizes that make no such layer.
+    `left` is x of the outer left side of the channel, which is in the middle by default. Every part is divided evenly
+    into rectangles of about `size` [m], or with `triangles` into their halves. With `far` [m] the mesh has irregular
+    triangles, which grow from `size` at the channel to `far` at bedrock and sides. Raises InputError for sizes that
+    make no such layer.
     """
 
     width: float = 24.0
@@ -47,13 +47,13 @@ class ChannelMesh:
         attributes(self, positive=("width", "depth", "outer_width", "height", "wall", "slab", "size", *given))
         if not (2.0 * self.wall < self.outer_width and self.slab < self.height < self.depth):
             raise InputError(f"channel {self.outer_width} x {self.height} m with walls of {self.wall} m and a slab of "
-                             f"{self.slab} m does not fit a layer {self.depth} m deep: it needs room inside, and soil "
-                             "under it")
+                             f"{self.slab} m does not fit a layer {self.depth} m deep: leave room inside it, and soil "
+                             "below it")
         if not 0.0 < self.x[1] < self.x[4] < self.width:
             ends = f"from x = {self.x[1]} to {self.x[4]} m"
             raise InputError(f"channel {ends} needs soil on both sides: keep it between 0 and {self.width} m")
         if self.far is not None and self.far < self.size:
-            raise InputError(f"cells of {self.far} m far from the channel: give at least those at it, {self.size} m")
+            raise InputError(f"far is {self.far} m: give at least the cell size at the channel, {self.size} m")
         grid = self.width / self.size * (self.depth / self.size)
         around = (self.outer_width + 2.0 * self.height) / self.size + self.width / (self.far or self.size)
         cells = grid if self.far is None else max(around, self.width / self.far * (self.depth / self.far))

@@ -19,7 +19,7 @@ from vi_contact.meshes.rows import Mask, Rows, cell_sides, connected, number_ali
 
 @dataclass(frozen=True)
 class CutOpen:
-    """Describe the mesh of `source`, a script or a file, cut open along its inner boundary group; see `cut_open`."""
+    """Describe the mesh of `source`, a script or a file, cut open along its inner boundary group."""
 
     source: Source
     group: str
@@ -33,7 +33,7 @@ class CutOpen:
 
 @dataclass(frozen=True)
 class Welded:
-    """Describe the mesh of `source` with the coinciding nodes of two boundary groups made one; see `welded`."""
+    """Describe the mesh of `source` with the coinciding nodes of two boundary groups made one."""
 
     source: Source
     first: str
@@ -55,7 +55,7 @@ def cut_open(arrays: MeshArrays, group: str, *, inside: str | None = None,
     """
     facets = _group(arrays, group)
     if (inside is None) == (towards is None):
-        raise InputError(f"cut of '{group}': say which side is the first, either inside=a cell group or towards=vector")
+        raise InputError(f"cut of '{group}': give its first side, either by inside=a cell group or by towards=a vector")
     sides, owner = cell_sides(arrays.cells, arrays.cell)
     side, *numbers = number_alike(sides, *arrays.facet_groups.values())
     named = dict(zip(arrays.facet_groups, numbers, strict=True))
@@ -65,7 +65,7 @@ def cut_open(arrays: MeshArrays, group: str, *, inside: str | None = None,
     one, other = order[inner], order[inner + 1]  # rows of sides: the two of every inner facet
     cut = np.isin(side[one], wanted)
     if cut.sum() < len(np.unique(wanted)):
-        raise InputError(f"boundary group '{group}' is not between cells everywhere: cut only inner boundaries")
+        raise InputError(f"boundary group '{group}' has facets without cells on both sides: cut inner boundaries only")
     first = _on_first_side(arrays, group, owner[one[cut]], owner[other[cut]], inside, towards)
     cells, points = _doubled(arrays, np.unique(facets), sides, owner, one[~cut], other[~cut])
 
@@ -124,7 +124,7 @@ def _on_first_side(arrays: MeshArrays, group: str, one: Rows, other: Rows, insid
             raise InputError(f"mesh has no cell group '{inside}'; it has {', '.join(arrays.cell_groups)}")
         mask = arrays.cell_groups[inside]
         if np.any(mask[one] == mask[other]):
-            raise InputError(f"cell group '{inside}' is not on one side of '{group}' only: say towards=vector instead")
+            raise InputError(f"cell group '{inside}' is not on one side of '{group}' only: give towards=vector instead")
         return np.asarray(mask[one])
     way = np.asarray(towards, dtype=float)
     centres = arrays.points[arrays.cells].mean(axis=1)
@@ -132,7 +132,7 @@ def _on_first_side(arrays: MeshArrays, group: str, one: Rows, other: Rows, insid
     ahead = across @ way
     if np.any(np.abs(ahead) <= 1e-9 * np.linalg.norm(across, axis=1) * np.linalg.norm(way)):
         given = tuple(float(x) for x in way)
-        raise InputError(f"towards={given} runs along '{group}' somewhere: say inside=a cell group instead")
+        raise InputError(f"towards={given} runs along '{group}' somewhere: give inside=a cell group instead")
     return np.asarray(ahead > 0.0)
 
 

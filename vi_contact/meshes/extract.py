@@ -82,7 +82,7 @@ def _of_grids(grids: Sequence[Grid], source: str) -> MeshArrays:
 
 def _check_finite(points: Array, source: str) -> None:
     if not np.isfinite(points).all():
-        raise InputError(f"{source} has nodes whose coordinates are no numbers: write it again from Gmsh")
+        raise InputError(f"{source} has nodes whose coordinates are not numbers: write it again from Gmsh")
 
 
 def extract(gmsh: Any, source: str) -> MeshArrays:

@@ -71,12 +71,12 @@ class GeoFile:
                 done = subprocess.run(command, cwd=folder, text=True, errors="replace", stdin=subprocess.DEVNULL,
                                       capture_output=True, timeout=self.time_limit)
             except subprocess.TimeoutExpired:
-                raise InputError(f"{self.path}: Gmsh was not done after {self.time_limit:g} s: ask for larger cells, "
-                                 "or give more time_limit") from None
+                raise InputError(f"{self.path}: Gmsh did not end within {self.time_limit:g} s: ask for larger cells, "
+                                 "or give a longer time_limit") from None
             if done.returncode:
-                said = (done.stderr.strip().splitlines() or ["it ended, as where memory is over"])[-1]
+                said = (done.stderr.strip().splitlines() or ["it ended, perhaps without memory"])[-1]
                 if said.strip().startswith(("terminate called", "what()")):  # for a text that Gmsh throws
-                    said = "it stopped at a formula or size: look at Field[…].F, and at Mesh.MeshSize…, above zero"
+                    said = "it stopped at a formula or size: check Field[…].F, and that Mesh.MeshSize… is positive"
                 raise InputError(f"{self.path}: Gmsh cannot mesh it: {said.replace('own_', '')}")
             gmsh.merge(str(safe_copy(Path(folder, "made.msh"), Path(folder))))
 
@@ -94,7 +94,7 @@ def mesh_here(refine: int, time_limit: float) -> None:
             gmsh.merge("script.geo")
             groups = gmsh.model.getPhysicalGroups()
             if not groups:
-                sys.exit("it has no cells in a group: name the body by a Physical Surface, in space a Physical Volume")
+                sys.exit("it has no cells in a group: name the body by a Physical Surface or Physical Volume")
             gmsh.model.mesh.generate(max(d for d, _ in groups))
             for _ in range(refine):
                 gmsh.model.mesh.refine()

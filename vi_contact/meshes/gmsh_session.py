@@ -72,7 +72,7 @@ def write(mesh: MeshScript, path: str | Path) -> None:
     """Build the mesh and write it to a file in the format Gmsh gives to that suffix (.msh: format 4.1, text)."""
     target = Path(path)
     if not target.parent.is_dir():
-        raise InputError(f"cannot write {target}: the folder {target.parent} does not exist, create it first")
+        raise InputError(f"cannot write {target}: the folder {target.parent} does not exist: create it first")
     with session(target.stem) as gmsh:
         mesh.build(gmsh)
         gmsh.write(str(target))

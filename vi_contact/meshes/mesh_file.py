@@ -34,7 +34,7 @@ def safe_copy(file: Path, folder: Path) -> Path:
         raise InputError(f"mesh file {shown(str(file))} cannot be read ({why}") from None
     if not there:
         what = str(file) if "\0" not in str(file) else shown(str(file))
-        raise InputError(f"mesh file {what} does not exist: check the path, or write it as by python3 meshes wall")
+        raise InputError(f"mesh file {what} does not exist: check the path, or write one (python3 meshes --help)")
     if copy.stat().st_size == 0:
         raise InputError(f"mesh file {file} is empty: write it again")
     with open(copy, "rb") as opened, mmap.mmap(opened.fileno(), 0, access=mmap.ACCESS_READ) as data:
@@ -45,7 +45,7 @@ def safe_copy(file: Path, folder: Path) -> Path:
 
 def _check_magic(data: mmap.mmap, file: Path) -> None:
     if data[: len(MAGIC)] != MAGIC:
-        raise InputError(f"mesh file {file} does not begin with $MeshFormat, so it is no mesh of Gmsh's own format and "
+        raise InputError(f"mesh file {file} does not begin with $MeshFormat, so it is not in Gmsh's mesh format and "
                          "may be a script, which runs commands: write it from Gmsh as .msh, or give a .geo of geometry "
                          "alone as meshes.GeoFile")
 

@@ -22,7 +22,7 @@ class Blocks:
     def __post_init__(self) -> None:
         kinds = {(len(block.lengths), block.simplices) for block in self.blocks.values()}
         if len(kinds) != 1:
-            raise InputError("blocks of one mesh need the same number of lengths and the same cells: give all alike")
+            raise InputError("give the blocks of one mesh the same number of lengths and the same kind of cells")
 
     def build(self, gmsh: Any) -> None:
         """Add the blocks to Gmsh's current model."""

@@ -20,8 +20,8 @@ class WallMesh:
     """Describe a mesh of a wall, height x width [m].
 
     `divisions` are the exact numbers of cells along width and height; `size` [m] asks for an irregular mesh of about
-    that cell size instead; without either, the 8 x 12 published cells. `triangles` instead of quadrilaterals.
-    Raises InputError for sizes that make no wall.
+    that cell size instead. If neither is given, the mesh has 8 x 12 cells. `triangles` asks for triangles instead of
+    quadrilaterals. Raises InputError for sizes that make no wall.
     """
 
     height: float = 9.0
@@ -32,11 +32,11 @@ class WallMesh:
 
     def __post_init__(self) -> None:
         if self.divisions is not None and self.size is not None:
-            raise InputError("a wall takes either divisions or a cell size: leave one of them out")
+            raise InputError("a wall has divisions and a cell size: leave one of them out")
         check_box((self.width, self.height), self.divisions or _PUBLISHED)
         if self.size is not None:
             if not 0.0 < self.size <= min(self.width, self.height):
-                raise InputError(f"cell size {self.size} m must be positive and no larger than the wall's sides")
+                raise InputError(f"the cell size is {self.size} m: give one above 0 and up to the wall's sides")
             cells = self.width / self.size * (self.height / self.size)
             counted("wall", f"a cell size of {self.size} m", cells, "cells", most=MOST_CELLS)
 

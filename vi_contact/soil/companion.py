@@ -1,8 +1,7 @@
 """March a small linear system beside a run: the ground, or a free-field column, with the run's own scheme and steps.
 
 Loads of the run ask for its motion. Displacement and velocity are straight lines between the steps, as in the schemes'
-averages, so that such a load enters the equation of motion with the same weights as the run's own u and v.
-"""
+averages, so that such a load enters the equation of motion with the same weights as the run's own u and v."""
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
@@ -29,8 +28,7 @@ class CompanionRun:
     """March a serial system without contact from rest at t = 0, as far as somebody asks for its u(t) and v(t).
 
     ``name`` is for messages; ``problem`` makes the system, with consistent mass, when it is first needed. A run *binds*
-    it to its scheme and time steps, with which the motion is then integrated. Each rank marches its own copy.
-    """
+    it to its scheme and time steps, with which the motion is then integrated. Each rank marches its own copy."""
 
     def __init__(self, name: str, problem: Callable[[], ContactProblem]) -> None:
         self.name, self._make = name, problem
@@ -43,13 +41,12 @@ class CompanionRun:
     def bind(self, scheme: Scheme, dt: TimeSteps) -> None:
         """March with this scheme and these time steps [s] from now on; nothing happens when they are those it has.
 
-        InputError for steps that the run itself chooses while it goes (``HalvedAtImpact``).
-        """
+        InputError for steps that the run itself chooses while it goes (``HalvedAtImpact``)."""
         if self._bound is not None and self._bound == (scheme, dt):
             return
         if isinstance(dt, HalvedAtImpact):
-            raise InputError(f"{self.name} is marched beside the run and needs its time steps beforehand, but the run "
-                             f"has {dt!r}: give dt as a number or a Schedule")
+            raise InputError(f"{self.name} is computed beside the run and needs its time steps beforehand, but the "
+                             f"run has {dt!r}: give dt as a number or a Schedule")
         self._bound = scheme, dt
         if isinstance(dt, Schedule):  # the last piece does not end: only the times of a run are asked for
             dt = Schedule((*dt.pieces[:-1], (dt.pieces[-1][0], inf)))
@@ -62,9 +59,9 @@ class CompanionRun:
         if t <= 0.0:
             return self._problem.system.u0.copy(), self._problem.system.v0.copy()
         if self._bound is None:
-            raise InputError(f"{self.name} is asked for its motion at t = {t:g} s, but no run has bound it yet: use it "
-                             "in a run (a function of your own around it hides it: give its own methods), or call "
-                             "bind(scheme, dt) first")
+            raise InputError(f"{self.name} is asked for its motion at t = {t:g} s, but no run has bound it yet: give "
+                             "it to a run as it is, not inside a function of your own, or call bind(scheme, dt) "
+                             "first")
         while self._t[-1] < t:
             state, _ = next(self._steps)
             self._t.append(state.t)

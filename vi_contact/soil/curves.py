@@ -23,8 +23,7 @@ class SoilCurves:
 
     strain: rising, as numbers, not per cent (1e-3 is 0.1 %); reduction: G/Gmax, from at least 0.95 falling, above zero;
     damping: ratios below 1/2. Smaller strains than the first have its values; larger ones than the last are outside:
-    ``equivalent_linear`` and ``strain_compatible`` refuse to end there. InputError for other tables.
-    """
+    ``equivalent_linear`` and ``strain_compatible`` refuse to end there. InputError for other tables."""
 
     strain: Sequence[float]
     reduction: Sequence[float]
@@ -36,8 +35,8 @@ class SoilCurves:
         reduction, damping = (array("SoilCurves", name, getattr(self, name), strain.shape)
                               for name in ("reduction", "damping"))
         if len(strain) < 2 or strain[0] <= 0.0 or np.any(np.diff(strain) <= 0.0):
-            raise InputError(f"SoilCurves: strain of '{self.name}' is {shown(self.strain)}; give two or more numbers "
-                             "above zero that rise")
+            raise InputError(f"SoilCurves: strain of '{self.name}' is {shown(self.strain)}; give two or more rising "
+                             "numbers above zero")
         if np.any(np.diff(reduction) > 0.0) or reduction[-1] <= 0.0 or not LINEAR <= reduction[0] <= 1.0:
             raise InputError(f"SoilCurves: reduction of '{self.name}' is {shown(self.reduction)}; give G/Gmax that "
                              f"falls from 1 (at least {LINEAR:g}) and stays above zero: begin at smaller strains")
@@ -83,8 +82,7 @@ class SoilCurves:
             xi = (0.6329 - 0.00566 ln N) (G/Gmax)^0.1 D_Masing + xi_min
             xi_min = (0.8005 + 0.0129 PI ocr^-0.1069) p^-0.2889 (1 + 0.2919 ln f)
 
-        with his D_Masing. mean_stress: effective [Pa] > 0; ocr: at least 1; frequency f [Hz], N cycles > 0.
-        """
+        with his D_Masing. mean_stress: effective [Pa] > 0; ocr: at least 1; frequency f [Hz], N cycles > 0."""
         owner = "SoilCurves.darendeli"
         p = number(owner, "mean_stress [Pa]", mean_stress, positive=True) / ATMOSPHERE
         index = number(owner, "plasticity [%]", plasticity, not_negative=True)
@@ -106,7 +104,7 @@ class SoilCurves:
         """Return the sentence about an effective strain beyond the largest of the curves; empty where it is not."""
         return "" if strain <= self.strain[-1] else (
             f"SoilCurves: the effective shear strain is {100.0 * strain:.3g} % {place}, and '{self.name}' ends at "
-            f"{100.0 * self.strain[-1]:.3g} %: the motion is too strong for this soil, or give curves that go further")
+            f"{100.0 * self.strain[-1]:.3g} %; give a weaker motion, or curves that go further")
 
     def at(self, strain: Array) -> tuple[Array, Array]:
         """Return (G/Gmax, damping ratio) at these shear strains; beyond the last strain its values."""

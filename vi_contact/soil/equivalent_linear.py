@@ -6,8 +6,7 @@ Vertical shear waves in layers on rock, in the frequency domain; depth z from th
 
 Every layer has one G and one xi, those of its curves at ``ratio`` times the largest strain in its middle, and the waves
 are computed again until neither changes by more than ``tolerance``.
-Sources: Schnabel, Lysmer and Seed, EERC 72-12 (1972); Idriss and Sun, SHAKE91 (1992); Kramer (1996), ch. 7.
-"""
+Sources: Schnabel, Lysmer and Seed, EERC 72-12 (1972); Idriss and Sun, SHAKE91 (1992); Kramer (1996), ch. 7."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -65,8 +64,7 @@ def equivalent_linear(layers: Sequence[Layer], record: Record, *, rock: LinearEl
     ratio: of the effective to the largest strain, 0.65 or (M - 1)/10 for magnitude M. tolerance: relative, of G and xi.
     frequency: None for xi at all frequencies; f [Hz] for G* = G (1 + 2 i xi w/(2 pi f)), the damping of
     ``column`` and DampingRatio. The record is followed by as long a quiet time. InputError where the effective strain
-    ends beyond its curves; ViContactError without convergence in so many iterations.
-    """
+    ends beyond its curves; ViContactError without convergence in so many iterations."""
     owner = "equivalent_linear"
     remedy = "give (thickness, LinearElastic, SoilCurves) of each layer, from the top"
     layers = tuple(several(owner, "a layer", one, remedy) for one in several(owner, "layers", layers, remedy))
@@ -119,7 +117,7 @@ def iterated(owner: str, run: Callable[[Array], tuple[T, Array]], values: Array,
             return found, values, tuple(changes)
         values = new
     raise ViContactError(f"{owner}: after {most} runs G or damping still change by {100.0 * changes[-1]:.2g} %: the "
-                         "motion is too strong for this soil, or most is too small")
+                         "motion is too strong for this soil, or give a larger most")
 
 
 def _waves(layers: Sequence[Layer], shear: Array, xi: Array, w: Array, slope: Array,
@@ -127,8 +125,7 @@ def _waves(layers: Sequence[Layer], shear: Array, xi: Array, w: Array, slope: Ar
     """Surface acceleration and strains in the middle of the layers, (n, frequencies), over the acceleration given.
 
     From the top down: B/A, and A over that of the layer below, of which none grows with depth or frequency. Below a
-    base that moves as given any rock does.
-    """
+    base that moves as given any rock does."""
     thick, rho = np.array([[thickness, material.rho] for thickness, material, _ in layers]).T[:, :, None]
     G = shear[:, None] * (1.0 + 2j * xi[:, None] * slope)
     k, z = w * np.sqrt(rho / G), np.sqrt(rho * G)

@@ -7,8 +7,7 @@ On a vertical side with outward normal n, v_ff(y, t) and sigma_ff the motion and
 (FLAC and PLAXIS free-field boundaries; OpenSees ASDAbsorbingBoundary2D). Without a structure v = v_ff and the side is
 not there: exact here to round-off, as the column has the heights and materials of the side's own elements and is
 marched with the run's scheme. Waves that a structure sends out leave through the dashpots. No static load is
-held: for a gravity stage put the sides on rollers, then ``release`` them.
-"""
+held: for a gravity stage put the sides on rollers, then ``release`` them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -78,9 +77,9 @@ class FreeFieldSide:
         self.space, self.given, self._ground = absorber.space, given, given.ground
         self.run = CompanionRun(f"FreeField on '{given.facets.name}'", self._problem)
         if self.space.dimension != 2:
-            raise InputError("FreeField is for bodies in the plane: tie the sides of others, or put dashpots on them")
+            raise InputError("FreeField is for plane bodies: tie the sides of this one, or give them dashpots")
         if self.space.degree > 1:
-            raise InputError("FreeField has a column of first-order elements: give assemble degree=1")
+            raise InputError("FreeField has a soil column of first order: give assemble degree=1")
         self._section: Section = forms.section
         self._dashpots = PetscMatrix(absorber.mat)
         self.column, self._sign = _column(self.space, forms, self.given)
@@ -151,7 +150,7 @@ def _column(space: FemSpace, forms: Any, given: FreeField) -> tuple[SoilColumn, 
     rows = np.concatenate(space.comm.bcast(space.comm.gather(mine)))
     rows = rows[np.argsort(rows[:, 0])]
     if np.isnan(rows).any():
-        raise InputError(f"free-field side '{name}' stands beside orthotropic cells, of which its column cannot be: "
+        raise InputError(f"free-field side '{name}' stands beside orthotropic cells, and its soil column is isotropic: "
                          "put a LinearElastic there, or Dashpots(…, material=)")
     x, close = rows[:, 7:9], 1e-9 * space.size
     if np.ptp(x) > close or np.any(np.abs(rows[1:, 0] - rows[:-1, 1]) > close):
@@ -165,5 +164,5 @@ def _column(space: FemSpace, forms: Any, given: FreeField) -> tuple[SoilColumn, 
 def _refuse_unlike(forms: Any, name: str) -> None:
     """Raise InputError where the column could not be what the body is beside it."""
     if forms.viscous or not forms.fields:
-        what = "of Rayleigh damping only, not KelvinVoigt" if forms.fields else "of materials, and forms=… tell none"
+        what = "of Rayleigh damping only, not KelvinVoigt" if forms.fields else "of materials, and forms=… have none"
         raise InputError(f"free-field side '{name}': its column is {what}: put Dashpots(…, material=) there")

@@ -9,8 +9,7 @@ u_g and v_g are what the scheme makes of u_g'' = a_g: for the trapezoidal rule
 The scheme is asked: a free unit mass is marched with it under the force a_g. Mass-proportional damping acts on the
 absolute velocity of a moved base and on the relative one in the frame of the ground: with alpha M the frames differ.
 So do MoreauJean and ContactStabilisedNewmark, whose contact looks at velocities or at a prediction.
-Source: seismic practice, prescribed base; a base moved by (u, v, a) integrated otherwise drifts against its inertia.
-"""
+Source: seismic practice, prescribed base; a base moved by (u, v, a) integrated otherwise drifts against its inertia."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -45,8 +44,7 @@ class BaseMotion(GroundFrame):
     """Hold displacement [m], velocity [m/s] and acceleration [m/s²] of the ground, starting from rest at t = 0.
 
     ``displacement``, ``velocity`` and ``acceleration`` take points (k, d) and t and return (k, d), as
-    ``fem.Prescribed`` wants them; ``at(t)`` gives the three vectors.
-    """
+    ``fem.Prescribed`` wants them; ``at(t)`` gives the three vectors."""
 
     path: CompanionRun = field(repr=False)
 
@@ -74,8 +72,7 @@ class BaseMotion(GroundFrame):
     def carrying(self, surface: ContactSurface, system: SemiDiscreteSystem) -> ContactSurface:
         """Return the contact surface of ``system`` on an obstacle that moves with the ground.
 
-        Between two deformable bodies nothing changes: both are moved by the ground.
-        """
+        Between two deformable bodies nothing changes: both are moved by the ground."""
         rigid = np.array([surface.in_frames(r) for r in system.influence.T])
         if surface.coupling is not None:  # relative to the other side: see SemiDiscreteSystem.in_relative
             rigid = np.array([2.0 * r - surface.coupling @ r for r in rigid])
@@ -91,8 +88,7 @@ def base_motion(excitation: Excitation | Sequence[Excitation]) -> BaseMotion:
 
     Systems and surfaces that it moves hand it to the run, which binds it (``CompanionRun.bind``). What the acceleration
     leaves behind (a final velocity, a drift) is in it: correct the baseline of a record first (``baseline_corrected``).
-    InputError for no excitation, or excitations of different dimensions.
-    """
+    InputError for no excitation, or excitations of different dimensions."""
     excitations = tuple(excitation) if isinstance(excitation, Sequence) else (excitation,)
     for one in excitations:
         provides("base_motion", "excitation", one, EXCITATION, "give Harmonic(…), GroundMotion(record) or another")

@@ -5,8 +5,7 @@ Linear elements between given heights, two displacement components at every node
     rho u_x'' = (G u_x,y),y    rho u_y'' = ((lambda + 2 G) u_y,y),y    sigma_xy = G u_x,y    sigma_xx = lambda u_y,y
 
 and with damping C = alpha M + beta K the stresses get beta times those of the velocity. It is what a strip of finite
-elements does whose sides move together, to the last digit: linear elements of such a strip have no other motion.
-"""
+elements does whose sides move together, to the last digit: linear elements of such a strip have no other motion."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -59,8 +58,7 @@ class SoilColumn:
                       velocity: Callable[[float], Array] | None = None) -> ContactProblem:
         """Return the system of nodes 1 to n, node 0 held, in the frame of a base with this acceleration (2,).
 
-        velocity: of the base, where mass damping acts on absolute velocities; None where it acts on relative ones.
-        """
+        velocity: of the base, where mass damping acts on absolute velocities; None where it acts on relative ones."""
         M, C, K = self.matrices()
         rigid = np.tile(np.eye(2), (len(self.heights), 1))
         inertia, drag = -(M @ rigid)[2:], -(C @ rigid)[2:]

@@ -48,18 +48,17 @@ def strain_compatible(mesh: Any, material: Materials, curves: Sequence[tuple[Cel
     Poisson's ratio is kept.
     Raises:
         InputError: cells named twice, Orthotropic ones, an effective strain that ends beyond its curves, with place.
-        ViContactError: no end after so many runs.
-    """
+        ViContactError: no end after so many runs."""
     function(OWNER, "run", run, "give a function of a material and a recorder")
     number(OWNER, "ratio", ratio, positive=True)
     comm, remedy = MpiComm(mesh.comm), "give (cells, SoilCurves) pairs"
     pairs = [(cells_of(OWNER, "the cells of curves", cells, mesh).indices, instance(OWNER, "curves", one, SoilCurves,
               remedy)) for cells, one in several(OWNER, "curves", curves, remedy)]
     named = np.concatenate([np.zeros(0, dtype=int), *(cells for cells, _ in pairs)])
-    refuse([f"{OWNER}: some cells have two curves: name each once" if len(np.unique(named)) < len(named) else ""], comm)
+    refuse([f"{OWNER}: some cells have two curves: give one" if len(np.unique(named)) < len(named) else ""], comm)
     space = compat.cell_space(mesh)
     place, (E, nu, rho, xi) = compat.cell_blocks(space)[:, 0], cell_constants(space, material)
-    refuse([f"{OWNER}: Orthotropic has no G to reduce: model these cells alike" if np.isnan(E).any() else ""], comm)
+    refuse([f"{OWNER}: Orthotropic has several G: give a LinearElastic" if np.isnan(E).any() else ""], comm)
 
     def field(values: Array) -> Any:
         found = compat.function(space)

@@ -2,8 +2,7 @@
 
 A record from an outcrop, where up- and downgoing waves are equal, is twice the upgoing wave; a record from within a
 profile holds what came back down and is of no use here without deconvolution. Wording as in PLAXIS: a fixed base
-expects the *within* motion, a compliant base the *upgoing* one (Mejia and Dawson 2006).
-"""
+expects the *within* motion, a compliant base the *upgoing* one (Mejia and Dawson 2006)."""
 
 from collections.abc import Callable, Sequence
 
@@ -20,8 +19,7 @@ from ..ground_motion.record import Record
 class UpgoingVelocity:
     """Give v_up(t) [m/s], (d,): a share of the velocity of an excitation that is at rest before t = 0.
 
-    Exact where a is a straight line between multiples of dt: v(k dt + s) = v_k + a_k s + (a_{k+1} - a_k) s²/(2 dt).
-    """
+    Exact where a is a straight line between multiples of dt: v(k dt + s) = v_k + a_k s + (a_{k+1} - a_k) s²/(2 dt)."""
 
     def __init__(self, excitation: Excitation, dt: float, share: float) -> None:
         self.excitation, self.dt, self.share = excitation, dt, share
@@ -46,12 +44,11 @@ def upgoing(motion: Record | Excitation | Sequence[Excitation], *, direction: tu
     components of an earthquake). dt: step of the integration [s], of the record when None. A record keeps its drift:
     correct its baseline first (``baseline_corrected``).
     InputError for an excitation other than a record without dt, a dt that is not positive, none at all, records in a
-    list, or directions of different numbers of components.
-    """
+    list, or directions of different numbers of components."""
     flag("upgoing", "outcrop", outcrop)
     if isinstance(motion, Sequence) and not isinstance(motion, str):
         if any(isinstance(one, Record) for one in motion):
-            raise InputError("upgoing: a record in a list has no direction of its own; give GroundMotion(record, "
+            raise InputError("upgoing: a record in a list has no direction; give GroundMotion(record, "
                              "direction=...) for each")
         waves = [upgoing(one, direction=direction, dt=dt, outcrop=outcrop) for one in motion]
         if len({len(wave(0.0)) for wave in waves}) != 1:

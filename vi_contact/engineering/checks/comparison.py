@@ -61,7 +61,7 @@ class Check(ABC):
         check_word(f"{name}: of", self.of, tuple(self.said["answers"]))
         for key, (value, unit) in self.given().items():
             if key in _SAID["limits"]:
-                angle = " radians, 30 degrees are 0.5236" if unit == "rad" else ""
+                angle = " radians; 30 degrees are 0.5236" if unit == "rad" else ""
                 low, high = _SAID["limits"][key]
                 between(f"{name}: {key}", value, low, high, f"give one from {low:g} to {high:g}{angle}")
             else:

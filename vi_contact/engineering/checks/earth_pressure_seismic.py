@@ -73,7 +73,7 @@ class _Layer(EarthPressure):
         row, moment, peak = int(np.argmax(thrust)), thrust * np.nan_to_num(height), float(push.max())
         more, left = float(thrust[row] - thrust[0]), float(opened.max())
         if len(push) < 3 or peak <= 0.0 or more <= 0.0:
-            return math.nan, more, f"{self.acceleration} never presses the soil on the wall: is it on that side?", {}
+            return math.nan, more, f"{self.acceleration} never presses the soil on the wall: check sign and side", {}
         most, arm, why = self.added(history["t"], push)
         why = why or (f"up to {left:.0%} of the wall leaves the soil" if left > LIFTED else "")
         if self.of == "height":
@@ -83,7 +83,7 @@ class _Layer(EarthPressure):
 
 @dataclass(frozen=True, kw_only=True)
 class Wood(_Layer):
-    """Expect the added thrust of a slow motion, exact plane strain: ``smooth_wall``.
+    """Expect the added thrust of a slow motion on a smooth wall, exact in plane strain.
 
     length: distance to the next smooth rigid wall [m], such as a side of the model that holds u; None: far away. It
     applies below 0.3 of the layer's lowest frequency, c_s/(4 H); that of a motion is max a/(pi (max v - min v)).

@@ -66,7 +66,7 @@ class EarthPressure(Check):
 
 @dataclass(frozen=True, kw_only=True)
 class AtRest(EarthPressure):
-    """Expect the thrust of an elastic layer that cannot give way sideways: what to compare an elastic soil with.
+    """Give the thrust of an elastic layer that cannot give way sideways, with which an elastic soil is compared.
 
     nu: Poisson's ratio. The wall is smooth and does not move; for sand, nu of K0 = 1 - sin(phi) is K0/(1 + K0).
     """
@@ -96,7 +96,7 @@ class Rankine(EarthPressure):
 
 @dataclass(frozen=True, kw_only=True)
 class Coulomb(EarthPressure):
-    """Expect the thrust of a plane wedge of soil that slides on the wall and on the ground below it: ``wedge``.
+    """Expect the thrust of a plane wedge of soil that slides on the wall and on the ground below it.
 
     phi, delta, slope, batter [rad]; N = P cos(delta). It applies for delta <= phi, passive: delta <= phi/2 (beyond it
     surfaces that are curved slide at less), ground up to phi, and phi -+ slope - psi >= 0.

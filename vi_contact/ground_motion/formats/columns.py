@@ -53,7 +53,7 @@ def _table(text: TextFile, *, series: bool) -> tuple[list[int], Array]:
             raise InputError(f"{text.at(index)}: {len(row)} columns instead of {min(len(rows[0]), 2)}; give time and "
                              "acceleration, or acceleration alone, or dt= if rows of accelerations follow each other")
     if len(rows) < 2:
-        raise InputError(f"{text.path}: {len(rows)} samples is no record; give at least two")
+        raise InputError(f"{text.path}: the file has {len(rows)} samples; give two or more")
     return lines, np.array(rows)
 
 

@@ -57,5 +57,5 @@ def _number(text: TextFile, index: int, key: str) -> float:
     """Return the positive number after a key, "Hz" allowed."""
     match = _FREQUENCY.match(text.heads[index][len(key):].strip())
     if match is None or text.number(index, match[1]) <= 0.0:
-        raise InputError(f"{text.at(index)}: {key!r} gives no positive number; get the file again")
+        raise InputError(f"{text.at(index)}: {key!r} has no positive number; get the file again")
     return text.number(index, match[1])

@@ -42,8 +42,8 @@ def read_record(path: str | os.PathLike[str], units: str | None = None, *, dt: f
                          f"if the unit is {record.units}; give the right units=, or largest= in m/s2 where the motion "
                          "is that strong")
     if not STEPS[0] <= record.dt <= STEPS[1]:
-        raise InputError(f"{record.source}: a time step of {record.dt:g} s is none of a ground motion; give seconds "
-                         f"from {STEPS[0]:g} to {STEPS[1]:g}, or make a Record of the samples")
+        raise InputError(f"{record.source}: a time step of {record.dt:g} s is not usual for ground motions; give "
+                         f"seconds from {STEPS[0]:g} to {STEPS[1]:g}, or make a Record of the samples")
     if resample_dt is not None and not math.isclose(record.dt, resample_dt, rel_tol=1e-9):
         record = resampled(record, resample_dt)
     return record

@@ -161,7 +161,7 @@ class TextFile:
             return False
         if semicolons and not points:
             return True
-        raise InputError(f"{self.at(inside)}: the comma between digits may be a decimal one or a separator; write "
+        raise InputError(f"{self.at(inside)}: the comma between digits may be a decimal comma or a separator; write "
                          "decimal points, and blanks between the numbers")
 
 
@@ -172,7 +172,7 @@ def load_text(path: str | os.PathLike[str], **said: Any) -> TextFile:
     """
     name = os.fspath(path)
     if "\0" in name:
-        raise InputError(f"{shown(name)}: no path holds the character NUL; correct it")
+        raise InputError(f"{shown(name)}: a path cannot contain the character NUL; correct it")
     try:
         with open(name, "rb") as file:
             data = file.read(BYTES + 1)
