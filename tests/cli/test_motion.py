@@ -132,7 +132,7 @@ def test_pictures_of_unusual_records(tmp_path):
     (["convert", "packet.at2", "out.txt", "--psa", "fast", "1"], "--psa fast 1"),
     (["plot", "packet.at2", "--out", "nowhere/x.png"], "folder that exists"),
     (["plot", "packet.at2", "--out-units", "m"], "'m' is not a unit"),
-    (["spectrum", "packet.at2", "--ec8", "B"], "--ec8 and --ag belong together"),
+    (["spectrum", "packet.at2", "--ec8", "B"], "--ec8 and --ag need each other"),
     (["spectrum", "packet.at2", "--ec8", "F", "--ag", "1"], "ground 'F'"),
     (["spectrum", "packet.at2", "--damping", "5"], "0.05 for 5 %"),
     (["spectrum", "packet.at2", "packet.at2"], "give each file and damping once"),
@@ -152,7 +152,7 @@ def test_accelerations_with_units():
 
 
 @pytest.mark.parametrize("arguments, word", [
-    (["--pga", "0.3 furlong"], "'0.3 furlong' is no acceleration"), (["--pga", "much"], "'much' is no acceleration"),
+    (["--pga", "0.3 furlong"], "'0.3 furlong' is not an acc"), (["--pga", "much"], "'much' is not an acceleration"),
     (["--pga", "1", "--scale", "2"], "not allowed with"), (["--trim", "1"], "expected 2 arguments"),
 ])
 def test_bad_options_show_the_usage(packet, capsys, arguments, word):

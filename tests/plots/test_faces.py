@@ -7,6 +7,7 @@ import shutil
 import sys
 import warnings
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -250,7 +251,7 @@ def test_films_and_what_is_no_film(runs: Any, tmp_path: Path, monkeypatch: pytes
     run = runs["tetrahedra"]
     with plain_pictures():
         assert film(replace(run, contact=None), tmp_path / "film.gif", times=[0.03]).stat().st_size > 5000
-    with pytest.raises(InputError, match=r"name 'film\.avi'"):
+    with pytest.raises(InputError, match=r"'film\.avi' is not a .gif or .mp4"):
         film(run, tmp_path / "film.avi")
     monkeypatch.setattr("matplotlib.animation.FFMpegWriter.isAvailable", lambda: False)
     with pytest.raises(InputError, match="needs ffmpeg"):
@@ -312,3 +313,17 @@ def test_rendering(runs: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
     monkeypatch.setitem(sys.modules, "pyvista", None)
     with pytest.raises(InputError, match="needs pyvista"):
         render_deformed(run, tmp_path / "none.png", t=0.0)
+
+
+@pytest.mark.parametrize("high", [(0.5, 6.0), (0.1, 6.0), (2.0, 6.0), (4.0, 6.0), (6.0, 0.5), (1.3, 1.0)])
+def test_numbers_on_slender_panels_do_not_overlap(high: tuple[float, float]) -> None:
+    """In panels of the size of plot_deformed, with the body displaced to negative x; some numbers are left."""
+    figure, axes = faces.sheet([True], 1, (4.2, 3.8))
+    axis = axes[0, 0]
+    faces.limit(axis, np.array([-0.6 * high[0], 0.0]), np.array(high), margin=0.03)
+    figure.draw_without_rendering()
+    for line, side in ((axis.xaxis, 0), (axis.yaxis, 1)):
+        low, top = line.get_view_interval()
+        drawn = [label.get_window_extent() for tick, label in zip(line.get_majorticklocs(), line.get_ticklabels(),
+                                                                  strict=True) if low <= tick <= top]
+        assert drawn and all(one.max[side] < after.min[side] for one, after in pairwise(drawn))

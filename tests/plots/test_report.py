@@ -144,7 +144,7 @@ def test_what_was_not_recorded_has_no_section(solved: tuple[Path, vc.Solution]) 
     for columns, text in (([["nonsense"]], "no column 'nonsense'"), ([["N_right", "u_x_end"]], "different units")):
         with pytest.raises(InputError, match=text):
             sections_of(run, {}, columns)
-    with pytest.raises(InputError, match="is an .html or a .pdf file"):
+    with pytest.raises(InputError, match="is not an .html or .pdf file"):
         report(solved[0], out=solved[0] / "page.doc")
 
 
@@ -244,7 +244,10 @@ def test_the_model_as_it_was_described(tmp_path: Path) -> None:
             report(folder, out=tmp_path / "page.pdf")
 
 
-def test_commands(solved: tuple[Path, vc.Solution], capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_commands(
+    solved: tuple[Path, vc.Solution], capsys: pytest.CaptureFixture[str], tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Every command writes what it says; mistakes are one sentence."""
     folder, run = solved
     with plain_pictures():  # how pages are arranged is seen above
@@ -263,19 +266,23 @@ def test_commands(solved: tuple[Path, vc.Solution], capsys: pytest.CaptureFixtur
     for picture in ("spectrum.png", "transfer.png", "loop.png"):
         assert (folder / picture).stat().st_size > 10_000
     capsys.readouterr()
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)  # without the packages that web pages need
+    before = sorted(tmp_path.iterdir())
     for wrong, text in (
         (["report", str(tmp_path)], "no history.csv"),
         (["report", str(folder), "--out", str(tmp_path / "no" / "page.pdf")], "folder that exists"),
-        (["report", str(folder), "--out", str(tmp_path / "page.svg")], "is an .html or a .pdf file"),
+        (["report", str(folder), "--out", str(tmp_path / "page.svg")], "is not an .html or .pdf file"),
+        (["report", str(folder), "--out", str(tmp_path / "page.html")], "needs jinja2 and plotly"),
         (["report", str(folder), "--refine"], "holds no case.toml"),
         (["plot", str(folder)], "no frames in"),
         (["film", str(folder), "--out", str(tmp_path / "x.mp4")], "no frames in"),
         (["post", "loop", str(folder), "u_x_end", "nothing"], "no column 'nothing'"),
-        (["post", "spectrum", str(folder), "u_x_end"], "no acceleration"),
+        (["post", "spectrum", str(folder), "u_x_end"], "not an acceleration"),
     ):
         assert main(wrong) == 1
         said = capsys.readouterr().err
         assert text in said and said.count("\n") == 1
+    assert sorted(tmp_path.iterdir()) == before  # a command that refuses has drawn nothing
 
 
 def test_example_of_the_documentation(tmp_path: Path) -> None:

@@ -106,4 +106,4 @@ def test_checks_and_doubtful_peaks(page: Path) -> None:
     text = without_scripts(page.read_text(encoding="utf-8"))
     rows = re.findall(r"<tr class=\"doubtful\">\s*<td>([^<]*)</td>", text)
     assert rows == ["a_x_top"]
-    assert "Discretisation error was not looked at" in text
+    assert "The discretisation error was not measured" in text

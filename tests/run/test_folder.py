@@ -355,7 +355,7 @@ def test_long_histories_stay_on_disk(tmp_path: Path, monkeypatch: pytest.MonkeyP
     for name in ("steps", "iterations_per_step", "worst_certificate", "energy", "steps_in_contact", "smallest_gap"):
         assert long.facts[name] == kept.facts[name] == alone.facts[name], name
     run(tmp_path / "long", 5)
-    with pytest.raises(ViContactError, match="has been replaced or is not on this machine: give every run a folder"):
+    with pytest.raises(ViContactError, match="was replaced or is not on this machine: give every run a folder"):
         long.history["t"]
 
 

@@ -129,7 +129,7 @@ def test_tolerance_decides_what_is_accepted():
 def test_a_solver_that_cannot_take_the_problem_is_refused_also_for_escalation():
     problem = replace(chain_problem(3), friction=Coulomb(0.3))
     for solvers in ({"solver": Condensed()}, {"solver": Careless(), "escalation": [Condensed()]}):
-        with pytest.raises(InputError, match=r"would ignore Coulomb\(mu=0.3\)"):
+        with pytest.raises(InputError, match=r"cannot use Coulomb\(mu=0.3\)"):
             list(run(problem, HALF, dt=0.1, steps=1, **solvers))
 
 

@@ -84,6 +84,7 @@ def test_each_step_is_the_step_alone_from_the_same_state(problems, scheme, steps
         assert steps_together == [3] * STEPS
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("friction", [None, vc.Coulomb(0.3)])
 @pytest.mark.parametrize("by_supernodes", [True, False])
 def test_bodies_in_space(monkeypatch, steps_together, by_supernodes, friction):
@@ -109,6 +110,7 @@ def test_bodies_in_space(monkeypatch, steps_together, by_supernodes, friction):
     assert steps_together == ([3] * 24 if MPI.COMM_WORLD.size == 1 else [])
 
 
+@pytest.mark.two_ranks
 def test_reports_hold_what_reports_of_march_hold(steps_together):
     """Read late, in any order; and a changed copy."""
     reports, _ = run(SHAKEN, steps=12)
@@ -130,6 +132,7 @@ def test_reports_hold_what_reports_of_march_hold(steps_together):
         assert after.old is before.new
 
 
+@pytest.mark.two_ranks
 def test_the_order_of_the_runs_does_not_matter():
     forwards, _ = run(SHAKEN)
     backwards, _ = run(SHAKEN[::-1])
@@ -138,6 +141,7 @@ def test_the_order_of_the_runs_does_not_matter():
             assert apart(one.new, other.new) < 1e-9
 
 
+@pytest.mark.two_ranks
 def test_a_run_that_ends_earlier_leaves_and_so_do_other_bodies(steps_together):
     other = build(Wall(divisions=(3, 4)), MPI.COMM_WORLD).problem("face")
     ends = [10, 30, 20, 5]
@@ -202,6 +206,7 @@ class Fails:
         return made
 
 
+@pytest.mark.two_ranks
 def test_a_run_that_escalates_goes_on_alone(steps_together):
     reports, errors = run(RUBBING, solver=Fails(), escalation=[vc.Condensed(friction_method=vc.solvers.NSGS())])
     escalated = [[one.new.k for one in reports[number] if one.escalated] for number in range(3)]
@@ -222,6 +227,7 @@ def test_runs_that_do_not_step_together_are_the_runs_alone(steps_together):
     assert not steps_together and not errors
 
 
+@pytest.mark.two_ranks
 def test_a_schedule_changes_the_step_of_all(steps_together):
     plan = vc.Schedule(((DT, 10.5 * DT), (0.5 * DT, np.inf)))
     reports, _ = run(SHAKEN, dt=plan, scheme=vc.Newmark())
@@ -231,6 +237,7 @@ def test_a_schedule_changes_the_step_of_all(steps_together):
         assert steps_together == [3] * STEPS
 
 
+@pytest.mark.two_ranks
 def test_refusals():
     with pytest.raises(vc.InputError, match="2 steps for 3 problems"):
         vc.march_many(SHAKEN, dt=DT, steps=[1, 2])

@@ -174,7 +174,7 @@ def test_times_must_increase(times):
 @pytest.mark.parametrize("mu", [ExponentialDecay(0.6, 0.4, v_c=0.1), StaticKinetic(0.6, 0.4)], ids=repr)
 def test_friction_that_asks_for_a_rate_is_refused(mu):
     problem = replace(slider(lambda t: t), friction=SlipRateCoulomb(mu))
-    with pytest.raises(InputError, match="SlipRateCoulomb.*has no rate; use Coulomb .*or march"):
+    with pytest.raises(InputError, match="no slip rate for SlipRateCoulomb.*: use Coulomb .*or compute"):
         quasi_static(problem, [1.0], solver=Condensed())
 
 

@@ -210,14 +210,14 @@ def test_bad_arguments_change_nothing(tmp_path: Path) -> None:
         ("checkpoint_every is 0", {"checkpoint_every": 0}),
         ("dt is -1.0", {"dt": -1.0}),
         ("give either steps or t_end", {"t_end": 1.0}),
-        ("two recorders record 'u_x_a'", {"record": [Probe({"a": (1.0,)}), Probe({"a": (2.0,)})]}),
+        ("two recorders have the column 'u_x_a'", {"record": [Probe({"a": (1.0,)}), Probe({"a": (2.0,)})]}),
         ("give a point of the body", {"record": [Probe({"a": (99.0,)})]}),
     ]
     for words, arguments in wrong:
         with pytest.raises(InputError, match=words):
             run(out=tmp_path, **arguments)
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
-    with pytest.raises(InputError, match="restart=True needs out"):
+    with pytest.raises(InputError, match="restart=True needs the folder"):
         run(restart=True)
     with pytest.raises(InputError, match="fields need an output folder"):
         run(fields=object())
@@ -243,9 +243,9 @@ class Own:
 @pytest.mark.parametrize(
     ("first", "later", "words"),
     [
-        ({}, {"a": 1.0}, "announces the column 'a' without filling it"),
-        ({"a": 1.0}, {"b": 1.0}, "announces the column 'a' without filling it"),
-        ({"a": 1.0}, {"a": 1.0, "b": 1.0}, "column 'b' without filling it, or the other way round"),
+        ({}, {"a": 1.0}, "names the column 'a' in columns"),
+        ({"a": 1.0}, {"b": 1.0}, "names the column 'a' in columns"),
+        ({"a": 1.0}, {"a": 1.0, "b": 1.0}, "names the column 'b' in columns"),
         ({"a": 1.0}, {"a": "one"}, "column 'a' is 'one': let its recorder return a number or an array"),
         ({"a": None}, {"a": 1.0}, "column 'a' is None"),
     ],

@@ -112,6 +112,7 @@ def test_reactions_carry_the_weight(shape):
         assert max_over_ranks(COMM, new.u - state.u) < 1e-9 * sag
 
 
+@pytest.mark.two_ranks
 def test_free_motions_keep_their_place():
     """On level ground nothing drives a block sideways: the M-weighted mean of u_x and, in 3D, of the spin stay zero
     but for rounding, which a mode without stiffness sees magnified by that of the springs, 1e-4 of K."""
@@ -127,6 +128,7 @@ def test_free_motions_keep_their_place():
             assert abs(system.algebra.dot(motion, system.M @ state.u)) < 1e-9 * size
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("push", [0.0, 5.0e3, -9.0e3])
 def test_two_corners_share_the_weight_like_a_beam(push):
     """Only the base corners touch (u_x held at the base): r = W/2 ± T H / L, T = push · L on the top at height H."""
@@ -147,6 +149,7 @@ def test_partly_lifted_base_balances_moments():
     assert state.r_n @ problem.surface.whole().points[:, 0] == pytest.approx(weight / 2.0 + moment, rel=1e-9)
 
 
+@pytest.mark.two_ranks
 def test_springs_settle_by_the_weight():
     """On springs of modulus k [Pa/m] a column without contraction settles by p / k, soft or stiff."""
     for modulus in (1.0e6, 1.0e9, 1.0e12):
@@ -159,6 +162,7 @@ def test_springs_settle_by_the_weight():
         assert COMM.allreduce(state.r_n.sum()) == pytest.approx(pressure, rel=1e-7)
 
 
+@pytest.mark.two_ranks
 def test_balanced_loads_need_no_support():
     """Pulled at both ends with p, without any contact: u = p x / E about the middle."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 2))
@@ -188,6 +192,7 @@ def test_no_equilibrium_is_refused(case, way, gap):
         static_equilibrium(problem, solver=Condensed())
 
 
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("gap", [0.0, 1.0e-4])
 def test_friction_holds_a_block_up_to_its_coefficient(gap):
     """Coulomb, mu = 0.3, on a plane inclined by theta: at tan theta = 0.99 mu it stands, Σ r_t = W sin theta and
@@ -221,6 +226,7 @@ def test_floating_without_contact_is_refused():
         static_equilibrium(problem, solver=Condensed())
 
 
+@pytest.mark.two_ranks
 def test_pressed_by_a_moving_side_and_its_weight():
     """Rollers move the left side by 1 mm to the right; the block follows as a whole and rests on its base."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 2))

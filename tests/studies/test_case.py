@@ -174,6 +174,7 @@ def test_a_pair_with_weight_and_record_to_the_last_bit(shared_tmp: Path) -> None
     assert_same(found.history, expected.history)
 
 
+@pytest.mark.serial
 def test_the_wall_with_other_values(shared_tmp: Path) -> None:
     """The case that ships is the wall beside its demo, its probes too, with the convention of its reference numbers."""
     given = ("contact.points=[[6.0, 3.0], [6.0, 5.25], [6.0, 7.5]]", "system.section.thickness=0.3",
@@ -263,6 +264,7 @@ def test_soil_boundaries(shared_tmp: Path) -> None:
     assert_same(rigid.history, vc.simulate(problem, dt=0.004, steps=20, record=[probe], progress=False).history)
 
 
+@pytest.mark.serial
 def test_weight_is_the_body_force_of_the_density(comm: Any) -> None:
     """M r g of one material is BodyForce((0, -rho g)), to round-off."""
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(2.0, 1.0), divisions=(3, 2)), comm)
@@ -287,31 +289,31 @@ MISTAKES = {  # what is replaced in demos/cases/wall.toml, by what, what the sen
     "no TOML": ("[mesh]", "[mesh", ": Expected ']'"),
     "end of file": ("every = 10", "every =", ": Invalid value (at line 54"),
     "table twice": ("[impact]", "[solver]", ": Cannot declare ("),
-    "table": ("[impact]", "[impakt]", ": unknown table [impakt]: did you mean impact or format? Known: format, title"),
+    "table": ("[impact]", "[impakt]", ": the table [impakt] is unknown: did you mean impact or format? Known: format"),
     "key": ("amplitude", "amplitute", ": [excitation[1]] has the unknown key 'amplitute' for Harmonic: did you mean "
             "amplitude? Known: amplitude, frequency, phase, direction"),
     "type": ('"Condensed"', '"Condensd"', ": [solver] has the unknown type 'Condensd': did you mean Condensed?"),
     "no type": ('type = "Inelastic"', "", ": [impact] has no type: give type = one of Inelastic, Newton, "
                 "Elastic"),
     "nameless": ("[material.concrete]", "[material]", ": [material] has the keys of one material and no name: "),
-    "missing": ("rho = 2400.0", "", ": [material.concrete] lacks 'rho', which LinearElastic needs"),
+    "missing": ("rho = 2400.0", "", ": [material.concrete] lacks the key 'rho', which LinearElastic needs"),
     "text": ("amplitude = 3.0", 'amplitude = "big"', ": [excitation[1]] amplitude is 'big': give a number"),
     "truth": ("amplitude = 3.0", "amplitude = true", ": [excitation[1]] amplitude is true: give a number"),
     "fraction": ("[8, 12]", "[8, 12.5]", ": [mesh] divisions[2] is 12.5: give a whole number"),
     "count": ("[8, 12]", "[8, 12, 1]", ": [mesh] divisions has 3 entries: give 2"),
     "list": ("steps = 400", "steps = [400]", ": [run] steps is a list: give a whole number"),
-    "name": ('clamped = "base"', 'clamped = "base"\nmaterial = "steel"', ": [system] material names 'steel', which is "
-             "not there: Known: concrete"),
+    "name": ('clamped = "base"', 'clamped = "base"\nmaterial = "steel"', ": [system] material names 'steel', "
+             "which does not exist: Known: concrete"),
     "function": ('"HalfSpace"', '"AnalyticGap"', ": [contact[1].obstacle] has the unknown key 'point' for AnalyticGap"),
     "inner table": ('section = {type = "PlaneStress", thickness = 0.20}', "section = {type = 'PlaneStress', depth = 1}",
                     ": [system.section] has the unknown key 'depth' for PlaneStress"),
-    "no dt": ("dt = 0.0017857142857142857", "", ": [run] lacks 'dt', which simulate needs"),
+    "no dt": ("dt = 0.0017857142857142857", "", ": [run] lacks the key 'dt', which simulate needs"),
     "model": ("[mesh]", '[model]\ntype = "Wall"\n[mesh]', ": [model] type was of the model Wall, which is retired: "
               "give the tables of the case 'wall'"),
     "part of the model": ("[mesh]", "[model]", ": [model] height was of the model Wall, which is retired: give "
                           "mesh.height of the case 'wall'"),
     "no mesh": ('[mesh]\ntype = "WallMesh"\nheight = 9.0              # m\nwidth = 6.0\ndivisions = [8, 12]\n', "",
-                ": there is no table [mesh]: give the mesh of the body"),
+                ": the table [mesh] is missing: give the mesh of the body"),
 }
 
 
@@ -428,6 +430,9 @@ def test_short_options_are_settings() -> None:
     assert shaken["excitation"][1]["record"] == {"path": str(Path("v.at2").absolute())}
     assert shaken["system"] == {"tied": {"first": "left_side", "second": "right_side"}}
     assert tables["run"]["t_end"] == 1.0
+    made = {"type": "GroundMotion", "direction": [0.0, 1.0], "scale": 0.8, "record": {"type": "synthetic", "seed": 1}}
+    shaken = with_settings({"excitation": [made]}, ShortOptions(motion="h.at2").settings({"excitation": [made]}))
+    assert shaken["excitation"] == [made | {"record": {"path": str(Path("h.at2").absolute())}}]
     for wrong, said in (
         (ShortOptions(scale=2.0), "nothing shakes it"), (ShortOptions(motion="a,b,c"), "give FILE, or FILE,FILE"),
     ):
@@ -447,7 +452,7 @@ def test_what_follows_from_the_first_mode() -> None:
     assert problem.excitations == (vc.Harmonic(2.0, 0.25 * f1, direction=(1.0, 0.0)),)
     solution = case.run(MPI.COMM_WORLD, progress=False)
     assert solution.history["t"] == pytest.approx(np.array([0.0, 1.0, 2.0]) / (10.0 * f1), rel=1e-14)
-    with pytest.raises(InputError, match="asks for the excitations, not known yet"):
+    with pytest.raises(InputError, match="needs the excitations, still unknown here"):
         read_case(WALL, [*settings, "system.dashpots=[{type='FreeField', facets='back'}]"]).problem(MPI.COMM_WORLD)
 
 

@@ -77,7 +77,7 @@ def test_checks_of_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
 @pytest.mark.parametrize(("change", "words"), [
     (("AtRest", "Okabe"), "unknown type 'Okabe'"), (("nu = 0.25\npart", "mu = 0.25\npart"), "unknown key 'mu'"),
     (("nu = 0.25\npart", "nu = 0.75\npart"), "nu is 0.75: give one from 0 to 0.5"),
-    (("AtRest", "mine.checks:Own"), "takes no classes but its own"),
+    (("AtRest", "mine.checks:Own"), "accepts built-in classes only"),
 ])
 def test_wrong_tables_are_refused_before_the_run(tmp_path: Path, change: tuple[str, str], words: str) -> None:
     (tmp_path / "layer.toml").write_text(LAYER.replace(*change), encoding="utf-8")
@@ -100,4 +100,4 @@ def test_a_run_without_checks(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     read_case(tmp_path / "layer.toml").run(MPI.COMM_SELF, out=tmp_path / "out", progress=False)
     assert comparisons(tmp_path / "out") == ()
     assert main(["post", "checks", str(tmp_path / "out")]) == 1
-    assert "has no [[check]] tables" in capsys.readouterr().err
+    assert "has no [[check]]: add one" in capsys.readouterr().err

@@ -96,7 +96,7 @@ def test_every_path_is_relative_to_the_case_file(folder: Path, tmp_path: Path, m
     ('facets = "top"', 'facets = "block"', "is 'block', a cell group: give the name of a boundary group"),
     ("motion.at2", "none.at2", "none.at2: there is no such file"),
     ("motion.at2", "", "path is empty: give the path of a file or folder"),
-    ("motion.at2", "a\\u0000b", "holds the character NUL"),
+    ("motion.at2", "a\\u0000b", "contains the character NUL"),
     ('"out"', '" "', "[run] out is empty"),
     ("format = 1", "format = 2", "format is 2, and this version of vi_contact reads format 1"),
     ("format = 1", 'format = "new"', "format is 'new'"),

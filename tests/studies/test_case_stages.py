@@ -102,6 +102,7 @@ system = {clamped = ["lower_bottom", "upper_top"]}
 """
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("extra", [pytest.param(False, marks=pytest.mark.serial), True])
 def test_nothing_moves_without_motion(shared_tmp: Path, extra: bool) -> None:
     """V8.9: gravity, perhaps a prop on the roof that then holds it where it is, then the compliant base for a second
@@ -218,7 +219,7 @@ def test_a_stage_follows_from_the_end_of_the_one_before(tmp_path: Path) -> None:
     for name, values in whole.items():
         assert np.array_equal(values, found[name], equal_nan=True), name
     renamed = HOUSE.replace('"shock"', '"event"')
-    with pytest.raises(InputError, match=r"2_shock' is of no stage of the case: give .* new run, which removes it"):
+    with pytest.raises(InputError, match=r"2_shock' belongs to no stage of the case: give .* new run, which rem"):
         run(renamed, longer, out=folder, restart=True)
     run(renamed, settings, out=folder)
     assert sorted(one.name for one in (folder / "stages").iterdir()) == ["1_gravity", "2_event"]
@@ -273,11 +274,11 @@ MISTAKES = {  # what is replaced in the guide's case, by what, what the sentence
     "name": ('name = "shock"', 'name = "../shock"', ": [[stage]] 2 has name = '../shock': give letters, dig"),
     "type": ('type = "static"', 'type = "gravity"', ": [[stage]] 1 has type = 'gravity': give \"stat"),
     "release": ("release = true", 'release = "yes"', ": [[stage]] 2: release is 'yes'; give True or False"),
-    "no list": (HOUSE[HOUSE.index("[[stage]]"):], "[stage]\nname = 1", ": [stage] is no list of tables: write"),
+    "no list": (HOUSE[HOUSE.index("[[stage]]"):], "[stage]\nname = 1", ": [stage] is not a list of tables: write"),
     "out": ("run = {dt = 0.002", 'run = {out = "x", dt = 0.002', ": [[stage]] 3: run has the key 'out', which all"),
-    "moved while static": (STAGE, STAGE + "excitation = []\n", ": [[stage]] 1 is static and has no use for exci"),
-    "steps while static": (STAGE, STAGE + "run = {dtt = 0.5}\n", ": [[stage]] 1 is static and has no use for run.dtt"),
-    "unit while static": (STAGE, STAGE + 'run = {dt = "3 m"}\n', ": [[stage]] 1 is static and has no use for run.dt: "),
+    "moved while static": (STAGE, STAGE + "excitation = []\n", ": [[stage]] 1 is static and cannot use exci"),
+    "steps while static": (STAGE, STAGE + "run = {dtt = 0.5}\n", ": [[stage]] 1 is static and cannot use run.dtt"),
+    "unit while static": (STAGE, STAGE + 'run = {dt = "3 m"}\n', ": [[stage]] 1 is static and cannot use run.dt: "),
     "released first": (STAGE, STAGE + "release = true\n", ": [[stage]] 1 'gravity' has release = true, and is "),
     "friction": ('name = "shock"', 'name = "shock"\nfriction = {type = "Coulomb", mu = 0.01}',
                  ": [[stage]] 2 'shock' has another [friction] than the stage before it"),

@@ -72,6 +72,7 @@ def axial(n: int, height: float, cells: int) -> float:
     return float(2.0 * np.pi / np.sqrt(6.0 * c**2 / h**2 * (1.0 - np.cos(kh)) / (2.0 + np.cos(kh))))
 
 
+@pytest.mark.serial
 def test_numbers_of_two_blocks(shared_tmp: Path) -> None:
     """V11.1: masses, sizes, wave lengths; periods of axial waves in both blocks as one where they touch, in the lower
     one with a gap. Held sideways they have no other modes as low; what rubs sticks, what slides is free to."""
@@ -106,6 +107,7 @@ def test_numbers_of_two_blocks(shared_tmp: Path) -> None:
     assert "periods" not in describe(read_case(path), COMM, most=51)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize(("axes", "G"), [("0.3", 5e8), ("[[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]", 2e8)])
 def test_shear_in_the_plane_is_that_of_the_axes_there(shared_tmp: Path, axes: str, G: float) -> None:
     """The other two moduli carry no wave in the plane, however soft."""
@@ -200,7 +202,7 @@ SECOND = '\n[[excitation]]\ntype = "GroundMotion"\ndirection = [1.0, 0.0]\nrecor
     ('"lower_bottom"', '"zz"', "upper: name it in Gmsh"),
     ("[run]", SECOND.replace("dt = 0.01", "dt = 0.02") + "[run]",
      "have samples every 0.01 and 0.02 s: bring them to one step"),
-    ("[run]", SECOND.replace("duration = 1.0", "duration = 2.0") + "[run]", "last 1 and 2 s: trim one"),
+    ("[run]", SECOND.replace("duration = 1.0", "duration = 2.0") + "[run]", "last 1 and 2 s: trim or pad one"),
     ("dt = 0.002", "dt = 0.02", "time step of 0.02 s leaves out samples of 'synthetic, seed 3'"),
     (RECORD, '"none.at2"', "none.at2: there is no such file"),
     ("steps = 3", 'steps = 3\n[[record]]\ntype = "Probe"\npoints = {far = [9.0, 9.0]}', "m away from the nearest node"),

@@ -87,12 +87,12 @@ def test_coarse_levels_against_a_search(seed: int) -> None:
 
 @pytest.mark.parametrize(("brackets", "said"), [
     (np.zeros((0, 2)), "0 of 0 records pass the limit"),
-    ([(9.0, INF)] * 3, "0 of 3 records pass the limit, maybe all at one intensity between 9 and inf: give oth"),
-    ([(0.0, 1.0)] * 3, "3 of 3 records .* between 0 and 1"),
-    ([(1.0, 2.0), (1.0, 3.0), (0.0, 2.0)], "between 1 and 2"),
-    ([(1.0, 2.0), (2.0, 3.0)], "between 2 and 2"),
-    ([(1.0, 2.0 - 4e-16), (2.0 + 4e-16, 3.0)], "between 2 and 2"),
-    ([(0.0, 1.0), (2.0, INF)], "2 records do not tell how far their capacities lie apart: give more levels, or"),
+    ([(9.0, INF)] * 3, "0 of 3 records pass the limit, maybe all at one intensity from 9 to inf: give oth"),
+    ([(0.0, 1.0)] * 3, "3 of 3 records .* from 0 to 1"),
+    ([(1.0, 2.0), (1.0, 3.0), (0.0, 2.0)], "from 1 to 2"),
+    ([(1.0, 2.0), (2.0, 3.0)], "from 2 to 2"),
+    ([(1.0, 2.0 - 4e-16), (2.0 + 4e-16, 3.0)], "from 2 to 2"),
+    ([(0.0, 1.0), (2.0, INF)], "the capacities of 2 records have a spread that cannot be fitted: give more"),
 ])
 def test_brackets_without_a_curve(brackets: list[tuple[float, float]], said: str) -> None:
     """What no curve, or a step, fits best is refused."""
@@ -136,10 +136,10 @@ def test_sets_of_records(tmp_path: Path) -> None:
     (tmp_path / "binary").write_bytes(b"\xff\xfe\xff")
     (tmp_path / "half").write_text("h.at2,\n", encoding="utf-8")
     for wrong in (str(tmp_path / "none"), "h.at2,", f"@{tmp_path / 'half'}"):
-        with pytest.raises(InputError, match=r"--motions .*: give FILE, or FILE,FILE, a folder of them, or @LIST"):
+        with pytest.raises(InputError, match=r"--motions .*: give FILE or FILE,FILE, a folder, or @LIST"):
             record_set(wrong)
     for wrong in ("missing", "binary", "none"):
-        with pytest.raises(InputError, match=r"--motions @.* cannot be read .*: give a text file with a record a line"):
+        with pytest.raises(InputError, match=r"--motions @.* cannot be read .*: give a text file, one record"):
             record_set(f"@{tmp_path / wrong}")
 
 

@@ -127,7 +127,7 @@ def test_a_case_file_alone_imports_nothing(folder: Path, capsys: pytest.CaptureF
     """One sentence that names the option, in every table, also on the command line."""
     for table in TABLES:
         sentence = said(folder, f"{table}.type=harmful:Name", *(["solver.type=Condensed"] * ("." in table)), allow=())
-        assert "give --allow harmful if you trust it" in sentence or "takes no classes but its own" in sentence
+        assert "give --allow harmful if you trust it" in sentence or "accepts built-in classes only" in sentence
     assert main(["run", str(folder / "case.toml"), "--check", *(f"--set={one}" for one in law("pack:Law"))]) == 1
     assert "[friction] has the type 'pack:Law' of the package 'pack', and a case file imports nothing by itself: " \
            "give --allow pack if you trust it" in capsys.readouterr().err
@@ -179,9 +179,9 @@ def test_installed_packages_register_an_entry_point(folder: Path) -> None:
         "a" * 10**6 + ":" + "b" * 10**6,
     )),
     ("pack:Popen", "which subprocess defines: name it there, and allow that package"),
-    ("pack:Foreign", "which harmless_friend defines"), ("pack:harmless_friend", "which is no class"),
+    ("pack:Foreign", "which harmless_friend defines"), ("pack:harmless_friend", "which is not a class"),
     ("pack.harmless_friend:Law", "which Python cannot import (ModuleNotFoundError"),
-    ("pack.laws:function", "which is no class"), ("pack.laws:law", "which is no class"),
+    ("pack.laws:function", "which is not a class"), ("pack.laws:law", "which is not a class"),
     ("pack.laws:Nothing", "which Python cannot import (AttributeError"), ("pack.nowhere:Law", "set PYTHONPATH"),
     ("pack.laws:Half", "which has no method slope, at, as FrictionLaw must: see docs/reference/api.md"),
     ("pack.laws:Property", "which has no method slope"),
@@ -197,18 +197,18 @@ def test_names_that_are_refused(folder: Path, name: str, words: str) -> None:
 def test_modules_that_end_or_fail(folder: Path) -> None:
     assert "(ZeroDivisionError: division by zero): install fails" in said(folder, *law("fails:Law"), allow=["fails"])
     assert "cannot import (SystemExit: 0)" in said(folder, *law("ends:Law"), allow=["ends"])
-    assert "which is no class" in said(folder, *law("os:system"), allow=["os"])
+    assert "which is not a class" in said(folder, *law("os:system"), allow=["os"])
     assert "which has no method limit" in said(folder, *law("subprocess:Popen"), allow=["subprocess"])
 
 
 def test_arguments_and_objects_are_checked(folder: Path) -> None:
     assert "friction] has the unknown key 'others' for pack:Law" in said(folder, *law("pack:Law", "friction.others=1"))
-    assert "lacks 'mu', which pack:Law needs" in said(folder, "friction.type=pack:Law")
+    assert "lacks the key 'mu', which pack:Law needs" in said(folder, "friction.type=pack:Law")
     assert "[friction] mu is 'a': give a number" in said(folder, *law("pack:Law", "friction.mu=a"))
     assert said(folder, *law("pack:Law", "friction.mu=-1")).endswith("[friction] pack:Law: mu is negative")
     assert said(folder, *law("pack:Law", "friction.mu=10")).endswith("[friction] mu is 10.0")
     assert "Still has no direction, duration, as Excitation must" in said(folder, "excitation.type=pack.laws:Still")
-    assert "takes no classes but its own" in said(folder, "material.one.type=pack:Law")
+    assert "accepts built-in classes only" in said(folder, "material.one.type=pack:Law")
     for wrong in ("", ".", "pack:", "pack ", "a-b", "päck"):
         assert "give the name of a Python package" in said(folder, allow=[wrong])
 

@@ -45,12 +45,12 @@ def test_values_are_those_of_si(text: str, unit: str) -> None:
 
 
 WRONG = {
-    ("٣ m", "m"): "'٣' in it is no part of arithmetic",
-    ("2400 kg/m3", "Pa"): "'kg/m3' is no unit of it: give it in Pa", ("30 MPa", "1"): "give it in % or as a plain",
-    ("5 %", "Pa"): "'%' is no unit of it", ("12 Hz", "rad/s"): "'Hz' is no unit of it: give it in rad/s",
-    ("1.8 g/cm3", "kg/m3"): "'g/cm3' is no unit of it: give it in kg/m3", ("3 mPaa", "Pa"): "'mPaa' is no unit here",
-    ("30 MPa", None): "no unit is known for it here: leave 'MPa' away", ("30 Mpa", "Pa"): "'Mpa' is no unit here",
-    ("3 N//m2", "Pa"): "is no unit: write one as", ("30 MPa + 1", "Pa"): "give a number, one with its unit, or",
+    ("٣ m", "m"): "'٣' in it does not belong to arithmetic",
+    ("2400 kg/m3", "Pa"): "'kg/m3' is not a unit of it: give it in Pa", ("30 MPa", "1"): "give it in % or as a plain",
+    ("5 %", "Pa"): "'%' is not a unit of it", ("12 Hz", "rad/s"): "'Hz' is not a unit of it: give it in rad/s",
+    ("1.8 g/cm3", "kg/m3"): "'g/cm3' is not a unit of it: give it in kg", ("3 mPaa", "Pa"): "'mPaa' is not a unit here",
+    ("30 MPa", None): "no unit is known for it here: leave 'MPa' out", ("30 Mpa", "Pa"): "'Mpa' is not a unit here",
+    ("3 N//m2", "Pa"): "is not a unit: write one as", ("30 MPa + 1", "Pa"): "give a number, one with its unit, or",
     ("1/0", "Pa"): "which is inf: give a finite number", ("1e999", "Pa"): "which is inf", ("log(0)", "Pa"): "is -inf",
     ("sqrt(-1)", "Pa"): "which is nan", ("exp(1000)", "1"): "which is inf", ("1e999 Pa", "Pa"): "'inf' in it is no",
     ("stiff", "Pa"): "give a number, one with its unit",
@@ -92,7 +92,7 @@ def test_a_case_with_units_is_the_case_without(tmp_path: Path) -> None:
     found, plain = read_case(path, settings), read_case(WALL, ["run.steps=6"])
     for name in ("mesh", "material", "system", "contact", "run"):
         assert given(found.nodes[name]) == given(plain.nodes[name]), name
-    with pytest.raises(InputError, match=r"\[mesh\] height is '9 s': 's' is no unit of it: give it in m"):
+    with pytest.raises(InputError, match=r"\[mesh\] height is '9 s': 's' is not a unit of it: give it in m"):
         read_case(path, ["mesh.height=9 s"])
     with pytest.raises(InputError, match=r"\[run\] steps is '5/2', which is 2.5: give"):
         read_case(path, ["run.steps=5/2"])
@@ -192,10 +192,10 @@ def test_expressions_where_none_belongs_are_refused(tmp_path: Path) -> None:
     for old, new, said in (
         ("30e6 + 2e6*y", "30e6 + 2e6*t", r"\[material.soil\] E is '30e6 \+ 2e6\*t': give a number, .* x, y, z; 't'"),
         ("min(1, t/2)", "x", r"history is 'x': give a number, one with its unit, or arithmetic of t; 'x' in it"),
-        ('["0.1*y", "0"]', '["0.1*y", "0 m"]', r"initial_velocity\[2\] is '0 m': 'm' is no unit of it: give it in m/s"),
-        ('["0.1*y", "0"]', '["0.1*y*t", 0]', r"initial_velocity\[1\] is '0.1\*y\*t': .*'t' in it is no number"),
+        ('["0.1*y", "0"]', '["0.1*y", "0 m"]', r"initial_velocity\[2\] is '0 m': 'm' is not a unit of it: give"),
+        ('["0.1*y", "0"]', '["0.1*y*t", 0]', r"initial_velocity\[1\] is '0.1\*y\*t': .*'t' in it is not a number"),
         ('["0", "-1 kPa"]', '"-1 kPa"', r"value is '-1 kPa': give a list of numbers or expressions of x, y, z, t"),
-        ("2e-4]]", '"1e-4*t"]]', r"value\[2\]\[2\] is '1e-4\*t': give a number, .*'t' in it is no number"),
+        ("2e-4]]", '"1e-4*t"]]', r"value\[2\]\[2\] is '1e-4\*t': give a number, .*'t' in it is not a number"),
         ('"1e-5*(10 + y)*t"', '["1e-5*t", "0"]', r"value\[1\] is '1e-5\*t': give a list of numbers"),
         ('"9810*max(0, 5 - y)"', '["9810*y", "0"]', "value is a list: give a number or an expression or a function"),
         ('divisions = [2, 3]', 'divisions = [2, "x"]', r"divisions\[2\] is 'x': give a number"),
@@ -211,7 +211,7 @@ def test_amplitudes_with_units_are_scaled() -> None:
     tables = {"excitation": {"type": "Harmonic", "amplitude": "0.5 g", "frequency": 1.0}}
     assert ShortOptions(scale=2.0).settings(tables) == ["excitation.amplitude=9.80665"]
     tables["excitation"]["amplitude"] = "0.5 m"
-    with pytest.raises(InputError, match=r"--scale: \[excitation\[1\]\] amplitude is '0.5 m': 'm' is no unit of it"):
+    with pytest.raises(InputError, match=r"--scale: \[excitation\[1\]\] amplitude is '0.5 m': 'm' is not a unit of it"):
         ShortOptions(scale=2.0).settings(tables)
 
 

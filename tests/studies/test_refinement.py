@@ -93,7 +93,7 @@ def test_both_columns_and_their_difference(tmp_path: Path, capsys: pytest.Captur
     assert "fields" not in read_copy(out / "refined" / "h")
     assert main(["run", str(case), "--out", str(out), "--quiet", "--set", "material.rubber.E=2e6"]) == 0
     assert not refinement(read_run(out), {}).tables  # those were of another case
-    assert "was not looked at" in refinement(read_run(out), {}).sentences[-1]
+    assert "was not measured" in refinement(read_run(out), {}).sentences[-1]
 
 
 def test_what_fails_is_told(tmp_path: Path) -> None:

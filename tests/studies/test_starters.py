@@ -37,8 +37,8 @@ def test_nothing_is_overwritten(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "pounding.geo").write_text("mine", encoding="utf-8")
-    for arguments, words in ((["new", "pounding", "mine"], "'mine/pounding.geo' is there already"),
-                             (["new", "pound"], "no case 'pound' to begin with: did you mean pounding?")):
+    for arguments, words in ((["new", "pounding", "mine"], "'mine/pounding.geo' exists already"),
+                             (["new", "pound"], "no starter case 'pound': did you mean pounding?")):
         assert main(arguments) == 1
         assert words in capsys.readouterr().err
     assert [path.name for path in (tmp_path / "mine").iterdir()] == ["pounding.geo"]

@@ -174,7 +174,7 @@ def test_no_restart_no_static_end_and_no_study(tmp_path):
     case = read_case(written(tmp_path))
     with pytest.raises(InputError, match="cannot be continued: run it from the start"):
         case.run(COMM, out=tmp_path / "out", restart=True)
-    with pytest.raises(InputError, match="take it out for stages and studies"), case.call(case.parts(COMM), None):
+    with pytest.raises(InputError, match="leave it out of stages and studies"), case.call(case.parts(COMM), None):
         pass
     with pytest.raises(InputError, match="the last stage, which is static"):
         read_case(written(tmp_path, CASE + STAGES.replace("dynamic", "static"))).run(COMM)

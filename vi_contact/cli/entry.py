@@ -1,6 +1,7 @@
 """The command line ``vi-contact``: parses and prints, nothing else."""
 
 import argparse
+import logging
 import sys
 import traceback
 from collections.abc import Callable, Sequence
@@ -12,9 +13,9 @@ from .case import add_case_commands
 from .errors import Parser, check_words, fail_together, printable, told, world
 from .ida import add_ida_commands
 
-_DESCRIPTION = """Dynamic unilateral contact of elastic structures: exact non-penetration, a closed energy ledger and a
-certificate for every time step. Run under "mpirun -n N" for any number of ranks. Options -vi_contact_volume_... go to
-PETSc (for example -vi_contact_volume_snes_monitor)."""
+_DESCRIPTION = """vi-contact computes structures that may lift off, bounce and slide. It checks every time step.
+Start it with "mpirun -n N vi-contact" on N ranks. Options that begin with -vi_contact_volume_ go to PETSc, for example
+-vi_contact_volume_snes_monitor."""
 _PETSC = "-vi_contact_"
 
 
@@ -48,15 +49,15 @@ def split_petsc(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
 
 def refuse_retired(arguments: Sequence[str]) -> None:
     """Raise InputError for a command of before, with the command or the demo in its place."""
-    for old in arguments[:1]:
-        library.refuse_retired([old])
-        if old in ("wall", "channel"):
-            raise InputError(f"'{old}' is a case now: give vi-contact run {old}, and for its pictures vi-contact "
-                             "report DIR; vi-contact run --help and the table of options in CHANGELOG.md tell the rest")
+    library.refuse_retired(first := list(arguments[:1]))
+    if first in (["wall"], ["channel"]):
+        raise InputError(f"'{first[0]}' is now a case: give vi-contact run {first[0]} (see docs/reference/upgrade.md)")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and print its text; return 0, 1 (one sentence on stderr), 128 + n (signal n) or 75 (wall time)."""
+    if arguments is None:  # a process of our own: with DOLFINx 0.5 the compiler of forms tells the root its calls
+        logging.getLogger().addFilter(lambda record: record.levelno > logging.INFO)
     own, petsc = split_petsc(sys.argv[1:] if arguments is None else arguments)
 
     def command() -> None:
@@ -67,8 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
             petsc4py.init(["vi-contact", *petsc])
         check_words(own)
-        text = told(lambda: options.run(options), getattr(options, "spelling", {}))
-        if text:
+        if text := told(lambda: options.run(options), getattr(options, "spelling", {})):
             print(printable(text))
 
     return status_of(command)

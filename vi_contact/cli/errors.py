@@ -18,20 +18,20 @@ PATIENCE = 30.0  # seconds between the first rank that has failed and the last
 PETSC_ERR_MEM = 55  # of petscsystypes.h
 _MEMORY = ("out of memory", "cannot allocate memory", "unable to allocate", "memory allocation failed", "bad_alloc")
 LIBRARIES = ("dolfinx", "ufl", "basix", "petsc4py", "mpi4py", "h5py", "gmsh", "matplotlib", "tqdm")
-OUT_OF_MEMORY = ("out of memory: take a coarser mesh, fewer steps or samples, or more ranks on more machines; what a "
-                 "run has written is kept, and --restart continues it")
+OUT_OF_MEMORY = ("out of memory: take a coarser mesh, fewer steps or samples, or more ranks on more machines; a run "
+                 "keeps what it has written, and --restart continues it")
 
 
 def check_words(arguments: Sequence[str]) -> None:
     """Raise InputError for words that no shell can give or file can have as a name, and for empty names of outputs."""
     for word in arguments:
         if "\0" in word:
-            raise InputError(f"{shown(word)} holds the character NUL: leave it out")
+            raise InputError(f"{shown(word)} contains the character NUL: leave it out")
         if word.startswith("--") and word.endswith("=--"):
-            raise InputError(f"{shown(word)}: the value is missing, give one")
+            raise InputError(f"{shown(word)} has no value: give one")
     for option, value in zip(arguments, [*arguments[1:], None], strict=True):
         if (option in ("--out", "--csv", "--png") and value == "") or option in ("--out=", "--csv=", "--png="):
-            raise InputError(f"{option.rstrip('=')} is empty: give the name of a file or folder, or leave it away")
+            raise InputError(f"{option.rstrip('=')} is empty: give the name of a file or folder, or leave it out")
 
 
 class Parser(argparse.ArgumentParser):
@@ -78,9 +78,9 @@ def _sentence(error: Exception) -> str | None:
     if isinstance(error, OSError):
         return sentence(error)
     if isinstance(error, ModuleNotFoundError) and error.name in LIBRARIES:
-        return f"this needs {error.name}, which this Python does not find: install it (docs/start/install.md)"
+        return f"{error.name} is needed and this Python does not find it: install it (docs/start/install.md)"
     if isinstance(error, OverflowError | FloatingPointError):
-        return f"a number grew beyond those of the machine ({error}): check the sizes and units of what was given"
+        return f"a number is too large for the machine ({error}): check the sizes and units of all inputs"
     return None
 
 

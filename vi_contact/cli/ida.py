@@ -20,13 +20,13 @@ def _numbers(text: str) -> tuple[float, ...]:
     try:
         return tuple(float(word) for word in text.split(","))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is no list of numbers such as 0.5,1,2") from None
+        raise argparse.ArgumentTypeError(f"{text!r} is not a list of numbers: give numbers such as 0.5,1,2") from None
 
 
 def _part(text: str) -> tuple[int, int]:
     first, slash, count = text.partition("/")
     if not (slash and first.isdecimal() and count.isdecimal()):
-        raise argparse.ArgumentTypeError(f"{text!r} is no part such as 1/4")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a part: give a part such as 1/4, the first of four")
     return int(first), int(count)
 
 
@@ -51,9 +51,9 @@ def _ida(options: argparse.Namespace) -> str:
     except OutOfTime:
         raise
     except KeyboardInterrupt:
-        raise ViContactError("interrupted: give the same command again to go on") from None
+        raise ViContactError("interrupted: give the same command again to continue the study") from None
     failed = [row["reason"] for row in rows if row["status"] != "finished"]
     if failed:
         raise ViContactError(f"{len(failed)} of {len(rows)} runs have failed, the first because: {failed[0]}; all rows "
-                             f"are in {options.out}/ida.csv")
-    return f"{len(rows)} rows, 0 of failed runs: {options.out}/ida.csv, ida.png"
+                             f"with their reasons are in {options.out}/ida.csv")
+    return f"{len(rows)} runs, 0 of them failed: {options.out}/ida.csv, ida.png"

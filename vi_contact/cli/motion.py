@@ -45,7 +45,7 @@ def acceleration(text: str) -> float:
             raise ValueError(text)
         return float(match[1]) * UNITS[canonical_units("option", match[2].strip() or "m/s2")]
     except ValueError:  # InputError is one
-        raise argparse.ArgumentTypeError(f"{text!r} is no acceleration such as 3.0 or 0.3g") from None
+        raise argparse.ArgumentTypeError(f"{text!r} is not an acceleration: give 3.0 or 0.3g, for example") from None
 
 
 def _read(options: argparse.Namespace, path: str) -> Record:
@@ -55,7 +55,7 @@ def _read(options: argparse.Namespace, path: str) -> Record:
         try:
             asked["psa"] = acceleration(words[0]), float(words[1])
         except (argparse.ArgumentTypeError, ValueError):
-            raise InputError(f"--psa {' '.join(words)}: give an acceleration such as 0.5g, a period in seconds"
+            raise InputError(f"--psa {' '.join(words)}: give an acceleration such as 0.5g, and a period in seconds"
                              ) from None
     return Processing(**asked)(read_record(path, options.units, dt=options.dt, channel=options.channel,
                                            resample_dt=options.even, largest=options.largest))
@@ -105,7 +105,7 @@ def _spectrum(options: argparse.Namespace) -> str:
     table = output_file(options.csv or f"{stem}_spectrum.csv", reads=options.file)
     picture = output_file(options.png or f"{stem}_spectrum.png", reads=options.file, picture=True)
     if table == picture:
-        raise InputError(f"{table}: the table would be overwritten by its picture; give each a name of its own")
+        raise InputError(f"{table}: the table would be overwritten by its picture; give --csv and --png two names")
     _write_csv(table, spectra, target)
     plot_spectra(spectra, picture, target=target, steps=steps, units=units)
     if target is not None:
@@ -117,7 +117,7 @@ def _spectrum(options: argparse.Namespace) -> str:
 def _target(options: argparse.Namespace) -> Any:
     """Return the Eurocode 8 spectrum asked for, at the first damping, or None."""
     if (options.ec8 is None) != (options.ag is None):
-        raise InputError("--ec8 and --ag belong together: give the ground type and the design ground acceleration")
+        raise InputError("--ec8 and --ag need each other: give both ground type and design ground acceleration")
     if options.ec8 is None:
         return None
     return EC8Spectrum.on_ground(options.ec8.upper(), ag=options.ag, kind=options.ec8_type, damping=options.damping[0])

@@ -70,8 +70,8 @@ def _opened(options: argparse.Namespace) -> tuple[Any, Any, str, list[float] | N
         try:
             times = [float(one) for one in asked.split(",")]
         except ValueError:
-            raise InputError(f"{shown(asked)} are no moments: give seconds, as 3.2,5") from None
+            raise InputError(f"{shown(asked)} is not a list of moments: give seconds, such as 3.2,5") from None
         slack = 1e-9 * (last - first)
         if not all(first - slack <= one <= last + slack for one in times):
-            raise InputError(f"{shown(asked)} is not within the run, which goes from {first:g} to {last:g} s")
+            raise InputError(f"{shown(asked)} is outside the run: give seconds from {first:g} to {last:g}")
     return run, frames, str(read_copy(run.folder).get("title", "Deformed bodies")), times

@@ -80,7 +80,7 @@ def _checks(options: argparse.Namespace) -> str:
 
     found, table = comparisons(options.folder), _table_path(options)
     if not found:
-        raise InputError(f"{options.folder}: its case has no [[check]] tables: docs/guide/checks.md lists the checks")
+        raise InputError(f"{options.folder}: its case has no [[check]]: add one, docs/guide/checks.md lists them")
     inputs = ["; ".join(f"{key} = {value:.6g} {unit}" for key, (value, unit) in one.inputs.items()) for one in found]
     head = "name", "formula", "source", "range", "inputs", "expected", "found", "unit", "ratio", "applies"
     write_csv(table, head, (

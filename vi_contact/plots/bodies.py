@@ -52,7 +52,7 @@ class Scene:
         """Read the frames next to ``times``; ``magnified``: a round number that shows the displacements when None."""
         frames, history = read_frames(run), run.history
         if frames.cells.shape[1] < 3:
-            raise InputError(f"the run in '{run.folder}' is of bars or of points: there is nothing to deform")
+            raise InputError(f"the run in '{run.folder}' has bars or points only: draw runs in the plane or in space")
         optional(number, "pictures of a run", "magnified", magnified, positive=True)
         found = frames.t[np.unique(nearest(frames.t, times))]
         plane = frames.points.shape[1] == 2
@@ -122,13 +122,12 @@ def _round_down(factor: float) -> float:
 
 def plot_deformed(run: RunFolder, path: str | Path, *, times: Sequence[float] | None = None,
                   magnified: float | None = None, title: str = "Deformed bodies") -> Path:
-    """Draw the bodies of a run with fields, in plane or space, in the frames next to ``times`` [s] (None: the first,
-    the last, and when most happens), coloured by von Mises stress, the edges of elements by body; in the plane dots
-    show the contact pressure, and below which points are open, stick and slip. In space y points upwards where contact
-    is along y rather than z, else z.
+    """Draw the deformed bodies of a run, coloured by von Mises stress, in the frames next to ``times`` [s].
 
-    ``magnified``: how many times larger displacements are drawn; a round number that shows them when None. InputError
-    for a run without fields or in one dimension.
+    None: the first, the last, and when most happens. The edges of elements have the colour of their body. In the plane
+    dots show the contact pressure, and below them which points are open, stick and slip. In space y points upwards
+    where contact is along y rather than z, else z. ``magnified``: how many times larger displacements are drawn; None:
+    a round number that shows them. InputError for a run without fields or in one dimension.
     """
     scene = Scene.of(run, moments(run.history) if times is None else times, magnified)
     flat = scene.points.shape[1] == 2
@@ -153,10 +152,10 @@ def _headed(title: str, scene: Scene) -> str:
 
 def film(run: RunFolder, path: str | Path, *, times: Sequence[float] | None = None, magnified: float | None = None,
          column: str | None = None, title: str = "", fps: int = 10) -> Path:
-    """Write a GIF or, by ffmpeg, an MP4 of the frames next to ``times`` [s] (None: up to 48 around that in which most
-    happens): the bodies as ``plot_deformed`` draws them, in space beside them the pressure on each contact face, and
-    below a ``column`` of the history with the moment marked, and dashed the acceleration of the ground.
+    """Write a film of the bodies of a run, a GIF or with ffmpeg an MP4, of the frames next to ``times`` [s].
 
+    None: up to 48 frames around the one in which most happens. In space the pressure on each contact face is beside
+    the bodies. Below them is a ``column`` of the history with the moment marked, and dashed the motion of the ground.
     InputError for another kind of file, .mp4 without ffmpeg, a column that the run does not have, and as
     ``plot_deformed``.
     """
@@ -165,7 +164,7 @@ def film(run: RunFolder, path: str | Path, *, times: Sequence[float] | None = No
     from matplotlib.figure import Figure
 
     if Path(path).suffix not in (".gif", ".mp4"):
-        raise InputError(f"films are .gif or .mp4 files: name '{Path(path).name}' so, or draw moments: plot_deformed")
+        raise InputError(f"'{Path(path).name}' is not a .gif or .mp4: give such a name, or use plot_deformed")
     if Path(path).suffix == ".mp4" and not FFMpegWriter.isAvailable():
         raise InputError("an .mp4 needs ffmpeg, which is not found: install it, or name the film .gif")
     scene = Scene.of(run, _around(run) if times is None else times, magnified)
@@ -227,8 +226,8 @@ def _trace(axis: Any, run: RunFolder, column: str, times: Array) -> Any:
 
 def draw_run(run: RunFolder, out: str | Path, *, title: str, times: Sequence[float] | None = None,
              magnified: float | None = None) -> list[Path]:
-    """Draw into the folder ``out`` what a run has data for: with fields deformed.png, the bodies and their contact, and
-    in space with ``Contact()`` faces.png, next to the ``times`` [s] (None: the first, the last, and when most happens).
+    """Draw the bodies of a run with fields as deformed.png and, in space with ``Contact()``, its contact faces as
+    faces.png, into the folder ``out``, next to the ``times`` [s]. None: the first, the last, and when most happens.
 
     ``magnified``: how many times larger displacements are drawn, None: so that they are seen.
     """

@@ -88,7 +88,7 @@ def chosen_charts(run: Run, columns: Sequence[Sequence[str]]) -> list[Chart]:
             if name not in run.columns or np.ndim(run.history.get(name, 0)) != 1:
                 raise InputError(f"the run has no column '{name}': see columns.json in its folder")
         if len({run.columns[name][0] for name in group}) > 1:
-            raise InputError(f"columns {', '.join(group)} have different units: give a chart to each unit")
+            raise InputError(f"columns {', '.join(group)} have different units: draw one chart for each unit")
     return [of_columns(run, group, ", ".join(group)) for group in columns]
 
 
@@ -197,8 +197,8 @@ def draw_chart(axis: Any, chart: Chart) -> None:
 
 
 def plot_overview(run: Run) -> Any:
-    """Return a matplotlib Figure of a Solution or RunFolder: the displacements of probes (the first 8), the contact
-    force, the energy ledger, each where it was recorded, and the certificate of every step."""
+    """Return a matplotlib Figure of a Solution or RunFolder. It has the displacements of the first 8 probes, the
+    contact force, the energy ledger, as far as they were recorded, and the certificate of every step."""
     probes = [name for name in run.history if name.startswith("u_")][:CURVES]
     charts = [of_columns(run, probes, "displacement")] if probes else []
     charts += [of_columns(run, ["contact_resultant"], "contact force")] if "contact_resultant" in run.history else []

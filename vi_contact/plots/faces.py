@@ -160,14 +160,14 @@ def limit(axis: Any, low: Array, high: Array, names: Sequence[str] = AXES, *, ma
     axis.grid(False)
     for letter, name, a, b in zip(AXES, names, low - room, high + room, strict=False):
         axis.set(**{f"{letter}lim": (a, b), f"{letter}label": f"{name if len(name) == 1 else f'along {name}'} [m]"})
+        share = (b - a) / (float((high - low).max() + 2.0 * room) or 1.0)  # narrow panels have room for few numbers
+        axis.locator_params(letter, nbins=5 if len(low) == 3 else int(np.clip(6.0 * share, 1.0, 5.0)), min_n_ticks=1)
     if len(low) == 3:
         axis.set_box_aspect(high - low + 2.0 * room, zoom=0.85)  # with room for names
         axis.view_init(25.0, -60.0, vertical_axis=up)
         axis.tick_params(labelsize=7)
-        axis.locator_params(nbins=5)
     else:
         axis.set_aspect("equal")
-        axis.locator_params(nbins=5)
 
 
 def leading(history: History) -> tuple[str, int]:
@@ -185,16 +185,16 @@ def moments(history: History) -> list[float]:
 
 def plot_faces(run: RunFolder, path: str | Path, *, times: Sequence[float] | None = None,
                title: str = "Contact faces") -> Path:
-    """Draw the contact faces of a run in space, a column for each of ``times`` [s] (None: see ``moments``), for every
-    face a row with its pressure and one with its open, sticking and slipping points and the slip of the body.
+    """Draw the contact faces of a run in space, a column for each of ``times`` [s].
 
-    Flat faces are drawn in their plane, curved ones in projection; each point colours its share of the element sides
-    around it, where the run stored fields, or is a dot. Arrows are the tangential displacements on the support of
-    closed points. InputError for a run in the plane or without arrays of ``Contact()``.
+    Every face has a row with its pressure, and one with its open, sticking and slipping points and its slip. Flat
+    faces are drawn in their plane, curved ones in projection. Each point colours its share of the element sides around
+    it, where the run stored fields, or is a dot. Arrows are the tangential displacements on the support of closed
+    points. InputError for a run in the plane or without arrays of ``Contact()``.
     """
     contact, history = run.contact, run.history
     if contact is None or "active" not in history or contact.points.shape[1] != 3:
-        raise InputError(f"'{run.folder}' is not of a finished run in space with Contact(): run it with both")
+        raise InputError(f"'{run.folder}' is not a finished run in space with Contact(): finish one that has it")
     sides = read_frames(run).facing(contact)[0] if frames_of(run.folder) else np.zeros((0, 3), dtype=np.int64)
     faces = faces_of(contact, sides)
     rows = nearest(history["t"], sorted({*moments(history)}) if times is None else times)

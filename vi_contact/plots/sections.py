@@ -51,7 +51,7 @@ def sections_of(run: RunFolder, model: Mapping[str, Any],
     """Return the sections that a run has data for; ``model``: model.json, empty where there is none; ``columns``:
     groups of columns for the histories, in place of those that move."""
     if len(run.history["t"]) < 2:
-        raise InputError(f"the run in '{run.folder}' has no steps yet: there is nothing to report")
+        raise InputError(f"the run in '{run.folder}' has no steps yet: report on it when it has some")
     histories = charts.history_charts(run, WORDS["groups"]) if columns is None else charts.chosen_charts(run, columns)
     found = [_model(model), _motion(run, model), _results(run), _accelerations(run),
              Section("Histories", charts=histories, drawings=maps_of(run)), _certificate(run), _peaks(run)]

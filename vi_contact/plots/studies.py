@@ -28,8 +28,7 @@ class DemandPanel:
 
 
 def plot_ida(demands: Sequence[DemandPanel], path: str | Path, *, intensity: str, unit: str) -> Path:
-    """Draw a panel for every demand, side by side: a grey curve for each record, and the fractiles; intensities are in
-    ``unit``, accelerations are drawn in g."""
+    """Draw a panel for every demand: a grey curve for each record, and the fractiles. Accelerations are in g."""
     figure, ((*axes,),) = canvas(1, len(demands), (1.0 + 4.4 * len(demands), 4.6), sharey=True)
     factor, unit = _in_g(unit)
     for axis, panel in zip(axes, demands, strict=True):

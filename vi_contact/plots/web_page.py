@@ -41,12 +41,11 @@ def write_web_page(path: Path, title: str, facts: Sequence[tuple[str, str]], sec
 
     Histories are thinned; largest and smallest values stay. InputError without jinja2 or plotly.
     """
-    try:
-        from jinja2 import Environment, FileSystemLoader
-        from markupsafe import Markup
-        from plotly.offline import get_plotlyjs
-    except ImportError:
-        raise InputError(MISSING) from None
+    if not can_write():
+        raise InputError(MISSING)
+    from jinja2 import Environment, FileSystemLoader
+    from markupsafe import Markup
+    from plotly.offline import get_plotlyjs
     engine = Environment(loader=FileSystemLoader(FOLDER), autoescape=True, trim_blocks=True, lstrip_blocks=True)
     charts = [chart for section in sections for chart in section.charts]
     most = int(np.clip(POINTS / max(sum(len(one.lines) for one in charts), 1), FEWEST, MOST))

@@ -120,13 +120,13 @@ class PreparedCrossCheck:
 
 def cross_check(problem: ContactProblem, *, scheme: Scheme | None = None, solvers: Sequence[Solver], dt: TimeSteps,
                 steps: int, state: State | None = None) -> CrossChecked:
-    """March with the first solver and compare the others with it at every step; see ``worst`` and ``report()``.
+    """March with the first solver and compare the others with it at every step. ``report()`` of the result tells.
 
     ``dt`` and ``steps`` as in ``march``: ``steps`` counts base steps, the statistics all accepted ones.
     """
     given = several("cross_check", "solvers", solvers, "give a list of two or more solvers")
     if len(given) < 2:
-        raise InputError(f"cross_check: {len(given)} solvers; give two or more to compare")
+        raise InputError(f"cross_check: {len(given)} solvers are given; give two or more")
     checked = CrossChecked(solvers[0], tuple(solvers[1:]))
     for _ in march(problem, scheme=scheme, solver=checked, dt=dt, steps=steps, state=state):
         pass

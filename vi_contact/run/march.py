@@ -21,14 +21,14 @@ def march(problem: ContactProblem, *, scheme: Scheme | None = None, solver: Solv
           escalation: Sequence[Solver] = (), tolerance: float = TOLERANCE) -> Iterator[tuple[State, Report]]:
     """Yield (state, report) after every certified step.
 
-    ``scheme`` None, and the mass matrix of a problem that does not name one: see ``run.method.with_defaults``, whose
-    problem is ``report.problem``. ``solver`` None is Automatic().
+    If ``scheme`` is None, or the problem names no mass matrix, ``run.method.with_defaults`` chooses them, and
+    ``report.problem`` has them. If ``solver`` is None, it is Automatic().
 
     ``dt`` [s] is constant, or a Schedule, or HalvedAtImpact. ``steps`` and ``t_end`` count base steps: the halves of
     a halved step are yielded one by one, and ``state.k`` counts them, but they are one of the ``steps``.
-    A step whose certificate exceeds ``tolerance`` goes to the solvers of ``escalation`` in turn, then raises
-    StepFailure with step, time, residuals and advice. ``state`` continues from a static stage or a checkpoint.
-    InputError, at the call, for arguments of the wrong kind, and a state of another problem or inside the obstacle.
+    A step whose certificate exceeds ``tolerance`` goes to the solvers of ``escalation`` in turn. If all of them fail,
+    StepFailure is raised with step, time, residuals and advice. ``state`` is that of a static stage or a checkpoint.
+    InputError is raised at the call: arguments of the wrong kind, a state of another problem or inside the obstacle.
     """
     method = checked_method("march", problem, scheme, (solver, escalation), dt, steps=steps, t_end=t_end, state=state,
                             tolerance=tolerance)

@@ -50,7 +50,7 @@ def _each(name: str, value: Any, count: int) -> Sequence[Any]:
     if not isinstance(value, Sequence):
         return [value] * count
     if len(value) != count:
-        raise InputError(f"march_many got {len(value)} {name} for {count} problems: give one for each")
+        raise InputError(f"march_many has {len(value)} {name} for {count} problems: give one for each")
     return value
 
 

@@ -104,5 +104,5 @@ def check_state(owner: str, problem: ContactProblem, state: State, *, dt: float,
     inside, *sizes = surface.comm.max(np.array([np.max(-gap, initial=-np.inf), *moved]))
     if inside > SLACK * tolerance * max(sizes):
         worst = np.concatenate(from_each(surface.comm, surface.points[gap == -inside]))[0]
-        raise InputError(f"{owner}: the state lies {inside:.3g} m inside the obstacle at {at(worst)}: start from one "
+        raise InputError(f"{owner}: the state is {inside:.3g} m inside the obstacle at {at(worst)}: give a state "
                          "with every gap >= 0")

@@ -182,7 +182,7 @@ class Proximal:
         if energy == 0.0 or bending > RIGID * energy or work < DRIVEN * energy or stopped:
             return
         raise InputError(f"the body has no static equilibrium: its loads {self._way(motion.d)} and neither contact nor "
-                         "a prescribed displacement stops that; hold it there, change the loads, or start the dynamics "
+                         "a prescribed displacement stops it: hold it there, change the loads, or start the dynamics "
                          "from rest")
 
     def _way(self, d: Array) -> str:

@@ -36,7 +36,7 @@ def refuse_overflow(row: Row) -> None:
         if not isinstance(value, float) or isfinite(value):
             continue
         if np.isinf(value) or name.startswith(("energy_", "work_", "loss_")):
-            raise StepFailure(f"step {row['k']} at t = {row['t']:.6g} s: {name} is {value}, beyond the numbers of the "
+            raise StepFailure(f"step {row['k']} at t = {row['t']:.6g} s: {name} is {value}, too large for the "
                               "machine: check the sizes and units of loads, motions and initial data")
 
 
@@ -65,16 +65,16 @@ class Steps:
 
 
 class Energy:
-    """Record the energy ledger of the run, all in joules, works and losses cumulative:
+    """Record the energy ledger of the run in joules. Works and losses are sums since the start.
 
         W_input + E(0) = E(t) + D_damping + D_contact + D_friction + D_impact + D_algorithmic - defect
         E = ½ vᵀMv + ½ uᵀKu of the free unknowns, with initial strains ½ vᵀMv + ½ uᵀKu - f_0·u + ½ ∫ eps_0 : C eps_0
 
-    with f_0·u = ∫ C eps_0 : eps(u), so that it is ½ ∫ (eps - eps_0) : C (eps - eps_0) where supports are at zero. The
-    rates of initial strains work too. What moved supports store by themselves is in no E: their pull -K U is a load.
-    D_impact = ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ with its sign; W_input is the work of loads, inertia loads -M r a_g and
-    prescribed motions. The defect is the work of the residual of the equation of motion, accumulated; its size relative
-    to the largest energy or work is in ``summary.json``. Three products a step; damping and impacts take one each.
+    with f_0·u = ∫ C eps_0 : eps(u), so that E is ½ ∫ (eps - eps_0) : C (eps - eps_0) if supports are at zero. Rates of
+    initial strains do work too. E has no energy that moved supports store by themselves: their pull -K U is a load.
+    D_impact = ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ with its sign. W_input is the work of loads, inertia loads -M r a_g and prescribed
+    motions. The defect is the summed work of the residual of the equation of motion; ``summary.json`` has its size over
+    the largest energy or work. Each step costs three products, and damping and impacts cost one more each.
     """
 
     _COLUMNS: ClassVar[Columns] = {name: ("J", meaning) for name, meaning in WORDS["columns"].items()}
@@ -120,17 +120,17 @@ class Energy:
 
 @dataclass
 class Contact:
-    """Record what the contact surface does. Reactions are those of the step (mean or end value, as the scheme says).
+    """Record gaps, pressures, forces and slip of the contact. Reactions are mean or end values, as the scheme says.
 
-    gap = gap0 - u_n, plus the shortening of a deformable support; pressure = r_n / weight; the force on the body is
-    -Σ r_n n; its point of action is Σ r_n X / Σ r_n (NaN while the contact is open). Arrays (total,) are of all
-    conditions by their numbers, as the points in ``history.h5`` are, on rank 0; on others they are empty.
+    gap = gap0 - u_n, plus the shortening of a deformable support. pressure = r_n / weight. The force on the body is
+    -Σ r_n n, and its point of action is Σ r_n X / Σ r_n (NaN while the contact is open). On rank 0 the arrays (total,)
+    have all conditions in the order of their numbers, as the points in ``history.h5``; on other ranks they are empty.
 
-    With friction also: the friction force on the body, the largest slip, and arrays (total, d - 1) in the tangents of
-    the nodal frames: traction_t = r_t / weight, that of the body on its support, and slip = B_t u, the tangential
-    displacement on the support (also of points that are open).
+    With friction it also records the friction force on the body, the largest slip, and arrays (total, d - 1) in the
+    tangents of the nodal frames: traction_t = r_t / weight, the traction of the body on its support, and slip = B_t u,
+    the tangential displacement on the support (of open points too).
 
-    Numbers are reduced, a dozen at a time. ``arrays=False`` leaves the arrays out: then nothing is gathered.
+    Ranks exchange a dozen numbers in each step. ``arrays=False`` leaves the arrays out, and then nothing is gathered.
     """
 
     arrays: bool = True
@@ -207,14 +207,14 @@ class Contact:
 
 @dataclass
 class Probe:
-    """Record histories at points of the body, at the node nearest to each: label -> point (d,) [m].
+    """Record histories at points of the body, each at its nearest node: label -> point (d,) [m].
 
-    Columns u_x_<label>, u_y_<label> [m]; with ``velocity`` v_x_<label> [m/s], after the impact law; with
-    ``acceleration`` a_x_<label> [m/s²]: the *absolute* acceleration, the one of the step's equation of motion (velocity
-    jumps of the impact law are not in it) plus the mean ground acceleration of the step; the ground's own in row 0.
-    u and v are relative to the ground when an excitation shakes the body.
+    The columns are u_x_<label>, u_y_<label> [m]; with ``velocity`` also v_x_<label> [m/s], after the impact law; with
+    ``acceleration`` also a_x_<label> [m/s²], the *absolute* acceleration. This is the one of the step's equation of
+    motion, without velocity jumps of the impact law, plus the mean ground acceleration of the step; row 0 has the
+    ground's own. u and v are relative to the ground when an excitation shakes the body.
 
-    InputError for a label that is not made of letters, digits and underscores, or a point outside the body.
+    InputError if a label has other characters than letters, digits and underscores, or a point is outside the body.
     """
 
     points: Mapping[Any, Sequence[float]]
@@ -230,7 +230,7 @@ class Probe:
             column_name("probe label", label)
             array("Probe", f"the point '{label}'", point, (None,), unit="metres")
         if len({len(point) for point in self.points.values()}) > 1:
-            raise InputError("the probe points have different numbers of coordinates: give one per dimension")
+            raise InputError("the probe points have different numbers of coordinates: give one for each dimension")
 
     def columns(self) -> Columns:
         """Name u_x_<label>, …"""

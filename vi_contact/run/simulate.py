@@ -36,36 +36,36 @@ def simulate(problem: ContactProblem, *, scheme: Scheme | None = None, solver: S
              changed: bool = False, progress: bool = True, fields: FieldWriter | None = None,
              cross_check: Comparison | None = None, wall_time: str | None = None,
              callback: Callable[[State, Report], Any] | None = None) -> Solution:
-    """March to t_end, or for so many steps, and records. Collective; every rank gets the solution.
+    """Compute steps in time until t_end, or so many steps, and record them. Collective; every rank gets the solution.
 
     Args:
-        scheme: None is the trapezoidal rule on redistributed mass, with an impact law the Zienkiewicz-Wood-Taylor step;
-            a problem that names no mass matrix gets the one of the scheme (``run.method.with_defaults``).
-        solver: Automatic() when None.
+        scheme: None means the trapezoidal rule on redistributed mass, or with an impact law the Zienkiewicz-Wood-Taylor
+            step. A problem that names no mass matrix gets the one of the scheme (``run.method.with_defaults``).
+        solver: None means Automatic().
         dt: time step [s], or a plan: Schedule, HalvedAtImpact. ``steps``, t_end and checkpoint_every count base steps.
-        record: recorders, (Energy(), Contact()) when None; time, iterations and certificate are always recorded.
+        record: recorders; None means (Energy(), Contact()). Time, iterations and certificate are always recorded.
         out: the run folder: history.csv, columns.json, history.h5, summary.json, run.log, checkpoint.npz, fields.xdmf.
             Without it nothing is written. Output of an earlier run in the folder is replaced, unless ``restart``.
-        state: the initial state, from a gravity stage for example; u0, v0 of the system when None.
+        state: the initial state, from a gravity stage for example; None means u0 and v0 of the system.
         escalation, tolerance: see ``march``.
-        checkpoint_every: base steps between checkpoints.
+        checkpoint_every: number of base steps between checkpoints.
         restart: True continues the run in ``out`` from its checkpoint; a path continues the run in that folder.
-            ``steps`` and ``t_end`` are those of the whole run. The result is the uninterrupted run's: on one rank to
-            the last bit, on several to round-off. Another problem, dt or scheme than that of the checkpoint is refused.
-        changed: True continues all the same; after another dt, ``steps`` count from the checkpoint.
-        progress: a progress line on a terminal. fields: fem.XDMF(every=10) for ParaView.
-        cross_check: whose report() goes into the summary.
+            ``steps`` and ``t_end`` are those of the whole run. The result is that of an uninterrupted run: on one rank
+            to the last bit, on several to round-off. InputError if problem, dt or scheme differ from the checkpoint.
+        changed: True continues even if they differ; after a change of dt, ``steps`` count from the checkpoint.
+        progress: show a progress line on a terminal. fields: fem.XDMF(every=10) writes frames for ParaView.
+        cross_check: a solver whose report() goes into the summary.
         wall_time: "11:30:00", as Slurm reads --time, from the start of the process: the run ends before it is over.
-        callback: called as callback(state, report) on all ranks after every step that is accepted, be it a part of a
-            halved one, when its row is recorded; the arrays of the state are read-only. Where it returns True on some
-            rank the run ends with this base step, with a checkpoint and status "stopped". What it raises ends the run
-            as an InputError that says where, on all ranks and with a checkpoint.
+        callback: it is called as callback(state, report) on all ranks after every accepted step, also after a part of
+            a halved step, when its row is recorded; the arrays of the state are read-only. If it returns True on some
+            rank, the run ends with this base step, with a checkpoint and status "stopped". If it raises an error, the
+            run ends with an InputError that says where, on all ranks and with a checkpoint.
     Raises:
         InputError: before anything is computed or overwritten; also when another run writes into the folder.
         Interrupted: after the step in which some rank got SIGINT (Ctrl-C), SIGTERM or SIGHUP, with a checkpoint.
-        OutOfTime: likewise, before the wall time is over.
-        StepFailure: a step no solver could certify; ViContactError: the disk refused something. All that was computed
-            is in the folder then, and summary.json says why the run ended.
+        OutOfTime: before the wall time is over, with a checkpoint.
+        StepFailure: no solver could certify a step. ViContactError: the disk refused to read or write. All that was
+            computed is then in the folder, and summary.json says why the run ended.
     """
     with opened(**locals()) as (session, writer):
         return session.go(writer)
@@ -83,7 +83,7 @@ def opened(problem: ContactProblem, scheme: Scheme | None, solver: Solver | None
     _check_outputs(record, out, restart, checkpoint_every, (progress, changed), fields, cross_check)
     optional(function, "simulate", "callback", callback, "give a function of a state and a report, or None")
     if wall_time is not None and out is None:
-        raise InputError("wall_time needs out, the folder of the run to continue afterwards")
+        raise InputError("wall_time needs a folder from which the run continues: give out")
     end = WallTime(wall_time, runs)
     problem, scheme = with_defaults(problem, scheme, others)
     method = checked_method("simulate", problem, scheme, (solver, escalation), dt, steps=steps, t_end=t_end,
@@ -121,7 +121,7 @@ def _check_outputs(record: Any, out: Any, restart: Any, checkpoint_every: Any, f
         flag(owner, meaning, value)
     if fields is not None:
         if out is None:
-            raise InputError("fields need an output folder: give out, or leave fields away")
+            raise InputError("fields need an output folder: give out, or leave out fields")
         provides(owner, "fields", fields, ("open",), "give fem.XDMF(every=10), or None")
     optional(provides, owner, "cross_check", cross_check, ("report",), "give a CrossChecked solver, or None")
 
@@ -130,7 +130,7 @@ def _source(restart: bool | str | Path, folder: Path | None) -> Path | None:
     """The folder of the run to continue."""
     if isinstance(restart, bool):
         if restart and folder is None:
-            raise InputError("restart=True needs out, the folder of the run to continue")
+            raise InputError("restart=True needs the folder of the run: give out")
         return folder if restart else None
     path = Path(restart)
     return path.parent if path.suffix == ".npz" else path
@@ -145,7 +145,7 @@ def _started(problem: ContactProblem, recorders: Sequence[Recorder], state: Stat
         row |= recorder.start(problem, state, resumed)
         twice = sorted(set(columns) & set(recorder.columns()))
         if twice:
-            raise InputError(f"two recorders record '{twice[0]}': leave one of them out")
+            raise InputError(f"two recorders have the column '{twice[0]}': leave one of them out")
         columns |= recorder.columns()
     return columns, row
 

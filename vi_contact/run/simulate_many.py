@@ -38,7 +38,7 @@ def simulate_many(runs: Sequence[Mapping[str, Any]], *,
     books = [id(one) for run in every if isinstance(run["record"], Sequence) for one in run["record"]]
     for what, own in (("recorder", books), ("folder", folders)):
         if len(set(own)) < len(own):
-            raise InputError(f"simulate_many: a {what} is given twice, and keeps what one run finds: give each its own")
+            raise InputError(f"simulate_many: two runs have one {what}, which keeps results of one: give each its own")
     return _in_turn(every, tell)
 
 

@@ -32,9 +32,9 @@ class Solution:
     Attributes:
         history: column -> values, (rows,) or (rows, m) for arrays; row 0 is the initial state.
         columns: column -> (unit, meaning).
-        state: the final state, in the rotated basis (``problem.cartesian`` turns it back).
-        facts: what summary.json holds; the times of a step are medians in seconds, nan without steps.
-        problem: what was solved, with the mass matrix that the scheme chose. folder: of the run, None without one.
+        state: the final state in the basis of the nodal frames (``problem.cartesian`` turns it back).
+        facts: the contents of summary.json; the times of a step are medians in seconds, nan without steps.
+        problem: the solved problem, with the mass matrix that the scheme chose. folder: the run folder, or None.
     """
 
     history: Mapping[str, Array]
@@ -51,13 +51,13 @@ class Solution:
         InputError for a system without a mesh, and without such a frame.
         """
         if not hasattr(self.problem.system.space, "V"):
-            raise InputError("function: the system has no mesh, so there are no Functions; use history and state")
+            raise InputError("function: the system has no mesh and so no Functions; use history and state")
         from ..fem.output.functions import as_function, read_function  # late: runs need no finite elements
 
         if t is None and frame is None:
             return as_function(self.problem, self.state, name, continuous=continuous)
         if self.folder is None:
-            raise InputError("function: the run kept no frames; give it out and fields=fem.XDMF(every=10)")
+            raise InputError("function: the run kept no frames; run with out and fields=fem.XDMF(every=10)")
         return read_function(self.problem, self.folder, name, t=t, frame=frame, continuous=continuous)
 
     def summary(self) -> str:
@@ -85,8 +85,8 @@ def energy_warning(facts: Mapping[str, Any]) -> str | None:
     if facts.get("energy_created", 0.0) <= CREATED:
         return None
     return (f"contact and time scheme created {100 * facts['energy_created']:.3g} % of the largest energy of the run: "
-            "take a smaller dt (a wave should not cross more than two elements in a step), HalvedAtImpact, or a "
-            "dissipative scheme such as ContactStabilisedNewmark() or HHT()")
+            "take a smaller dt (a wave should not cross more than two elements in a step) or, without impact law, "
+            "ContactStabilisedNewmark(), which creates none; HHT() and HalvedAtImpact do not cure it")
 
 
 def sampling_warning(excitations: Sequence[Excitation], dt: float) -> str | None:
@@ -95,15 +95,15 @@ def sampling_warning(excitations: Sequence[Excitation], dt: float) -> str | None
     if dt <= finest * (1.0 + 1e-6):
         return None
     return (f"the time step of {dt:g} s is longer than the {finest:g} s of the record, whose peaks fall between the "
-            "steps: take a shorter dt, or bring the record to it by resampled(record, dt), which takes out what dt "
-            "cannot carry")
+            "steps: take a shorter dt, or give resampled(record, dt), which filters out frequencies that dt cannot "
+            "represent")
 
 
 def _entries(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     """(name, value) of every line of the summary; those without a name are whole lines."""
     dt, mean, plain = facts["dt"], facts["seconds_per_step"], facts["seconds_per_linear_step"]
     ratio = f", plain linear step {plain:.3e} s, ratio {mean / plain:.2f}" if np.isfinite(plain) else ""
-    told = dict(facts) | {
+    told = dict(facts) | {"s": "s" * (facts["ranks"] > 1)} | {
         "length": f"({facts['base_steps']} base steps of {dt})" if isinstance(dt, str) else f"of {dt:g} s",
         "solver": shorten(facts["solver"], 88, placeholder=" …"), "ratio": ratio if np.isfinite(mean) else None,
         "and_output": ", output and the cross-check" if facts["cross_check"] else " and output",

@@ -34,13 +34,13 @@ def static_equilibrium(problem: ContactProblem, *, solver: Solver | None = None,
                        tolerance: float = TOLERANCE) -> State:
     """Return the gravity stage: K u = f(t) - B_nᵀ r_n - B_tᵀ r_t with contact active, without excitation.
 
-    The state it leaves has v = 0, keeps stresses, reactions and contact set, and is the start of the dynamic stage. A
-    body that no prescribed displacement holds is brought to rest on its contacts; free rigid motions that no load
-    drives keep the mean position of u0 (see ``proximal``). ``solver`` None is Automatic().
+    The state has v = 0, and it has the stresses, reactions and contact set with which the dynamic stage starts. A body
+    that no prescribed displacement holds is brought to rest on its contacts. Free rigid motions that no load drives
+    keep the mean position of u0 (see ``proximal``). If ``solver`` is None, it is Automatic().
 
     Raises:
-        InputError: the loads drive a rigid motion that nothing stops: there is no equilibrium.
-        StepFailure: no answer below the certificate tolerance.
+        InputError: the loads drive a rigid motion that nothing stops, so that there is no equilibrium.
+        StepFailure: no answer has a certificate below the tolerance.
     """
     owner = "static_equilibrium"
     check_problem_given(owner, problem)
@@ -95,8 +95,8 @@ def quasi_static(problem: ContactProblem, times: Iterable[float], *, solver: Sol
     check_problem_given("quasi_static", problem)
     check_methods("quasi_static", solver, (), tolerance)
     if problem.friction.at(np.zeros(problem.surface.count)) is not problem.friction:
-        raise InputError(f"load steps with {problem.friction}: slip between them has no rate; use Coulomb with the "
-                         "coefficient of slow sliding, or march through the history in time")
+        raise InputError(f"load steps have no slip rate for {problem.friction}: use Coulomb with the coefficient of "
+                         "slow sliding, or compute the history in time by march")
     if state is None:
         state = initial_state(problem)
     else:

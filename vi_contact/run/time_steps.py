@@ -22,10 +22,10 @@ LONGEST = 1e100  # [s] and its inverse: squares of dt, with masses and stiffness
 
 @dataclass(frozen=True)
 class Schedule:
-    """Plan pieces (dt [s], until [s]): steps of dt until that time; the last piece is usually (dt, math.inf).
+    """Plan pieces (dt [s], until [s]) with steps of dt until that time; the last piece is usually (dt, math.inf).
 
-    A piece ends with the first step that reaches its time, be it not a whole number of steps long.
-    InputError for no pieces, dt that is not positive, or times that do not increase.
+    A piece ends with the first step that reaches its time, even if the piece is not a whole number of steps long.
+    InputError if there are no pieces, if a dt is not positive, or if the times do not increase.
     """
 
     pieces: tuple[tuple[float, float], ...]
@@ -37,21 +37,21 @@ class Schedule:
             given = shown(self.pieces)
             raise InputError(f"Schedule pieces are {given}: give pairs ((dt, until), …) in seconds") from None
         if not pairs:
-            raise InputError("Schedule has no pieces: give at least one (dt, until), (dt, math.inf) for a constant dt")
+            raise InputError("Schedule has no pieces: give at least one (dt, until); until may be math.inf")
         object.__setattr__(self, "pieces", tuple((_positive(dt), until) for dt, until in pairs))
         for (_, before), (_, until) in pairwise([(0.0, -inf), *self.pieces]):
             if not until > before:
                 raise InputError(f"Schedule: the piece until {until:g} s does not end after {before:g} s: give "
-                                 "increasing times, math.inf for the last one only")
+                                 "increasing times, and math.inf as the last one only")
 
 
 @dataclass(frozen=True)
 class HalvedAtImpact:
-    """Plan steps of ``dt`` [s], or of a Schedule; one that closes an open contact point is done anew as two halves.
+    """Plan steps of ``dt`` [s], or of a Schedule; a step that closes an open contact point is computed again in halves.
 
-    These may be halved again, down to dt/2**halvings, the resolution of the time of an impact. Every accepted part is a
-    certified step like any other. At most one matrix is factorised for each of the halvings + 1 lengths of a piece.
-    InputError for dt that is not positive, and unless halvings is a whole number from 0 to 20.
+    The halves may be halved again, down to dt/2**halvings, which resolves the time of an impact. Every accepted part is
+    a certified step like any other. At most one matrix is factorised for each of the halvings + 1 lengths of a piece.
+    InputError if dt is not positive, or if halvings is not a whole number from 0 to 20.
     """
 
     dt: float | Schedule

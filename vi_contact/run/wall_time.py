@@ -29,7 +29,7 @@ def seconds_of(wall_time: object) -> float:
         seconds = 86400 * int(days or 0) + sum(a * b for a, b in zip(units, parts, strict=True))
         if 0 < seconds < 1e9:
             return float(seconds)
-    raise InputError(f"the wall time {shown(wall_time)} is none that Slurm reads: give {_FORMS}, such as '11:30:00'")
+    raise InputError(f"the wall time is {shown(wall_time)}: give {_FORMS}, such as '11:30:00'")
 
 
 def age() -> float:

@@ -21,8 +21,8 @@ NOISE = 1e-6  # of the largest peak in the same unit: columns that small are not
 
 
 def refine(folder: str | Path, comm: Any, *, allow: Sequence[str] = (), progress: bool = True) -> dict[str, str]:
-    """Run the case of a finished run folder with h/2 and with dt/2, into refined/h and refined/dt; return name -> why
-    it failed. What is finished is kept, what was interrupted goes on. Collective.
+    """Run the case of a finished run folder with h/2 and with dt/2, into refined/h and refined/dt. Return name -> why
+    it failed. A finished run is kept, and an interrupted run is continued. Collective.
 
     InputError for a folder without case file or whose run has not finished. ``allow``: as of ``read_case``.
     """
@@ -62,7 +62,7 @@ def _halved(folder: RunFolder, name: str) -> Iterator[str]:
         refine = 1 + tables["mesh"].get("refine", 0)
         yield f"mesh.refine={refine}" if finer is None else f"mesh.divisions={toml_value(finer)}"
     elif not isinstance(dt, int | float):
-        raise InputError(f"the time step is a plan, {dt}: halve it in the case and compare the runs")
+        raise InputError(f"the time step is not a number, {dt}: halve it in the case and compare the runs")
     else:
         yield f"run.dt={0.5 * dt!r}"
         for k, stage in enumerate([tables, *tables.get("stage", ())]):

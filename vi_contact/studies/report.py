@@ -14,7 +14,7 @@ from ..plots.bodies import draw_run
 from ..plots.pages import write_pages
 from ..plots.sections import HEADERS, Section, Table, header_facts, number, sections_of
 from ..plots.sketch import sketch
-from ..plots.web_page import can_write, write_web_page
+from ..plots.web_page import MISSING, can_write, write_web_page
 from ..run.files.folder import MODEL
 from ..run.files.reading import read_object, read_run
 from .cases.library import COPY, read_copy, refuse_retired
@@ -28,22 +28,22 @@ WRITERS = {".html": write_web_page, ".pdf": write_pages}
 def report(folder: str | Path, *, out: str | Path | None = None, title: str | None = None,
            columns: Sequence[Sequence[str]] | None = None,
            failed: Mapping[str, str] | None = None) -> tuple[Section, list[Path]]:
-    """Write the report on a run folder, the table peaks.csv and the pictures beside it; return what it says of
-    discretisation error, and their paths.
+    """Write the report on a run folder, and beside it the table peaks.csv and the pictures. Return what the report
+    says of the discretisation error, and the paths of the files.
 
     ``out``: an .html or .pdf file; None: report.pdf in the folder and, with jinja2 and plotly, report.html.
     ``columns``: groups of columns of one unit, a chart each, in place of those that move; ``failed``: what ``refine``
     returned. What has no data is left out. InputError as of ``read_run``, for a run of one row, columns that do not
     exist, another kind of file, .html without jinja2 and plotly, and a damaged model.json.
     """
-    folder = Path(folder)
-    case = read_copy(folder)
-    refuse_retired(case)
+    refuse_retired(case := read_copy(folder := Path(folder)))
     run = read_run(folder)
     heading = str(title or case.get("title") or f"Run {folder.resolve().name}")
     pages = [Path(out)] if out is not None else [folder / f"report.{end}" for end in ("pdf", "html")[: 1 + can_write()]]
     if pages[0].suffix.lower() not in WRITERS:
-        raise InputError(f"'{pages[0]}': a report is an .html or a .pdf file")
+        raise InputError(f"'{pages[0]}' is not an .html or .pdf file: give such a name")
+    if pages[0].suffix.lower() == ".html" and not can_write():  # before a picture is drawn over another one
+        raise InputError(MISSING)
     model, sketched = _model(folder, pages[0].with_name("model.png"))
     sections, drawn = sections_of(run, model, columns), draw_run(run, pages[0].parent, title=heading)
     sections[:0] = [replace(sections.pop(0), pictures=sketched)] if model else []

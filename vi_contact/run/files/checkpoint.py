@@ -187,9 +187,9 @@ def _unpacked(file: Path) -> tuple[dict[str, Any], Arrays]:
     wanted = arrays.pop("checksum", None)
     about = json.loads(str(arrays["about"]))
     if not isinstance(about, dict) or not isinstance(about.get("run"), dict):
-        raise ValueError("no description of the run")
+        raise ValueError("the description of the run is missing")
     if str(wanted) != checksum(arrays):
-        raise ValueError("its checksum is another one")
+        raise ValueError("its checksum is wrong")
     del arrays["about"]
     return about, arrays
 
@@ -201,7 +201,7 @@ def _check_sizes(problem: ContactProblem, about: dict[str, Any], arrays: Arrays)
     about |= {name: whole("it", name, about[name], most=2**53) for name in ("k", "k_start", "base", "halved")}
     array("it", "span", about["span"], (2,))
     if not isinstance(about["rows"], str) or not {"u", "v"} <= set(about["vectors"]):
-        raise InputError("its description is of nothing")
+        raise InputError("the description of the run is empty")
     theirs = about["run"]
     if theirs.get("unknowns") != n or theirs.get("contact points") != m:
         return  # told as another problem's

@@ -73,7 +73,7 @@ def check_folder_format(folder: Path) -> None:
     except FileNotFoundError:
         return
     except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
-        raise InputError(f"'{folder / ABOUT}' is damaged ({error}): restore it, or remove it") from error
+        raise InputError(f"'{folder / ABOUT}' is damaged ({error}): restore it or remove it") from error
     check_format(folder, found)
 
 
@@ -120,7 +120,7 @@ def _take(folder: Path, name: str) -> Any:
             raise InputError(f"another run writes into '{folder}' ({_owner(file)}): wait until it has ended, or choose "
                              "another output folder") from None
         except OSError as error:
-            log.warning("'%s' is on a file system without locks (%s): see to it that no other run writes there",
+            log.warning("'%s' is on a file system without locks (%s): make sure that no other run writes there",
                         folder, error.strerror)
         if _is_there(folder / name, file):
             break

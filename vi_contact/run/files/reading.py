@@ -57,7 +57,7 @@ class RunFolder:
 
 
 def read_run(folder: str | Path) -> RunFolder:
-    """Read a run folder of ``simulate``; of a run that goes on or was killed what is there.
+    """Read a run folder of ``simulate``. For a run that is still going on or was killed, return what is there.
 
     Numbers come from history.csv, which has every step. Arrays come from history.h5, when it has all steps too (it does
     once the run has ended). InputError when there is no history, or a file is damaged.
@@ -91,7 +91,7 @@ def read_object(path: Path) -> dict[str, Any]:
     except RecursionError:
         raise ValueError(f"{path.name} is nested too deep") from None
     if not isinstance(found, dict):
-        raise ValueError(f"{path.name} holds no object")
+        raise ValueError(f"{path.name} does not hold an object")
     json.dumps(found, ensure_ascii=False).encode()  # lone surrogates
     return found
 
@@ -133,11 +133,11 @@ def _numbers(path: Path) -> dict[str, Array]:
         names = header.decode().strip().split(",")
         history = dict(zip(names, numbers_of(str(path), lines, len(names), 0).T, strict=True))
         if not lines or len(history) != len(names):
-            raise ValueError("no rows, or two columns of one name")
+            raise ValueError("there are no rows, or two columns have one name")
         if missing := [name for name in _NEEDED if name not in history]:
             raise ValueError(f"no column {missing[0]}")
         if not np.all(np.isfinite(history["t"])) or np.any(np.diff(history["t"]) <= 0.0):
-            raise ValueError("times that do not increase")
+            raise ValueError("the times do not increase")
     except InputError:
         raise
     except OSError as error:

@@ -63,8 +63,8 @@ class StoredRows:
                     self.hash.update(line + record)
                 yield block
             if self._checksum and self.hash.hexdigest() != self._checksum:
-                raise InputError(f"the histories in '{self.folder}' are not those of the checkpoint, a file of them is "
-                                 "damaged: restore it or start a new run")
+                raise InputError(f"the histories in '{self.folder}' do not belong to the checkpoint, or a file is "
+                                 "damaged: restore the folder or start a new run")
 
 
 def read_blocks(csv: Any, table: Table, arrays: "StoredArrays", *, first: int = 0,

@@ -55,8 +55,8 @@ class Table:
         if row.keys() == self.columns.keys() and self._types.issuperset(map(type, row.values())):
             return
         for name in sorted(row.keys() ^ self.columns.keys()):
-            raise InputError(f"a recorder announces the column '{name}' without filling it, or the other way round: "
-                             "let columns(), start() and row() name the same")
+            raise InputError(f"a recorder names the column '{name}' in columns() only, or in start() and row() only: "
+                             "let all three name the same columns")
         for name, value in row.items():
             if not isinstance(value, int | float | np.generic | np.ndarray) or isinstance(value, np.str_):
                 raise InputError(f"column '{name}' is {shown(value)}: let its recorder return a number or an array")
@@ -144,8 +144,8 @@ class StoredHistory(Mapping[str, Array]):
             raise ViContactError(f"'{name}' of more than {SHARED} points is on rank 0 only: give the run an output "
                                  "folder (out=), from which every rank reads it")
         if self._stamp is None or self._now() != self._stamp:
-            raise ViContactError(f"'{self._file}', where the histories of this run are, has been replaced or is not on "
-                                 "this machine: give every run a folder of its own, on a shared disk")
+            raise ViContactError(f"'{self._file}', which holds the histories of this run, was replaced or is not on "
+                                 "this machine: give every run a folder of its own on a shared disk")
         with open_hdf5(self._file) as file:
             return np.asarray(file[name][()])
 

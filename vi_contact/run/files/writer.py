@@ -63,7 +63,7 @@ class Writer:
     def rest(self) -> str:
         """Return what remains of a run that was ended early, for a sentence."""
         if self.folder is None:
-            return "without an output folder nothing of it is kept"
+            return "without an output folder its histories are lost"
         return f"restart it from its checkpoint in '{self.folder}'"
 
     def open(self, state: State) -> None:

@@ -183,7 +183,7 @@ class Case:
         parts: as of ``parts``, of this case or of one with the same body; state: at rest, when it is known.
         """
         if "strain_compatible" in self.nodes:
-            raise InputError(f"{self.path}: [strain_compatible] is for single runs: take it out for stages and studies")
+            raise InputError(f"{self.path}: [strain_compatible] is for single runs: leave it out of stages and studies")
         problem = self._problem(parts)
         own = {name: value for name, value in self._timed(parts).items() if name != "out"}
         solver = self._made("solver")
@@ -252,8 +252,8 @@ class Case:
 
 
 def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence[str] = ()) -> Case:
-    """Read and check a case file; ``settings``: texts KEY=VALUE that replace values of it (``with_settings``);
-    ``allow``: packages whose classes it may name as "package.module:Name", which runs them: those you trust.
+    """Read and check a case file. ``settings`` are texts KEY=VALUE that replace values of it. ``allow`` names packages
+    that you trust: the case may name their classes as "package.module:Name", which runs code of these packages.
 
     Raises InputError, one sentence with file, table, key and remedy: no TOML (with the line), a table, type or key that
     nobody knows (with the nearest known), a missing key, a value of the wrong kind. Groups are looked up by ``run``.
@@ -267,9 +267,9 @@ def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence
     refuse_retired_model(path, tables.get("model"))
     for name in tables:
         if name not in ("format", *_TABLES, "stage"):
-            raise InputError(f"{path}: unknown table [{name}]: {nearest(name, ('format', *_TABLES, 'stage'))}")
+            raise InputError(f"{path}: the table [{name}] is unknown: {nearest(name, ('format', *_TABLES, 'stage'))}")
     if "mesh" not in tables:
-        raise InputError(f"{path}: there is no table [mesh]: give the mesh of the body")
+        raise InputError(f"{path}: the table [mesh] is missing: give the mesh of the body")
     whole = Case(path, tables, tuple(settings), {}, allowed)
     stages = tuple(replace(one, case=replace(whole, nodes=_nodes(one.tables, one.label, known)))
                    for one in split(path, tables))
@@ -285,7 +285,7 @@ def _node(name: str, tables: Mapping[str, Any], spot: Spot, known: Words) -> Nod
     value, asked = tables[name], _TABLES[name]
     if isinstance(asked, Callee):
         if not isinstance(value, dict):
-            raise spot.wrong("is no table: give its keys below it")
+            raise spot.wrong("is not a table: write its keys below it")
         materials = list(tables.get("material", {})) if name == "system" and "material" not in value else []
         if materials:  # those that [system] does not name: one for the whole body, or each for its cell group
             value = {"material": materials[0] if len(materials) == 1 else [[one, one] for one in materials]} | value

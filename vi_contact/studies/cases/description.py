@@ -75,7 +75,7 @@ def in_words(model: Mapping[str, Any]) -> str:
         rows = model[part["key"]] if "key" in part else [model] if part.get("needs", "title") in model else []
         lines += [part["heading"]] if rows and "heading" in part else []
         lines += [part["text"].format(**{key: _word(one) for key, one in row.items()}) for row in rows]
-    return "\n".join([*lines, *(f"look at this: {one}" for one in model["warnings"])])
+    return "\n".join([*lines, *(f"warning: {one}" for one in model["warnings"])])
 
 
 def _word(value: Any) -> Any:

@@ -42,12 +42,12 @@ class Expression:
         if len(self.text) > LENGTH:
             raise InputError(f"it has {len(self.text)} characters, and {LENGTH} are the most")
         if strange := _WORD.sub("", self.text).strip():
-            raise InputError(f"'{strange[0]}' in it is no part of arithmetic")
+            raise InputError(f"'{strange[0]}' in it does not belong to arithmetic")
         words = " ".join(word[0] for word in _WORD.finditer(self.text))
         try:
             tree = ast.parse(words.replace("^", "**").strip(), mode="eval").body
         except (SyntaxError, RecursionError, MemoryError):
-            raise InputError("its brackets, signs or commas make no arithmetic") from None
+            raise InputError("its brackets, signs or commas are not arithmetic") from None
         object.__setattr__(self, "program", tuple(self._program(tree, 0)))
 
     @property
@@ -79,7 +79,7 @@ class Expression:
                 if any(isinstance(one, str) for one in right):
                     raise InputError("an exponent has a variable: write a^x as exp(x*log(a))")
                 if not abs(_run(right, {})) <= POWER:
-                    raise InputError(f"an exponent is beyond {POWER}")
+                    raise InputError(f"an exponent is larger than {POWER}")
             yield from (*right, (_OF_TWO[type(node.op).__name__], 2))
         elif isinstance(node, ast.Call) and (name in _OF_MORE if len(node.args) > 1 else node.args and name in _OF_ONE):
             yield from self._program(node.args[0], depth + 1)
@@ -89,7 +89,7 @@ class Expression:
             yield from [(_OF_ONE[name], 1)] if name in _OF_ONE else []
         else:
             there = "".join(f", {one}" for one in self.variables)
-            raise InputError(f"'{name or ast.unparse(node)[:20]}' in it is no number{there}, pi or one of "
+            raise InputError(f"'{name or ast.unparse(node)[:20]}' in it is not a number{there}, pi or one of "
                              f"{', '.join((*_OF_ONE, *_OF_MORE))} with its values in brackets")
 
 
@@ -116,7 +116,7 @@ def check_axes(node: Any, d: int, source: str) -> None:
     for one in of if isinstance(of, tuple) else (of,):
         if isinstance(one, Expression) and (beyond := one.used & {*"xyz"[d:]}):
             raise InputError(f"{source} {shown(one.text)} has {min(beyond)}, and a model of dimension {d} has only "
-                             f"{', '.join('xyz'[:d])}: write it of these")
+                             f"{', '.join('xyz'[:d])}: use these only")
 
 
 def _run(program: Any, values: Mapping[str, Any]) -> Any:

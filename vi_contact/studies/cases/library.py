@@ -36,10 +36,10 @@ def copy_starter(name: str, folder: Path) -> list[Path]:
     """Copy the files of a case to begin with into a folder, made if need be, and return them; InputError for a name
     that nobody knows, and for files that are there: they may have been changed."""
     if name not in starters():
-        raise InputError(f"there is no case {shown(name)} to begin with: {nearest(name, starters())}")
+        raise InputError(f"there is no starter case {shown(name)}: {nearest(name, starters())}")
     copies = {folder / one.name: one.read_bytes() for one in sorted(STARTERS.glob(f"{name}.*"), reverse=True)}
     for path in (path for path in copies if path.exists()):
-        raise InputError(f"'{path}' is there already: give another folder, or move it away")
+        raise InputError(f"'{path}' exists already: give another folder, or move the file")
 
     def copy() -> None:
         folder.mkdir(parents=True, exist_ok=True)
@@ -84,7 +84,7 @@ def check_format(path: Path, tables: Mapping[str, Any]) -> None:
     found = tables.get("format", FORMAT)
     if found != FORMAT or isinstance(found, bool):
         raise InputError(f"{path}: format is {shown(found)}, and this version of vi_contact reads format {FORMAT}: "
-                         "take the version it was written for, or correct the number")
+                         "use the version that it was written for, or correct the number")
 
 
 def base_folder(path: Path) -> Path:

@@ -42,7 +42,7 @@ def own_class(text: str, kinds: Sequence[Any], allowed: Sequence[str], spot: Spo
                           "underscores")
     asked = [kind for kind in kinds if is_protocol(kind)]
     if not asked:
-        raise spot.inside(f"has the type '{text}', and takes no classes but its own: leave the type out to see them")
+        raise spot.inside(f"has the type '{text}', but accepts built-in classes only: leave it out to see them")
     from importlib.metadata import entry_points  # late: it takes a while
 
     module, name = found.groups()
@@ -53,7 +53,7 @@ def own_class(text: str, kinds: Sequence[Any], allowed: Sequence[str], spot: Spo
                           f"itself: give --allow {package} if you trust it")
     cls = _imported(module, name, spot)
     if not isinstance(cls, type):
-        raise spot.inside(f"has the type '{text}', which is no class: give one")
+        raise spot.inside(f"has the type '{text}', which is not a class: give one")
     if not _within(cls.__module__, allowed):
         raise spot.inside(f"has the type '{text}', which {cls.__module__} defines: name it there, and allow that "
                           "package if you trust it")

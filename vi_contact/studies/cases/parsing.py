@@ -11,6 +11,7 @@ from typing import Any, Union, get_args, get_origin
 
 from ...core.checks import SHOWN, shown
 from ...core.errors import InputError
+from ...core.lazy import since
 from .own_classes import own_class
 from .quantities import FIELD, HISTORY, Expression, list_node, text_node, unit_of
 from .table_calls import GROUP, Call, Callee, Group, Node, Spot, callee
@@ -64,7 +65,7 @@ def arguments(table: Mapping[str, Any], target: Callee, spot: Spot, words: Words
             raise spot.inside(f"has the unknown key '{key}' for {target.name}: {nearest(key, target.hints)}")
     missing = sorted(target.required - set(given))
     if missing:
-        raise spot.inside(f"lacks '{missing[0]}', which {target.name} needs")
+        raise spot.inside(f"lacks the key '{missing[0]}', which {target.name} needs: give it")
     nodes = {key: read(value, target.hints[key], spot.at(key, unit_of(target.name, key)), words)
              for key, value in given.items()}
     return Call(target, nodes, spot)
@@ -74,8 +75,11 @@ def nearest(word: Any, known: Iterable[str]) -> str:
     """Return the rest of a sentence about a word nobody knows."""
     names = sorted(known) if isinstance(known, frozenset) else list(known)
     if not names:
-        return "leave it out, there are none"
+        return "leave it out, as there are none"
     near = get_close_matches(str(word), names, n=3, cutoff=0.5)
+    now = since("words", str(word)).removeprefix(": ")
+    if "it is gone" in now or now.split(" ")[-1] in names:
+        return now
     return (f"did you mean {' or '.join(near)}? " if near else "") + f"Known: {', '.join(names)}"
 
 
@@ -101,7 +105,7 @@ def _scalar(value: Any, member: Any, spot: Spot, words: Words) -> Node | None:
         return Group(value, member, spot)
     if member in words.named:
         if value not in words.named[member]:
-            raise spot.wrong(f"names '{value}', which is not there: {nearest(value, words.named[member])}")
+            raise spot.wrong(f"names '{value}', which does not exist: {nearest(value, words.named[member])}")
         return words.named[member][value]
     if member in words.short:
         return _table({words.short[member]: value}, [member], spot, words)

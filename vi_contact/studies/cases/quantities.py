@@ -72,11 +72,11 @@ def _expression(text: str, letters: str, spot: Spot) -> Expression:
         if found is None or found[2] in tuple(letters):
             return Expression(text, letters)
         if spot.unit is None:
-            raise InputError(f"no unit is known for it here: leave {shown(found[2])} away")
+            raise InputError(f"no unit is known for it here: leave {shown(found[2])} out")
         (factor, dimension), (own, asked) = _unit(found[2]), _unit(spot.unit)
         if dimension != asked:
             proper = "% or as a plain number" if spot.unit == "1" else spot.unit
-            raise InputError(f"{shown(found[2])} is no unit of it: give it in {proper}")
+            raise InputError(f"{shown(found[2])} is not a unit of it: give it in {proper}")
         return Expression(repr(float(found[1]) * (factor / own)))
     except InputError as error:
         arithmetic = f" of {', '.join(letters)}" if letters else ""
@@ -91,13 +91,13 @@ def _unit(text: str) -> tuple[float, Dimension]:
     while place < len(text):
         found = _FACTOR.match(text, place)
         if found is None:
-            raise InputError(f"{shown(text)} is no unit: write one as kN/m3, cm/s^2 or Pa*s")
+            raise InputError(f"{shown(text)} is not a unit: write one as kN/m3, cm/s^2 or Pa*s")
         sign, name, digits, raised = found.groups()
         below = sign == "/" or (below and not sign)
         power = (int(digits) if digits else {"²": 2, "³": 3}.get(raised, 1)) * (-1 if below else 1)
         if name not in _UNITS:
             known = ", ".join((*_TABLES["with_prefix"], *_TABLES["alone"]))
-            raise InputError(f"{shown(name)} is no unit here: there are {known}, kPa, mm")
+            raise InputError(f"{shown(name)} is not a unit here: there are {known}, kPa, mm")
         factor, *dimension = _UNITS[name]
         size *= factor**power
         total = tuple(a + power * b for a, b in zip(total, dimension, strict=True))

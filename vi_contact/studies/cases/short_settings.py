@@ -54,14 +54,14 @@ class ShortOptions:
         direction = before[0].get("direction") if before else None
         axes = len(direction) if isinstance(direction, list) else 2
         if not all(files) or len(files) > 2:
-            raise InputError(f"--motion {shown(self.motion)}: give FILE, or FILE,FILE for a vertical one too")
+            raise InputError(f"--motion {shown(self.motion)}: give FILE, or FILE,FILE with a vertical motion")
         motions: list[dict[str, Any]] = []
         for number, file in enumerate(files):
             old = before[number] if number < len(before) and before[number].get("type") == "GroundMotion" else {}
-            record = old.get("record")
-            axis = 0 if number == 0 else axes - 1
+            record, axis = old.get("record"), 0 if number == 0 else axes - 1
             motions.append({"type": "GroundMotion", "direction": [float(k == axis) for k in range(axes)]} | old | {
-                "record": (record if isinstance(record, dict) else {}) | {"path": str(Path(file).absolute())}})
+                "record": ({} if not isinstance(record, dict) or record.get("type") == "synthetic" else record)
+                | {"path": str(Path(file).absolute())}})
         found = [f"excitation={toml_value(motions)}"]
         system = next(iter(_tables(tables.get("system"))), {})
         if system.get("base_inertia") is False:
@@ -108,7 +108,7 @@ class ShortOptions:
             place = f"excitation.{number}" if isinstance(shaking, list) else "excitation"
             found.append(f"{place}.{key}={value * self.scale!r}")
         if not found:
-            raise InputError("the case has no use for --scale, nothing shakes it: leave it out, or give --motion")
+            raise InputError("the case cannot use --scale, as nothing shakes it: leave it out, or give --motion")
         return found
 
     def _cross_check(self, tables: Mapping[str, Any]) -> list[str]:

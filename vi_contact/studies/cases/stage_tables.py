@@ -41,7 +41,7 @@ def split(path: Path, tables: Mapping[str, Any]) -> list[Stage]:
         return []
     given = tables["stage"]
     if not isinstance(given, list) or not given or not all(isinstance(one, dict) for one in given):
-        raise InputError(f"{path}: [stage] is no list of tables: write [[stage]] above the keys of each stage")
+        raise InputError(f"{path}: [stage] is not a list of tables: write [[stage]] above the keys of each stage")
     stages = [_stage(f"{path}: [[stage]] {number}", one, tables) for number, one in enumerate(given, start=1)]
     if stages[0].release:
         raise InputError(f"{stages[0].label} has release = true, and is the first stage: leave it out")
@@ -75,7 +75,7 @@ def _stage(where: str, given: Mapping[str, Any], tables: Mapping[str, Any]) -> S
         vain = [key for key in OF_MOTION if key in given] + [f"run.{key}" for key in given.get("run", {})
                                                              if key != "tolerance"]
         if vain:
-            raise InputError(f"{where} is static and has no use for {vain[0]}: leave it out, or give it a dynamic one")
+            raise InputError(f"{where} is static and cannot use {vain[0]}: leave it out, or move it to a dynamic one")
         whole["run"] = {key: one for key, one in whole.get("run", {}).items() if key in ("tolerance", "out")} | AT_REST
     whole |= {key: given[key] for key in WHOLE if key in given}
     return Stage(f"{where} '{name}'", name, kind == "static", release, whole)

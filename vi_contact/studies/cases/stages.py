@@ -83,8 +83,8 @@ def _tidy(out: Path, stages: list[Path], *, keep: bool) -> None:
     """Clear the folders of a new run, and remove those of stages that are none any more; to ``keep``, refuse these."""
     old = [one for one in sorted((out / "stages").glob("[0-9]*_*")) if one.relative_to(out) not in stages]
     if keep and old:
-        raise InputError(f"'{old[0]}' is of no stage of the case: give stages their old names and order, or start a "
-                         "new run, which removes it")
+        raise InputError(f"'{old[0]}' belongs to no stage of the case: give stages their old names and order, or start "
+                         "a new run, which removes it")
     for folder in () if keep else old:
         shutil.rmtree(folder)
     for folder in () if keep else stages:

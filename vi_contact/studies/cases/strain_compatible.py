@@ -35,7 +35,7 @@ def iterate(case: Any, comm: Any, folder: Path | None, *, restart: bool | str | 
     if not isinstance(damping, Call) or damping.callee.name != "DampingRatio":
         raise InputError(f"{spot} gives every cell its damping ratio: give [system.damping] type = \"DampingRatio\"")
     if case.stages and case.stages[-1].static:
-        raise InputError(f"{spot} goes by the strains of the last stage, which is static: give a dynamic one")
+        raise InputError(f"{spot} uses the strains of the last stage, which is static: give a dynamic one")
     mesh, tags = case.meshed(comm)
 
     def softened(one: Any, material: Any, *strain: Any) -> Any:

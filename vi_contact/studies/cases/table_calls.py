@@ -120,7 +120,7 @@ class Call:
     def build(self, context: Context) -> Any:
         lacking = [name for name in self.callee.given if name not in context]
         if lacking:
-            raise self.spot.inside(f"{self.callee.name} asks for the {lacking[0]}, not known yet: give numbers")
+            raise self.spot.inside(f"{self.callee.name} needs the {lacking[0]}, still unknown here: give numbers")
         supplied = {name: context[name] for name in self.callee.given}
         arguments = build(self.arguments, context)
         try:

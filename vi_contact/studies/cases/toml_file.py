@@ -13,7 +13,7 @@ from ...core.checks import shown
 from ...core.errors import InputError
 
 BYTES, DEPTH = 10_000_000, 20  # of a case file; of tables and lists in each other
-_TOO_DEEP = "is nested too deep: give tables and lists as docs/guide/studies.md has them"
+_TOO_DEEP = "is nested too deep: write tables and lists as docs/guide/studies.md does"
 _TOO_LONG = "holds a whole number beyond 64 bits: write it with a point, as 1.0e30"
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
 _CHAIN = re.compile(rf"(?<![\w-])(?:{_PART}){{{DEPTH}}}")  # a key of many parts
@@ -58,7 +58,7 @@ def checked(tables: dict[str, Any], source: str) -> dict[str, Any]:
         inside = value.items() if isinstance(value, dict) else enumerate(value, 1) if isinstance(value, list) else ()
         left += [(f"{key}.{name}".lstrip("."), one, depth + 1) for name, one in inside]
         if any("\0" in str(name) for name, _ in inside):
-            raise InputError(f"{source}: a key below {key or 'the top'} holds the character NUL: correct it")
+            raise InputError(f"{source}: a key below {key or 'the top'} contains the character NUL: correct it")
     return tables
 
 
@@ -69,7 +69,7 @@ def _defect(value: Any, depth: int) -> str:
         return "is nan: give a number"
     if isinstance(value, int) and not -(2**63) <= value < 2**63:
         return _TOO_LONG
-    return "holds the character NUL: leave it out" if isinstance(value, str) and "\0" in value else ""
+    return "contains the character NUL: leave it out" if isinstance(value, str) and "\0" in value else ""
 
 
 def with_settings(tables: dict[str, Any], settings: Sequence[str]) -> dict[str, Any]:
@@ -135,7 +135,7 @@ def _place(there: Any, name: str, setting: str) -> Any:
     if isinstance(there, dict):
         return name
     if not isinstance(there, list):
-        raise InputError(f"setting '{setting}': what comes before '{name}' is a plain value; shorten the key")
+        raise InputError(f"setting '{setting}': the part before '{name}' is a plain value; shorten the key")
     if not name.isdecimal() or not 1 <= int(name) <= len(there):
         raise InputError(f"setting '{setting}': there is no entry '{name}'; give a number from 1 to {len(there)}")
     return int(name) - 1

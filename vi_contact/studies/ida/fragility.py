@@ -93,7 +93,7 @@ def fragility_curve(brackets: Array) -> Fragility:
     low, high = np.max(brackets[:, 0], initial=0.0), np.min(brackets[:, 1], initial=math.inf)
     if low <= high * (1.0 + SAME):
         raise InputError(f"{np.isfinite(brackets[:, 1]).sum()} of {len(brackets)} records pass the limit, maybe all at "
-                         f"one intensity between {low:g} and {high:g}: give other or closer levels, or more records")
+                         f"one intensity from {low:g} to {high:g}: give other or closer levels, or more records")
     with np.errstate(divide="ignore"):
         x = np.log(brackets)
     centre, spread = np.mean(seen := x[np.isfinite(x)]), np.std(seen)
@@ -101,8 +101,8 @@ def fragility_curve(brackets: Array) -> Fragility:
     p = minimize(lambda p: [-one for one in _likelihood(p, x)[:2]], [1.0, 0.0], jac=True, method="L-BFGS-B",
                  bounds=[(LEAST, None), (None, None)]).x
     if p[0] <= LEAST:
-        raise InputError(f"{len(brackets)} records do not tell how far their capacities lie apart: give more levels, "
-                         "or more records")
+        raise InputError(f"the capacities of {len(brackets)} records have a spread that cannot be fitted: give more "
+                         "levels, or more records")
     for _ in range(3):  # of Newton, from digits that are enough to all of them
         _, slope, bend = _likelihood(p, x)
         p = p - np.linalg.solve(bend, slope)

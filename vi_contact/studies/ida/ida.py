@@ -45,7 +45,7 @@ _COLUMNS = tomllib.loads(Path(__file__).with_name("columns.toml").read_text(enco
 
 @dataclass(frozen=True)
 class IDA:
-    """Say what to run, and what to tell of it.
+    """Say what an incremental dynamic analysis runs, and what it tells of the runs.
 
     case: shaken by GroundMotions alone, whose record files are replaced; motions: a file, or one file per GroundMotion
     of the case, for each record; its name is that of its first file. scales: factors on the motion as the case prepares
@@ -68,9 +68,9 @@ class IDA:
             raise InputError("give either scales or levels of the intensity, at least one value")
         values = (*self.scales, *self.levels)
         if len(set(values)) < len(values) or not all(0.0 < value < math.inf for value in values):
-            raise InputError(f"scales or levels {list(values)}: give different positive numbers")
+            raise InputError(f"scales or levels are {list(values)}: give different positive numbers")
         if not self.demands:
-            raise InputError("no demands: give at least one column of history.csv, such as contact_uplift:max")
+            raise InputError("demands is empty: give a column of history.csv, such as contact_uplift:max")
         _ = self.measure, self.wanted, self.shakings
 
     @cached_property
@@ -109,7 +109,7 @@ class IDA:
 
 def run_ida(study: IDA, out: str | Path, *, jobs: int = 1, part: tuple[int, int] = (1, 1), launch: Sequence[str] = (),
             say: Callable[[str], None] = print, wall_time: str | None = None) -> list[Row]:
-    """Make the runs that have not finished yet, and the table and figure of all that are in ``out``; returns its rows.
+    """Make the runs that have not finished yet, and the table and figure of all that are in ``out``. Return its rows.
 
     Eight runs share a process and, where the body serves all excitations, its assembly and every pass over its
     matrices (``simulate_many``). What a run cannot do is told in its row, and the others go on. Called again it keeps
@@ -129,7 +129,7 @@ def run_ida(study: IDA, out: str | Path, *, jobs: int = 1, part: tuple[int, int]
     """
     refuse_mpirun()
     if jobs < 1 or not 1 <= part[0] <= part[1]:
-        raise InputError(f"jobs = {jobs}, part = {part[0]}/{part[1]}: give at least one job, and 1 <= i <= n for i/n")
+        raise InputError(f"jobs = {jobs}, part = {part[0]}/{part[1]}: give one job or more, and 1 <= i <= n for i/n")
     out, end = Path(out), WallTime(wall_time)
     _claim(study, out)
     with locked(SerialComm(), out, LOCK if part[1] == 1 else f"{LOCK}-{part[0]}-of-{part[1]}"):
@@ -138,7 +138,7 @@ def run_ida(study: IDA, out: str | Path, *, jobs: int = 1, part: tuple[int, int]
         left = [run for run in mine if run.done() is None]
         if left:
             _check_demands(study)
-        say(f"{len(every)} runs, {len(mine)} of them here, {len(mine) - len(left)} finished before")
+        say(f"{len(every)} runs, {len(mine)} of them here, {len(mine) - len(left)} finished already")
         number, begin = 0, time.monotonic()
         told = begin
         for found in executed(left, jobs, launch, end):

@@ -34,7 +34,7 @@ class Intensity:
         value = self.of(record)
         if not (level > 0.0 and value > 0.0):
             raise InputError(f"level {level:g} of {self.name}: the record has {value:g}; give levels above zero, and "
-                             "records that shake")
+                             "records with a motion")
         return float((level / value) ** (1.0 / self.degree))
 
 

@@ -54,7 +54,7 @@ def started(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> sub
                                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                                 start_new_session=True)
     except OSError as error:
-        raise InputError(f"'{error.filename}' cannot be started ({error.strerror}): give another launch") from None
+        raise InputError(f"'{error.filename}' cannot be started ({error.strerror}): correct --launch") from None
 
 
 class Processes:

@@ -60,16 +60,16 @@ def ground_motions(case: Case) -> list[tuple[str, Mapping[str, Any]]]:
         found = [(f"excitation.{number}", table) for number, table in enumerate(tables, start=1)]
     for place, table in found:
         if table.get("type") != "GroundMotion":
-            raise InputError(f"{case.path}: [{place}] is no GroundMotion with a record file, whose place other records "
-                             "can take: make it one")
+            raise InputError(f"{case.path}: [{place}] has no record that others can replace: make it a GroundMotion "
+                             "with a record file")
     if not found:
-        raise InputError(f"{case.path}: no [[excitation]] whose record other records can replace: give a GroundMotion")
+        raise InputError(f"{case.path}: no [[excitation]] has a record to replace: give a GroundMotion")
     return found
 
 
 def record_set(word: str) -> list[list[str]]:
-    """Return the files of each record of "H", "H,V", a folder (its AT2 files, if there are any, else all), or "@LIST",
-    a file with one of the first two a line, relative to its folder. InputError for others."""
+    """Return the files of each record of "H", "H,V", a folder (its AT2 files, if it has any, else all) or "@LIST".
+    A LIST is a file with "H" or "H,V" in each line, relative to its folder. InputError for others."""
     folder, names, path = Path(), [word], Path(word.removeprefix("@"))
     try:
         if word.startswith("@"):
@@ -79,10 +79,10 @@ def record_set(word: str) -> list[list[str]]:
             every = sorted(str(one) for one in path.iterdir() if one.is_file() and not one.name.startswith("."))
             names = [one for one in every if one.lower().endswith(".at2")] or every
     except (OSError, ValueError) as error:
-        raise InputError(f"--motions {word} cannot be read ({error}): give a text file with a record a line") from None
+        raise InputError(f"--motions {word} cannot be read ({error}): give a text file, one record in a line") from None
     found = [[name.strip() for name in one.split(",")] for one in names]
     if not found or not all(map(all, found)):
-        raise InputError(f"--motions {word}: give FILE, or FILE,FILE, a folder of them, or @LIST with a record a line")
+        raise InputError(f"--motions {word}: give FILE or FILE,FILE, a folder, or @LIST with one record in a line")
     return [[str(folder / name) for name in files] for files in found]
 
 
@@ -94,14 +94,13 @@ def shakings(case: Case, motions: Sequence[str | Path | Sequence[str | Path]]) -
         files = tuple(Path(one).resolve() for one in ([motion] if isinstance(motion, str | Path) else motion))
         if len(files) != count:
             names = ", ".join(one.name for one in files)
-            raise InputError(f"motion {names}: the case has {count} ground motion(s), give as many files, joined by "
-                             "commas")
+            raise InputError(f"{names}: the case has {count} ground motion{'s' * (count > 1)}: give as many files")
         name = files[0].stem
         if name in found:
-            raise InputError(f"two motions are called '{name}': their runs need different names, rename a file")
+            raise InputError(f"two motions are called '{name}': rename a file, as their runs need different names")
         found[name] = Shaking(name, files)
     if not found:
-        raise InputError("no motions: give at least one record file")
+        raise InputError("motions is empty: give at least one record file")
     return list(found.values())
 
 
