@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
-"""How far contact of spheres on meshes that do not match is from the closed forms, and how that falls with the cells.
+"""Measure the error of contact of spheres on meshes that do not match, and how it falls with the cells.
 
     python3 benchmarks/contact_in_space.py [--hertz 4 8 16] [--mindlin 4 8 12] [--torsion 4 6 8] [--json FILE]
 
-The numbers are cells across the radius a of contact; a problem without numbers is left out. Hertz: a sphere on a rigid
-plane, two spheres, a sphere of steel on a block of aluminium, in the mean over twelve approaches; Cattaneo and Mindlin:
-two spheres, Q along x, and back; torsion: two spheres, Coulomb friction (tests/support/spheres.py says what is
-measured). P, Q and T are what the contact answers to given motions of the bodies far away. Errors in per cent, c/a in
-per cent of 1; "order": of the absolute error, between this number of cells and the one before.
+The numbers are cells across the radius a of contact. A problem without numbers is left out. Hertz has three problems:
+a sphere on a rigid plane, two spheres, and a sphere of steel on a block of aluminium; the error is the mean over
+twelve approaches. Cattaneo and Mindlin press two spheres, push them by Q along x, and back. Torsion turns two spheres
+with Coulomb friction. tests/support/spheres.py says what is measured. P, Q and T are the forces and the moment by
+which the contact answers to given motions of the bodies far away. Errors are in per cent, and c/a is in per cent of
+1. "order" is the order of the absolute error between this number of cells and the one before.
 """
 
 from __future__ import annotations
@@ -97,7 +98,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
     usual = {"hertz": [4.0, 8.0, 16.0], "mindlin": [4.0, 8.0, 12.0], "torsion": [4.0, 6.0, 8.0]}
     for name, levels in usual.items():
-        parser.add_argument(f"--{name}", type=float, nargs="*", default=levels, help="cells across a")
+        parser.add_argument(f"--{name}", type=float, nargs="*", default=levels, help="numbers of cells across a")
     parser.add_argument("--json", type=Path, help="file for all figures: rows with problem, case, cells, errors")
     options = parser.parse_args()
     rows: list[Row] = []

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""What a step with Coulomb friction costs, as a multiple of a plain linear step with the same matrix, in one run.
+"""Measure what a step with Coulomb friction costs, as a multiple of a plain linear step with the same matrix.
 
     python3 benchmarks/friction_cost.py [--sizes 2e4 2e5] [--steps 60] [--mu 0.3]
 
-The wall of step_cost.py with its whole right side in possible contact and a vertical harmonic motion beside the
-horizontal one, so that points open, stick and slip; certificate on, no records, processor time of one thread. A
-linear step, by the fastest of three factors, is timed beside every step with contact. Medians over the steps with
-contact, and the mean ratio.
+The model is the wall of step_cost.py with its whole right side in possible contact. A vertical harmonic motion acts
+beside the horizontal one, so that points open, stick and slip. The certificate is on and nothing is recorded. Seconds
+are processor time of one thread. A linear step, by the fastest of three factors, is timed beside every step with
+contact. The rows have medians over the steps with contact, and the mean ratio.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def main() -> None:
     """Prints the table."""
     arguments = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
     arguments.add_argument("--sizes", type=float, nargs="+", default=[2e4, 2e5])
-    arguments.add_argument("--steps", type=int, default=60, help="steps with contact that are timed")
+    arguments.add_argument("--steps", type=int, default=60, help="number of steps with contact that are timed")
     arguments.add_argument("--mu", type=float, default=0.3)
     options = arguments.parse_args()
     print(HEADER, flush=True)

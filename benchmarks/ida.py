@@ -1,16 +1,20 @@
 #!/usr/bin/env python3
-"""What an incremental dynamic analysis costs with eight runs in a process, and with a process for each.
+"""Measure what an incremental dynamic analysis costs with eight runs in a process, and with a process for each.
 
     python3 benchmarks/ida.py [--records 20] [--scales 5] [--duration 4] [--mesh 4 6] [--json FILE]
     python3 benchmarks/ida.py --case vi_contact/studies/starters/wall.toml --set fields= --scales 10 --step 0.2 \
         --duration 10 --jobs 2
 
-The wall of demos/cases/wall_record.toml, which begins under its weight and slides with Coulomb friction, under
-synthetic motions; or another case with contact, and a probe called "top". Keys of the row: ``records``, ``scales``,
-``runs``, ``unknowns``, ``steps`` of a run; ``seconds_apart`` and ``seconds_together``: processor time of all processes
-of a study, from the command to its table and figure; ``ratio``: of the two; ``wall_seconds_apart``,
-``wall_seconds_together`` and ``wall_ratio``: by the clock, with so many ``jobs`` at a time; ``worst_difference``: of
-the demands of the two studies, over each one's largest.
+The case is the wall of demos/cases/wall_record.toml, which begins under its weight and slides with Coulomb friction,
+under synthetic motions. It may be another case with contact and with a probe called "top". The row has these keys:
+
+* ``records``, ``scales``, ``runs``, ``unknowns``, and ``steps`` of a run;
+* ``seconds_apart`` and ``seconds_together``: processor time of all processes of a study, from the command to its
+  table and figure; ``ratio`` is the ratio of the two;
+* ``wall_seconds_apart``, ``wall_seconds_together`` and ``wall_ratio``: the same by the clock, with so many ``jobs``
+  at a time;
+* ``worst_difference``: the largest difference between the demands of the two studies, over the largest of each
+  demand.
 """
 
 from __future__ import annotations
@@ -64,10 +68,14 @@ def measured(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     scales = tuple(options.step * k for k in range(1, options.scales + 1))
     study = IDA(case, motions(folder, options.records, options.duration), DEMANDS, scales=scales)
     spent, passed, rows = {}, {}, {}
-    for way, runs in (("together", processes.TOGETHER), ("apart", 1)):
+    usual = processes.TOGETHER
+    for way, runs in (("together", usual), ("apart", 1)):
         processes.TOGETHER = runs
         begin, clock = seconds(), time.perf_counter()
-        rows[way] = run_ida(study, folder / way, jobs=options.jobs, say=lambda line: None)
+        try:
+            rows[way] = run_ida(study, folder / way, jobs=options.jobs, say=lambda line: None)
+        finally:
+            processes.TOGETHER = usual
         spent[way], passed[way] = seconds() - begin, time.perf_counter() - clock
     failed = [row["reason"] for found in rows.values() for row in found if row["status"] != "finished"]
     if failed:
@@ -90,11 +98,11 @@ def main() -> None:
     parser.add_argument("--case", type=lambda text: Path(text).resolve(), default=CASE, help="a case file")
     parser.add_argument("--set", dest="settings", action="append", default=[], metavar="KEY=VALUE")
     parser.add_argument("--records", type=int, default=20)
-    parser.add_argument("--scales", type=int, default=5, help="how many: 1, 2, 3... times --step")
-    parser.add_argument("--step", type=float, default=0.5, help="of the scales: 1 is a peak of 3 m/s²")
-    parser.add_argument("--jobs", type=int, default=1, help="processes at a time")
-    parser.add_argument("--duration", type=float, default=4.0, help="of a motion [s]")
-    parser.add_argument("--mesh", type=int, nargs=2, default=[4, 6], help="cells across and up, of its own case")
+    parser.add_argument("--scales", type=int, default=5, help="number of scales: 1, 2, 3 and so on times --step")
+    parser.add_argument("--step", type=float, default=0.5, help="step of the scales; scale 1 is a peak of 3 m/s²")
+    parser.add_argument("--jobs", type=int, default=1, help="number of processes at a time")
+    parser.add_argument("--duration", type=float, default=4.0, help="duration of a motion [s]")
+    parser.add_argument("--mesh", type=int, nargs=2, default=[4, 6], help="cells across and up in the own case")
     parser.add_argument("--json", type=Path, help="write the row into this file")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:

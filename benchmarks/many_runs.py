@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""What a step costs when several runs are marched together, as a multiple of the step of a run alone.
+"""Measure what a step costs when several runs are marched together, as a multiple of the step of a run alone.
 
     python3 benchmarks/many_runs.py [--sizes 2e3] [--rounds 5] [--json FILE]
 
-The wall of step_cost.py, all of its right side in possible contact, under harmonic motions of different amplitude and
-frequency: ``march_many`` of k runs beside k times ``march``, in turn. ``cost_ratio``: processor time per run and step
-over that of single runs, the median of the rounds; set-up is in neither, and nobody reads the reports.
-``worst_difference``: of a step from the single step that begins with the same state, in u and v over their largest
-entries.
+The model is the wall of step_cost.py with its whole right side in possible contact. Harmonic motions of different
+amplitude and frequency shake it. ``march_many`` of k runs is timed beside k times ``march``, in turn. ``cost_ratio``
+is the processor time per run and step over that of single runs, the median of the rounds. Set-up is in neither time,
+and nobody reads the reports. ``worst_difference`` compares a step with the single step that begins with the same
+state: the largest difference in u and v over their largest entries.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def line(row: dict[str, Any]) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--sizes", type=float, nargs="+", default=list(SIZES), help="unknowns, about")
+    parser.add_argument("--sizes", type=float, nargs="+", default=list(SIZES), help="numbers of unknowns, about")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--json", type=Path, help="write the rows into this file")
     options = parser.parse_args()

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""What bounds on a field cost: ``vi.solve`` beside PETSc's SNESVI, on the membrane over a ball; and where SNESVI errs.
+"""Measure what bounds on a field cost: ``vi.solve`` beside PETSc's SNESVI, on the membrane over a ball.
 
     python3 benchmarks/obstacle.py [--cells 449] [--json FILE]
     mpirun -n 2 python3 benchmarks/obstacle.py
 
-First the cost, at 2e5 unknowns: processor time of the busiest rank from the forms to the answer, cold. "plain" is
-SNES vinewtonrsls as users set it up, with PETSc's tolerances, but without a line search and with MUMPS, which is how it
-is quickest. Then, on a small mesh, SNESVI with all of PETSc's defaults beside ``vi.solve``: from nothing, from the
-solution, and with heights in another unit. ``wrong``: unknowns on the wrong side of the active set; ``error`` of u,
-relative to its size, against ``vi.solve``.
+First comes the cost at 2e5 unknowns: processor time of the busiest rank from the forms to the answer, without a first
+guess. "plain" is SNES vinewtonrsls as users set it up, with PETSc's tolerances, but without a line search and with
+MUMPS, which is its quickest setting. Then SNESVI with all defaults of PETSc stands beside ``vi.solve`` on a small
+mesh. It starts from nothing, from the solution, and with heights in another unit. ``wrong`` counts unknowns on the
+wrong side of the active set. ``error`` is the error of u, relative to its size, against ``vi.solve``.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Where the processor time of a run goes: a bar for every size, and a figure.
+"""Measure where the processor time of a run goes: a bar for every size, and a figure.
 
     python3 benchmarks/run_parts.py [--steps 200] [--figure docs/figures/run_parts.png] [--json FILE]
 
-The wall and the block in space of step_cost.py, without friction, ``simulate`` with its default records and a run
-folder; mesh and assembly excluded. Every part is what its functions take less what they call of other parts: matrix
-products are "products" whoever asks for them, and what is left of ``simulate`` outside of the time loop is "records".
-The clock itself takes a microsecond each time a part begins.
+The runs are the wall and the block in space of step_cost.py, without friction. ``simulate`` has its default records
+and a run folder; mesh and assembly are not counted. The time of a part is the time of its functions without the
+functions of other parts that they call. Matrix products are "products" whoever asks for them, and the rest of
+``simulate`` outside the time loop is "records". The clock itself takes a microsecond each time a part begins.
 """
 
 from __future__ import annotations
@@ -152,7 +152,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--steps", type=int, default=200)
     parser.add_argument("--figure", type=Path)
-    parser.add_argument("--json", type=Path, help="file for all figures; one that is there is drawn without a run")
+    parser.add_argument("--json", type=Path, help="file for all numbers; a file that exists is drawn without a run")
     options = parser.parse_args()
     rows: list[dict[str, Any]] = []
     if options.json and options.json.exists():

@@ -1,18 +1,20 @@
 #!/usr/bin/env python3
-"""What a contact step costs in three dimensions without any factor, in products with the matrix of the step.
+"""Measure what a contact step costs in three dimensions without any factor, in products with the matrix of the step.
 
     python3 benchmarks/scale.py [--sizes 6e4 1e6] [--json FILE]
     mpirun -n 2 python3 benchmarks/scale.py --sizes 2e5
 
-A block of two layers, ten times stiffer above, on a wavy rigid plane: all of its lower face may touch. Steps of the
-default scheme at Courant numbers C = c_p dt / h of 1 and 10 after a common history at C = 10, the block thrown; and, at
-C = 100 and in statics, of a block at rest whose top is pushed down slowly. For the same steps the plain linear problem
-is solved too: same A, load, tolerance, preconditioner and guess, no contact. Times are processor time
-of the busiest rank, ``flops`` its operations in a step, as PETSc counts them: how ranks share the work, whatever else
-the machine does. A product is one with A as AIJ, timed in the same run. ``peak_bytes`` counts set-up,
-``bytes_per_unknown`` what there is while stepping (Linux), mesh, M, K, and A included, without what Python and its
-libraries take before the first mesh. Beside it, on small
-blocks, the condensed route.
+The body is a block of two layers, the upper one ten times stiffer, on a wavy rigid plane; all of its lower face may
+touch. Some steps are those of the thrown block with the default scheme at Courant numbers C = c_p dt / h of 1 and 10,
+after a common history at C = 10. Others, at C = 100 and in statics, are those of a block at rest whose top is pushed
+down slowly. The plain linear problem is solved for the same steps: with the same A, load, tolerance, preconditioner
+and guess, and without contact.
+
+Times are processor time of the busiest rank. ``flops`` are its operations in a step, as PETSc counts them; they show
+how ranks share the work, whatever else the machine does. A product is one with A as AIJ, timed in the same run.
+``peak_bytes`` includes set-up. ``bytes_per_unknown`` is the memory while stepping (Linux), with mesh, M, K and A, and
+without the memory that Python and its libraries take before the first mesh. On small blocks the condensed route
+stands beside it.
 """
 
 from __future__ import annotations
@@ -326,10 +328,10 @@ def told(found: dict[str, Any]) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--sizes", type=float, nargs="+", default=[6e4], help="unknowns, about")
-    parser.add_argument("--steps", type=int, default=4, help="steps of a row")
+    parser.add_argument("--sizes", type=float, nargs="+", default=[6e4], help="numbers of unknowns, about")
+    parser.add_argument("--steps", type=int, default=4, help="number of steps in a row")
     parser.add_argument("--no-small", action="store_true", help="leave out the condensed route")
-    parser.add_argument("--json", type=Path, help="file for all figures")
+    parser.add_argument("--json", type=Path, help="file for all numbers")
     options = parser.parse_args()
     found: list[dict[str, Any]] = []
     if COMM.rank == 0:

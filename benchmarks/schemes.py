@@ -1,15 +1,16 @@
 #!/usr/bin/env python3
-"""What each time scheme does in an impact, measured against exact solutions, and what its step costs.
+"""Measure what each time scheme does in an impact, against exact solutions, and what its step costs.
 
     python3 benchmarks/schemes.py [--elements 100] [--bounces 20] [--blocks 2e3 2e4] [--no-bars] [--json FILE]
 
-Two tables, in the form of docs/guide/schemes.md:
+There are two tables, in the form of docs/guide/schemes.md:
 
-* the bar (1D elements): largest error of the contact force in the window 0.6 < t < 1.067 of the thrown bar (V1.1),
-  energy of the bar of V1.3 after 1, 4 and 20 bounces over the exact 1/8, L2 error of its contact force over four
-  bounces (the force that a scheme reports: end value or mean of the step);
-* the block: a unit square, plane strain, thrown at 1 m/s on the ground, 400 steps of 1 ms: energy and mean speed at the
-  end, largest force, and the time of a step over that of the plain linear step with the same matrix, timed beside it.
+* the bars (1D elements): the largest error of the contact force of a bar that is thrown at a wall, in the window 0.6
+  < t < 1.067; the energy of a bouncing bar after 1, 4 and 20 bounces over the exact 1/8; and the L2 error of its
+  contact force over four bounces. The force is the one that a scheme reports: end value or mean of the step;
+* the block: a unit square in plane strain is thrown at 1 m/s on the ground, in 400 steps of 1 ms. The columns are
+  energy and mean speed at the end, the largest force, and the time of a step over that of the plain linear step with
+  the same matrix, which is timed beside it.
 """
 
 from __future__ import annotations
@@ -71,7 +72,7 @@ def force(one: Any) -> float:
 
 
 def oscillation(elements: int, courant: float, scheme: Any, mass: Any) -> float:
-    """max |p/300 - 1| over 0.6 < t < 1.067 (V1.1)."""
+    """max |p/300 - 1| of the thrown bar over 0.6 < t < 1.067."""
     bar = Bar(ThrownBar(), elements=elements)
     dt = bar.time_step(courant)
     worst = 0.0
@@ -82,8 +83,8 @@ def oscillation(elements: int, courant: float, scheme: Any, mass: Any) -> float:
 
 
 def bounces(elements: int, courant: float, count: int, scheme: Any, mass: Any) -> dict[str, Any]:
-    """Energies of V1.3 after 1, 4 and ``count`` bounces over 1/8; relative L2 error of the force of four bounces, and
-    their largest force over the exact one."""
+    """Energies of the bouncing bar after 1, 4 and ``count`` bounces over 1/8; relative L2 error of the force of four
+    bounces, and its largest force over the exact one."""
     bar = Bar(PeriodicBar(), elements=elements)
     dt = bar.time_step(courant)
     per_bounce = round(3.0 / dt)

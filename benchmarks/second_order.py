@@ -1,16 +1,18 @@
 #!/usr/bin/env python3
-"""What displacements of second order buy, and what not: elements of degree 1 and 2 on the same nodes.
+"""Measure what displacements of second order gain: elements of degree 1 and 2 on the same nodes.
 
     python3 benchmarks/second_order.py [--bending 2 4 8] [--hertz 8 16] [--impact 50 100] [--json FILE]
 
-The numbers are cells of degree 1; those of degree 2 are half as many a side and have the same nodes, so that all
-elements have as many unknowns (the graded meshes of hertz: nearly). A problem without numbers is left out.
+The numbers are cells of degree 1. Cells of degree 2 are half as many on a side and have the same nodes, so that all
+elements have as many unknowns (nearly as many on the graded meshes of hertz). A problem without numbers is left out.
 
-bending: first frequency of a cantilever, 8 times as long as high, with so many cells over its height, in space and in
-    the plane (plane stress), against Q2 with 6 and 16 cells; nu = 0.3 and 0.4999 (plane strain).
-hertz: pressure of a cylinder on so many cells in the half-width of the contact, error in L2 over the norm.
-impact: force of a bar thrown at a wall (V1.1) on so many cells along, 4 across: rms of the error around the contact,
-    and largest in its middle, over the exact force. Errors in per cent. "entries" of K for each unknown.
+* bending: the first frequency of a cantilever, 8 times as long as high, with so many cells over its height, in space
+  and in the plane (plane stress), against Q2 with 6 and 16 cells; nu = 0.3, and 0.4999 in plane strain.
+* hertz: the pressure of a cylinder on so many cells in the half-width of the contact: its error in L2 over the norm.
+* impact: the force of a bar thrown at a wall, on so many cells along it and 4 across: the rms of the error around the
+  contact, and the largest error in its middle, over the exact force.
+
+Errors are in per cent. "entries" are those of K for each unknown.
 """
 
 from __future__ import annotations

@@ -1,14 +1,16 @@
 #!/usr/bin/env python3
-"""What a step of a small system costs, as a multiple of the same mathematics in bare numpy, in one run.
+"""Measure what a step of a small system costs, as a multiple of the same mathematics in bare numpy, in one run.
 
     python3 benchmarks/small_systems.py [--steps 400] [--rounds 11] [--json FILE]
 
-The wall of 8 x 12 cells, 216 unknowns, 11 contact points, harmonic motion, Zienkiewicz-Wood-Taylor step, impact rule.
-``march`` yields certified steps; ``simulate`` also keeps energies, contact and a run folder. The bare loop below has
-right-hand side, substitutions, search of the contact set, certificate and impact rule, and no names. Processor time of
-the thread, each run between two of the bare loop; the median of their ratios counts, as the machine may be busy. Set-up
-(assembly excluded) is in all of them. Start-up is the processor time of ``vi-contact run wall`` from command to first
-step, over that of importing scipy and dolfinx just before, each in its own process; forms and byte code are cached.
+The model is the wall of 8 x 12 cells with 216 unknowns and 11 contact points, under a harmonic motion, with the
+Zienkiewicz-Wood-Taylor step and an impact law. ``march`` yields certified steps. ``simulate`` also keeps energies,
+contact and a run folder. The bare loop in this file has the right-hand side, the substitutions, the search of the
+contact set, the certificate and the impact law, and no objects. Times are processor time of the thread. Each run is
+timed between two runs of the bare loop, and the median of their ratios counts, as the machine may be busy. Set-up
+without assembly is in all of them. Start-up is the processor time of ``vi-contact run wall`` from the command to the
+first step, over that of importing scipy and dolfinx just before, each in its own process; forms and byte code are
+cached.
 """
 
 from __future__ import annotations

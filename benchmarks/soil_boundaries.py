@@ -1,14 +1,15 @@
 #!/usr/bin/env python3
-"""What soil boundaries send back: dashpots at an angle, and how far the sides of a soil with a structure must be.
+"""Measure what soil boundaries reflect: dashpots at an angle, and how far away the sides of a soil must be.
 
     python3 benchmarks/soil_boundaries.py [--angles 15 30 45 60 75] [--cells 14] [--only dashpots|sides|boxes]
 
-Dashpots: a packet of plane waves on a strip that is one wavelength wide along the boundary, its sides tied; energy left
-after the reflection over energy before (verification V8.1). Sides: a heavy stiff box at the surface of a soft layer on
-rigid rock, shaken horizontally; largest deviation of the box's displacement from that with sides twelve depths away.
-Boxes: the same in space with sides that are tied both ways, against sides six depths away; and level ground on a
-compliant base, shaken in three components, between dashpots or free sides: deviation of the velocity in the middle of
-the surface from that of tied sides, which is exact.
+dashpots: a group of plane waves runs in a strip that is one wavelength wide along the boundary, and whose sides are
+tied. The column is the energy that is left after the reflection, over the energy before it. sides: a heavy stiff box
+at the surface of a soft layer on rigid rock is shaken horizontally. The column is the largest deviation of the
+displacement of the box from that with sides twelve depths away. boxes: the same in space with sides that are tied in
+both directions, against sides six depths away. Then level ground on a compliant base is shaken in three components,
+between dashpots or free sides. The column is the deviation of the velocity in the middle of the surface from that of
+tied sides, which is exact.
 """
 
 from __future__ import annotations
@@ -146,7 +147,7 @@ def side_table(depths: Sequence[float]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--angles", type=float, nargs="+", default=[15.0, 30.0, 45.0, 60.0, 75.0])
-    parser.add_argument("--cells", type=int, default=12, help="per wavelength")
+    parser.add_argument("--cells", type=int, default=12, help="number of cells in a wavelength")
     parser.add_argument("--only", choices=("dashpots", "sides", "boxes"))
     given = parser.parse_args()
     if given.only in (None, "sides"):

@@ -1,18 +1,19 @@
 #!/usr/bin/env python3
-"""What a unilateral step costs, as a multiple of a plain linear step with the same matrix, in one run.
+"""Measure what a unilateral step costs, as a multiple of a plain linear step with the same matrix, in one run.
 
     python3 benchmarks/step_cost.py [--sizes 2e4 1e5] [--problems wall channel block square] [--json FILE]
 
-The wall of seed 000 with its whole right side in possible contact, its buried channel (two bodies, an impulse rule,
-after its gravity stage), and a block in space shaken over ground: harmonic motion, Zienkiewicz-Wood-Taylor step, impact
-rule and certificate on, no records, with and without friction. A linear step is right-hand side, one substitution and
-update, with the fastest of PETSc's Cholesky, MUMPS and CHOLMOD in free ordering, timed beside every unilateral step;
-set-up is ordering, factor and condensed matrix, beside a factorisation of PETSc's own Cholesky and of CHOLMOD's.
-The square is the static problem of Signorini on triangles, assembly excluded, beside the way of commit f04e87a: PETSc's
-factor, a substitution for every contact unknown, a second one for the reactions.
+The problems are the wall of docs/start/first_wall.md with its whole right side in possible contact, the buried
+channel (two bodies and an impact law, after the gravity stage), and a block in space that is shaken over ground. They
+have a harmonic motion, the Zienkiewicz-Wood-Taylor step, an impact law and the certificate, with and without
+friction, and nothing is recorded. A linear step is right-hand side, one substitution and update, with the fastest of
+PETSc's Cholesky, MUMPS and CHOLMOD in free ordering; it is timed beside every unilateral step. Set-up is ordering,
+factor and condensed matrix, beside a factorisation of PETSc's own Cholesky and of CHOLMOD's. The square is the static
+problem of Signorini on triangles without assembly. It stands beside the plain way to condense: PETSc's factor, a
+substitution for every contact unknown, and a second one for the reactions.
 
-Processor time of one thread; medians and means over steps that have contact. Any size can be asked for, in unknowns;
-in space and in statics those are left out of which nothing is to be learned or that take minutes.
+Seconds are processor time of one thread. Medians and means are over steps with contact. Any size can be asked for, in
+unknowns. Sizes in space and in statics that teach nothing or take minutes are left out.
 """
 
 from __future__ import annotations
@@ -265,7 +266,7 @@ def measure(name: str, given: Problem, factors: Factors, count: int) -> dict[str
 
 
 class Whole(EffectiveMatrix):
-    """A matrix that orders nothing last, as at commit f04e87a."""
+    """A matrix that orders no unknowns last, for the plain way to condense."""
 
     def contact_last(self, last: Any) -> None:
         return None
@@ -273,7 +274,7 @@ class Whole(EffectiveMatrix):
 
 @dataclass(frozen=True)
 class Before:
-    """Condense by PETSc's factor and two whole substitutions, as at commit f04e87a."""
+    """Condense by PETSc's factor and two whole substitutions, the plain way."""
 
     def check(self, problem: vc.ContactProblem) -> None:
         """Everything is right."""
@@ -336,10 +337,10 @@ def line(row: dict[str, Any]) -> str:
 def main() -> None:
     """Prints the table and writes it with --json."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
-    parser.add_argument("--sizes", type=float, nargs="+", help="unknowns, about; default: those of the guide's table")
+    parser.add_argument("--sizes", type=float, nargs="+", help="numbers of unknowns (default: as in the guide)")
     parser.add_argument("--problems", nargs="+", default=list(SIZES), choices=list(SIZES))
-    parser.add_argument("--steps", type=int, default=40, help="steps with contact that are timed")
-    parser.add_argument("--json", type=Path, help="file for all figures")
+    parser.add_argument("--steps", type=int, default=40, help="number of steps with contact that are timed")
+    parser.add_argument("--json", type=Path, help="file for all numbers")
     options = parser.parse_args()
     print(" ".join(f"{title:>{width}}" for title, width, _, _ in COLUMNS), flush=True)
     rows: list[dict[str, Any]] = []

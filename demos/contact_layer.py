@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Put the boundary layer in the place of the exact inequality: a stiff block, an elastic bar and the shaken wall.
+"""Replace the exact inequality by a boundary layer: for a stiff block, an elastic bar and the shaken wall.
 
-The block is stiff: it rebounds with the restitution that its layer was made for. The bar is thrown at a rigid wall with
-10 m/s, then it falls and bounces under gravity: in thinner and thinner layers its motion tends to that of
-the exact inequality, which is known in closed form. So does that of the shaken wall.
+The block is stiff: it rebounds with the restitution that its layer was made for. The bar is thrown at a rigid wall
+with 10 m/s, then it falls and bounces under gravity. In thinner and thinner layers its motion tends to that of the
+exact inequality, which is known in closed form. The motion of the shaken wall tends to that of the exact inequality
+too.
 
     bash demos/run.sh contact_layer             # into results/contact_layer
     bash demos/run.sh -n 2 contact_layer        # the same on two ranks

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """Break a bar in tension: a phase field whose damage can only grow, which is a lower bound on d.
 
-Staggered: the displacement by a plain linear solve, then the damage between its values before and one. First the bar
-stays homogeneous, is loaded beyond its peak and unloaded: the closed form to the last digit. Then its ends keep d = 0,
-and it breaks in the middle at once: the elastic energy falls to nothing. The surface energy is that of the crack and of
-the damage all over the bar that came before and cannot heal. The crack alone, which is the least energy with d = 1
-where the bar broke, a strip of nodes h wide, costs Gc (1 + h / (2 l)). E = Gc = 1, length 1.
+Each step is staggered: a plain linear solve gives the displacement, then the damage is found between its values
+before and one. First the bar stays homogeneous, and is loaded beyond its peak and unloaded; the answer is the closed
+form to the last digit. Then the ends keep d = 0, and the bar breaks in the middle at once: the elastic energy falls
+to nothing. The surface energy is that of the crack and of the damage all over the bar, which came before and cannot
+heal. The crack alone costs Gc (1 + h / (2 l)); this is the least energy with d = 1 where the bar broke, a strip of
+nodes that is h wide. The data are E = Gc = 1 and length 1.
 
     bash demos/run.sh crack                # a table and a figure, into results/crack
     bash demos/run.sh -n 2 crack           # the same on two ranks

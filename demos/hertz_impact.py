@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Throw a steel ball on a rigid plane: elastic finite elements against Hertz' quasi-static theory.
+"""Throw a steel ball on a rigid plane, and compare elastic finite elements with Hertz' quasi-static theory.
 
 A ball of 10 mm is thrown down with 0.1 m/s. It touches the plane for 83 microseconds, with up to 145 N on a spot of a
-third of a millimetre, and rebounds with its full speed. A quarter of it is computed, with the default scheme.
+third of a millimetre, and rebounds with its full speed. The model is a quarter of the ball, with the default scheme.
 
     bash demos/run.sh hertz_impact                # the figure and a table, into results/hertz_impact
     bash demos/run.sh -n 2 hertz_impact           # the same on two ranks

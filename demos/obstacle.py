@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Stretch a membrane over a ball: bounds on a scalar field, against the exact solution on five meshes.
+"""Stretch a membrane over a ball, a field with a lower bound, and compare it with the exact solution on five meshes.
 
 The membrane is held at the height of the exact solution along the sides of a square, and lies on the ball within the
-radius 0.69797, which is not known beforehand. Everything is a form of UFL and a lower bound.
+radius 0.69797, which is not known beforehand. The problem consists of a form of UFL and a lower bound.
 
     bash demos/run.sh obstacle                # a table and a figure, into results/obstacle
     bash demos/run.sh -n 2 obstacle           # the same on two ranks

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Throw a particle on a wall with a boundary layer: Figs. 1, 2 and 3 of the paper on b-geometry (ENOC 2017).
 
-Nothing here is an impact law. The particle slows down in a thin layer before the wall, by Newton's law in a metric that
-grows without bound there, and comes back: restitution and duration are results, in closed form. Beside them the motion
-by integration in time, with the force that fades in smoothly, and with the other readings of the law.
+There is no impact law. The particle slows down in a thin layer before the wall, by Newton's law in a metric that
+grows without bound there, and comes back. Restitution and duration are results in closed form. Beside them stand
+motions by integration in time: with the force that begins smoothly, and with the other readings of the law.
 
     bash demos/run.sh particle_layer        # into results/particle_layer
 

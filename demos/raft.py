@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
 """Shake a building on a raft on soil in all three directions: it lifts off at its edges and corners, and slides.
 
-Two bodies of tetrahedra that do not match, Coulomb friction between them. Three stages as in practice: gravity on a
-firm base; the base released, its reactions kept as forces; an earthquake of three components that comes up from below.
-The sides of the soil are tied, as level ground moves. Data, figures, mesh and time step: docs/guide/raft.md.
+The two bodies have tetrahedra that do not match, with Coulomb friction between them. There are three stages, as in
+practice. In the first, gravity acts on a firm base. In the second, the base is released and its reactions are kept as
+forces. In the third, an earthquake of three components comes up from below. The sides of the soil are tied to each
+other, because level ground moves in this way. docs/guide/raft.md has the data, the figures, the mesh and the time
+step.
 
     bash demos/run.sh raft                          # 2e4 unknowns, 1000 steps, into results/raft
     bash demos/run.sh -n 2 raft --size 1e5          # on two ranks
@@ -171,8 +173,8 @@ def draw(out: Path, weight: float, *, quick: bool, filmed: bool) -> None:
 def command_line(words: Sequence[str]) -> int:
     """Run it with the options of the command line."""
     options = ArgumentParser(prog="raft", description=__doc__.splitlines()[0])
-    options.add_argument("--quick", action="store_true", help="a coarse mesh and 150 steps")
-    options.add_argument("--size", choices=SIZES, default="2e4", help="unknowns, about")
+    options.add_argument("--quick", action="store_true", help="use a coarse mesh and 150 steps")
+    options.add_argument("--size", choices=SIZES, default="2e4", help="number of unknowns, about")
     options.add_argument("--steps", type=int, help=f"number of steps of {1e3 * DT:g} ms")
     options.add_argument("--out", type=Path, default=OUT)
     given = options.parse_args(words)

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Throw a spinning rigid body on a plane with a boundary layer: second example of the paper on b-geometry (ENOC 2017).
 
-First a body with one contact point, whose motion through thinner and thinner layers tends to the impact map of rigid
-body dynamics. Then an ellipsoid that tumbles down on the plane: every bounce has the wanted restitution at the point
-that touches, and turns spin into flight and back.
+The first body has one contact point. Its motion through thinner and thinner layers tends to the impact map of rigid
+body dynamics. The second body is an ellipsoid that tumbles down on the plane. Every bounce has the wanted restitution
+at the point that touches, and turns spin into flight and back.
 
     bash demos/run.sh rigid_body_layer      # into results/rigid_body_layer
 

@@ -2,8 +2,8 @@
 """Rock a block on its corners: Housner's rigid block (1963) as the stiff limit of a finite element body.
 
 A concrete block, 0.4 m wide and 2 m high, is tilted and let go; then it stands on a ground that moves. Its contact is
-two points, the corners of its base. What Housner had to put in, the loss of energy when the block changes from one
-corner to the other, comes out here: nothing but unilateral contact with inelastic impulses and a little damping.
+two points, the corners of its base. Housner had to assume the loss of energy when the block changes from one corner
+to the other. Here it is a result of unilateral contact with inelastic impulses and a little damping.
 
     bash demos/run.sh rocking_block         # into results/rocking_block
     bash demos/run.sh -n 2 rocking_block    # the same on two ranks

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# bash demos/run.sh [-n RANKS] NAME [arguments of the demo…]     runs demos/NAME.py; installs what is missing on Debian
+# bash demos/run.sh [-n RANKS] NAME [arguments of the demo…]     runs demos/NAME.py, and installs missing packages on Debian
 set -euo pipefail
 demos=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 . "$demos/../install/setup.sh"

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Press beams, a frame and plates on rigid stops and on the ground, and throw them at stops, beside closed forms.
 
-Contact asks of a body only for M, K and loads: here they are cubic beam elements as scipy matrices, and thin plates
-by a form of DOLFINx. Every static problem is solved on the condensed route and on all unknowns, and every answer is put
-into the conditions of contact once more.
+Contact needs only M, K and loads of a body. Here they are cubic beam elements as scipy matrices, and thin plates by a
+form of DOLFINx. Every static problem is solved on the condensed route and on all unknowns, and every answer is
+checked again in the conditions of contact.
 
     bash demos/run.sh structures                # tables and a figure, into results/structures
     bash demos/run.sh -n 2 structures           # the plates on two ranks

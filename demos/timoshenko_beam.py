@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Rub a viscoelastic Timoshenko beam on a wall with its tip: Ahn (2012), and what that scheme leaves out.
 
-First the source's own runs with their figures 8.1 to 8.9: the normal force is given, friction is regularised, a scalar
-equation per step is solved by Newton's method. Then the friction inequality itself beside it. Last, the beam is also a
-rod that is pulled against the wall: its computed contact force drives the friction, and the tip slips, sticks, lets go
-and touches again.
+First come the runs of the source with their figures 8.1 to 8.9. Their normal force is given, friction is regularised,
+and Newton's method solves a scalar equation in each step. Then the friction inequality itself stands beside them. In
+the last run the beam is also a rod that is pulled against the wall. Its computed contact force drives the friction,
+and the tip slips, sticks, lifts off and touches again.
 
     bash demos/run.sh timoshenko_beam       # into results/timoshenko_beam
 

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Twist an elastic-plastic bar: a stress function between bounds, on a disk (exact) and a square.
+"""Twist an elastic-plastic bar: find a stress function between bounds on a disk (known exactly) and on a square.
 
 The yield condition |∇u| <= k is, for a bar without holes, the obstacle |u| <= k times the distance to the boundary.
-Where u lies on it the bar is plastic. On the disk zone and torque are known for every twist; on the square the elastic
-bar and the limit torque are, and one twist is computed again by another method, projected relaxation of differences.
+Where u lies on the obstacle the bar is plastic. On the disk the plastic zone and the torque are known for every
+twist. On the square the elastic bar and the limit torque are known, and one twist is computed again by another
+method, projected relaxation of finite differences.
 
     bash demos/run.sh torsion                # a table and a figure, into results/torsion
     bash demos/run.sh -n 2 torsion           # the same on two ranks

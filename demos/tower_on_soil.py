@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """Shake a tower that stands on soil, lifts off and slides, above a compliant base and between free-field sides.
 
-The three stages of practice: gravity on firm supports; supports released, their reactions kept as forces; an earthquake
-that comes up from below. A compliant base takes the upgoing motion, half of what an outcrop record shows, so the record
-of the base is not the record that went in. Everything about these boundaries: docs/guide/soil.md.
+There are three stages, as in practice. In the first, gravity acts on firm supports. In the second, the supports are
+released and their reactions are kept as forces. In the third, an earthquake comes up from below. A compliant base
+takes the upgoing motion, which is half of an outcrop record, so the motion of the base differs from the record that
+is put in. docs/guide/soil.md explains these boundaries.
 
     bash demos/run.sh tower_on_soil         # into results/tower_on_soil
     bash demos/run.sh -n 2 tower_on_soil    # the same on two ranks

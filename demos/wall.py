@@ -25,7 +25,7 @@ from mpi4py import MPI
 import vi_contact as vc
 from demos.pictures.histories import draw_histories
 from demos.pictures.runs import plot_runs
-from demos.pictures.wall import plot_data, plot_decomposition
+from demos.pictures.wall import plot_data, plot_decomposition, plot_frames
 from demos.problems import wall as wall_model
 from demos.problems.decomposition import split
 from vi_contact import fem
@@ -41,6 +41,7 @@ AMPLITUDE = 1.0  # of the ground acceleration [m/s²]
 STEPS = 400
 REFINED = 16  # the comparison of schemes divides the seed's dt by this
 FRAMES_EVERY = 10  # steps between ParaView frames
+INSTANTS = (10, 30)  # steps of case b at which the wall is drawn: away from the ground, and against it
 OUT = Path("results/wall")
 BUILT_IN = {  # case -> settings of the case that ships with the package, which is case b
     "a": ["contact.points=[[6.0, 3.0], [6.0, 5.25], [6.0, 7.5]]"], "b": [], "face": ["contact.points="],
@@ -83,6 +84,9 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
             draw_histories(solution.history, contact, out / case, title=title, reference=linear.history,
                            unilateral=[str(number) for number in wall_model.CASES[case]])
         comm.Barrier()  # nobody leaves before the figures are there
+    if comm.rank == 0:
+        numbers["magnified"] = plot_frames(out / "b", WALL, [dt * k for k in INSTANTS], out / "frames.png")
+        print(f"\nframes.png: displacements are drawn {numbers['magnified']:g} times larger")
     numbers["decomposition"] = draw_step(model, steps, out)
     for case in CASES:
         compare_schemes(model, case, steps, 2 if quick else REFINED, out / f"schemes_{case}.png")

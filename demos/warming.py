@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Warm a wall between rigid walls, warm a bar at once, and tear a body apart: initial strains against closed forms.
+"""Warm a wall between rigid walls, warm a bar at once, and tear a body apart, and compare with closed forms.
 
     sigma = C (eps(u) - eps_0),     eps_0 = alpha (T - T_0) I  or  b⊗n / h in a layer of cells of height h
 
@@ -7,7 +7,7 @@ A wall below a rigid ceiling is warmed slowly: the gap g closes at (1 + nu) alph
 pressure is E / (1 - nu²) ((1 + nu) alpha dT - g / H). A bar that is warmed at once sends the stress E alpha dT along
 itself as waves, whose arrivals are known. A jump b across a layer strains a held bar by b / L.
 
-    bash demos/run.sh warming                 # a table
+    bash demos/run.sh warming                 # a table and a figure, into results/warming
     bash demos/run.sh -n 2 warming            # the same on two ranks
 """
 
@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
 
@@ -22,6 +23,7 @@ import numpy as np
 from mpi4py import MPI
 
 import vi_contact as vc
+from demos.pictures.warming import plot_warming
 from vi_contact import core, fem, meshes
 from vi_contact.cli import status_of
 from vi_contact.core.surfaces import empty_surface
@@ -34,6 +36,7 @@ ALPHA, WARMER = 1.0e-5, 30.0  # [1/K], [K]
 HEIGHT, GAP = 3.0, 6.0e-4  # of the wall, and above it [m]
 LENGTH, CELLS = 2.0, 200  # of the bar [m]
 JUMP = 2.0e-4  # of the dislocation [m]
+OUT = Path("results/warming")
 
 
 def slowly(comm: MPI.Comm) -> list[tuple[float, float, float, float]]:
@@ -48,13 +51,18 @@ def slowly(comm: MPI.Comm) -> list[tuple[float, float, float, float]]:
     for solver in (vc.Condensed(), Volume()):
         states = vc.quasi_static(problem, warmings, solver=solver)
         found.append([float(problem.surface.everywhere(one.r_n / problem.surface.weights).mean()) for one in states])
+    return list(zip(warmings, *found, map(pressure, warmings), strict=True))
+
+
+def pressure(dT: float) -> float:
+    """Return the pressure of the warmed wall on the ceiling, in closed form [Pa]."""
     E, nu = CONCRETE.E, CONCRETE.nu
-    exact = [max(0.0, E / (1.0 - nu**2) * ((1.0 + nu) * ALPHA * dT - GAP / HEIGHT)) for dT in warmings]
-    return list(zip(warmings, *found, exact, strict=True))
+    return max(0.0, E / (1.0 - nu**2) * ((1.0 + nu) * ALPHA * dT - GAP / HEIGHT))
 
 
-def at_once(comm: MPI.Comm, cells: int) -> dict[str, tuple[float, float]]:
-    """Return (computed, exact) of a bar whose right end has the gap alpha dT L to a wall: L/c is its crossing T."""
+def at_once(comm: MPI.Comm, cells: int) -> tuple[dict[str, tuple[float, float]], tuple[Any, Any, Any]]:
+    """Return (computed, exact) of a bar whose right end has the gap alpha dT L to a wall, and its histories: t over
+    the crossing T = L/c, pushes of the support and of the wall over their exact size."""
     strain, speed = ALPHA * WARMER, float(np.sqrt(BAR.E / BAR.rho))
     crossing, push = LENGTH / speed, BAR.E * ALPHA * WARMER
     mesh, tags = fem.build_mesh(meshes.BlockMesh(lengths=(LENGTH,), divisions=(cells,)), comm)
@@ -70,13 +78,14 @@ def at_once(comm: MPI.Comm, cells: int) -> dict[str, tuple[float, float]]:
         return float(np.mean(values[(t > begin + 0.2) & (t < begin + 0.8)]))
 
     impulse = float(np.sum(0.5 * (contact[1:] + contact[:-1]) * np.diff(h["t"])))
-    return {
+    numbers = {
         "push of the support before T [N]": (mean(support, 0.0), push),
         "and from T to 2T [N]": (mean(support, 1.0), -push),
         "push on the wall from T to 2T [N]": (mean(contact, 1.0), push),
         "its impulse [N s]": (impulse, push * crossing),
         "strain energy at the start [J]": (float(h["energy_strain"][0]), 0.5 * BAR.E * strain**2 * LENGTH),
     }
+    return numbers, (t, support / push, contact / push)
 
 
 def torn(comm: MPI.Comm) -> dict[str, tuple[float, float]]:
@@ -101,17 +110,21 @@ def torn(comm: MPI.Comm) -> dict[str, tuple[float, float]]:
     return found
 
 
-def main(quick: bool = False) -> dict[str, tuple[float, float]]:
-    """Print all comparisons (``quick``: a bar of 50 cells); return them as name -> (computed, exact)."""
+def main(quick: bool = False, out: Path = OUT) -> dict[str, tuple[float, float]]:
+    """Print and draw all comparisons (``quick``: a bar of 50 cells); return them as name -> (computed, exact)."""
     comm = MPI.COMM_WORLD
     pressures = slowly(comm)
     numbers = {f"pressure at {dT:g} K [Pa]": (one, exact) for dT, one, _, exact in pressures}
     numbers |= {f"pressure at {dT:g} K, whole body [Pa]": (other, exact) for dT, _, other, exact in pressures}
-    numbers |= at_once(comm, 50 if quick else CELLS) | torn(comm)
+    waves, histories = at_once(comm, 50 if quick else CELLS)
+    numbers |= waves | torn(comm)
     if comm.rank == 0:
+        out.mkdir(parents=True, exist_ok=True)
+        plot_warming([(dT, one) for dT, one, _, _ in pressures], pressure, histories, out / "warming.png")
         print(f"{'':<36} {'computed':>16} {'closed form':>16}")
         for name, (computed, exact) in numbers.items():
             print(f"{name:<36} {computed:>16.8g} {exact:>16.8g}")
+        print(f"\nThe figure is in {out}.")
     return numbers
 
 

@@ -1,4 +1,4 @@
-"""A bar in tension with the quadratic (AT2) phase-field model of fracture: what is known in closed form.
+"""Give closed forms for a bar in tension with the quadratic (AT2) phase-field model of fracture.
 
     energy = ∫ (1 - d)² ½ E eps² + Gc/2 (d²/l + l |∇d|²),    d >= its values before
 

@@ -1,4 +1,4 @@
-"""A membrane over a ball: the obstacle problem on a square whose solution is known.
+"""Give the solution of a membrane over a ball, the obstacle problem on a square.
 
 -Δu >= 0, u >= psi and one of them an equality, on (-2, 2)²; psi is the upper half of the unit ball, continued outside
 of r = 0.9 by its tangent cone so that it has a value everywhere. With the boundary values of

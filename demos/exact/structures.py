@@ -1,4 +1,4 @@
-"""Beams and plates that touch a rigid stop or the rigid ground: what is known in closed form.
+"""Give closed forms for beams and plates that touch a rigid stop or the rigid ground.
 
 A body that a load presses on a stop at the distance g carries there P = (w0 - g)/f, where w0 is the deflection of that
 point under the load alone and f the deflection under a unit force at it. Deflections of plates: S. Timoshenko, S.

@@ -1,4 +1,4 @@
-"""Elastic-plastic torsion of bars: what is known in closed form, of the disk and the square.
+"""Give closed forms for the elastic-plastic torsion of bars: the disk and the square.
 
 The stress function u of a bar of shear modulus G, yield stress k and twist theta per length minimises
 

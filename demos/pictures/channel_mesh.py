@@ -116,7 +116,7 @@ def animate(
 
     path = Path(path)
     if path.suffix != ".gif":
-        raise InputError(f"animations are GIF files: name '{path.name}' so, or draw single moments with plot_moments")
+        raise InputError(f"'{path.name}' is not a .gif: give such a name, or draw moments with plot_moments")
     bodies = read_bodies(folder)
     colours = Colours.of(np.concatenate([bodies.tractions.at(t)[0] for t in times]))
     reach = 2.0 * AROUND * bodies.height

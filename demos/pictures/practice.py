@@ -1,6 +1,9 @@
-"""Draw the pictures of docs/guide/practice.md from runs of the cases: python3 demos/pictures/practice.py RESULTS.
+"""Draw the pictures of docs/guide/practice.md from runs of the cases.
 
-RESULTS holds the run folders wall, dam, pier, pounding and culvert; the pictures are written beside them.
+    python3 demos/pictures/practice.py RESULTS [NAMES]
+
+RESULTS holds the run folders wall, dam, pier, pounding and culvert, or those that are named; the pictures are written
+beside them.
 """
 
 import math
@@ -14,6 +17,8 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # run from the source tree without installing
 
 import vi_contact as vc
 from vi_contact.core.units import STANDARD_GRAVITY as G
@@ -108,9 +113,10 @@ CASES: Mapping[str, Callable[[Any, History], None]] = {
 }
 
 
-def main(results: Path) -> None:
-    """Draw all five."""
-    for name, draw in CASES.items():
+def main(results: Path, *names: str) -> None:
+    """Draw these cases, or all five."""
+    for name in names or CASES:
+        draw = CASES[name]
         figure, axes = plt.subplots(1, 3, figsize=(11.0, 2.9), layout="constrained")
         draw(axes, vc.read_run(results / name).history)
         for one in axes:
@@ -122,4 +128,4 @@ def main(results: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), *sys.argv[2:])

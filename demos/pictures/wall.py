@@ -1,4 +1,6 @@
-"""Draw the wall of the boundary method: its data and numbered points (Fig. 2), a step as two structures (Fig. 1)."""
+"""Draw the wall of the boundary method: its data and numbered points (Fig. 2), a step as two structures (Fig. 1), and
+the deformed wall at two instants, which is the first picture of the documentation.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +10,16 @@ from typing import Any
 
 import numpy as np
 
+from demos.pictures.tractions import read_tractions
 from demos.problems.decomposition import Decomposition
 from demos.problems.wall import Wall
+from vi_contact.plots.deformed import nearest, read_frames
 from vi_contact.plots.histories import canvas, save, scale
 
 GROUND, WALL, CONTACT = "0.87", "#e8dfc8", "#c0392b"
+PRESSURE = "tab:blue"
+LEANS = 0.05  # of the height of the wall: the largest displacement of the two instants
+ARROW = 0.35  # of the width of the wall: the arrow of the largest pressure
 LONGEST = 0.16  # of the height of the wall: the largest displacement, and the longest arrow of a reaction
 DEPTH = 0.09  # of the height: how much of the ground is drawn
 
@@ -104,3 +111,49 @@ def plot_decomposition(found: Decomposition, wall: Wall, path: str | Path) -> Pa
     factor, unit = scale(push, "N")
     return save(figure, path, f"A step at t = {found.t:.4f} s: displacements x {magnified:g}, "
                               f"reactions up to {push * factor:.3g} {unit}")
+
+
+def plot_frames(folder: str | Path, wall: Wall, times: Sequence[float], path: str | Path) -> float:
+    """Draw the wall of a run at times [s] that have a frame: displacements, stresses and pressures of the ground.
+
+    Return how many times larger than they are the displacements are drawn, the same in all panels.
+    """
+    from matplotlib.collections import PolyCollection
+
+    frames, tractions = read_frames(folder), read_tractions(folder)
+    shots = [frames.at(t) for t in times]
+    magnified = float(f"{LEANS * wall.height / max(float(np.abs(u).max()) for _, u, _ in shots):.1g}")
+    pressures = [tractions.normal[nearest(tractions.t, [t])[0]] for t, _, _ in shots]
+    push, most = max(float(p.max()) for p in pressures), max(float(stress.max()) for *_, stress in shots)
+    (factor, unit), (force, force_unit) = scale(most, "Pa"), scale(push, "Pa")
+    figure, axes = canvas(1, len(times), (4.3 * len(times) + 1.2, 6.6), lattice=False, sharey=True)
+    for axis, (t, u, stress), pressure in zip(axes[0], shots, pressures, strict=True):
+        _ground(axis, wall)
+        moved = frames.points + magnified * u
+        cells = PolyCollection(list(moved[frames.cells]), cmap="YlOrRd", ec="0.35", lw=0.4)
+        cells.set(array=factor * stress, clim=(0.0, factor * most))
+        axis.add_collection(cells)
+        axis.fill([0.0, wall.width, wall.width, 0.0], [0.0, 0.0, wall.height, wall.height], fc="none", ec="black",
+                  ls=":")
+        axis.plot([0.0, wall.width], [0.0, 0.0], color="black", lw=3.5)
+        for (x, y), one in zip(tractions.points, pressure, strict=True):
+            if one > 0.0:
+                long = ARROW * wall.width * one / push
+                axis.annotate("", (x - long, y), (x, y), arrowprops={"arrowstyle": "-|>", "color": PRESSURE, "lw": 1.6,
+                                                                     "shrinkA": 0.0, "shrinkB": 0.0})
+        state = "the ground presses the wall" if pressure.any() else "the wall leans away: the gap is open"
+        axis.set(title=f"t = {t:.3f} s\n{state}", xlabel="x [m]", aspect="equal", xlim=(-1.0, wall.width + 1.6),
+                 ylim=(-DEPTH * wall.height, wall.height + 0.6))
+        axis.text(wall.width + 0.8, 0.5 * wall.height, "ground", rotation=90.0, ha="center", va="center", fontsize=10,
+                  bbox={"fc": "white", "ec": "none", "pad": 2.0})
+    axes[0, 0].set_ylabel("y [m]")
+    first, last = axes[0, 0], axes[0, -1]
+    first.plot([], [], color="black", ls=":", label="wall at rest")
+    first.plot([], [], color="black", lw=3.5, label="base, held")
+    last.plot([], [], color=PRESSURE, marker=r"$\leftarrow$", ms=20, ls="none",
+              label=f"pressure of the ground, up to {force * push:.0f} {force_unit}")
+    for axis in (first, last):
+        axis.legend(fontsize=10, loc="upper center", bbox_to_anchor=(0.5, -0.09), ncol=2, frameon=False)
+    figure.colorbar(cells, ax=axes, label=f"von Mises stress [{unit}]", shrink=0.8)
+    save(figure, path, f"A shaken wall beside the ground: displacements are drawn {magnified:g} times larger")
+    return magnified

@@ -1,5 +1,7 @@
-"""Set up four examples of Aimi, Di Credico and Gimperlein (2024) with boundary elements: numpy and scipy only, data of
-square, disk and embedded have for finite elements."""
+"""Set up four examples of Aimi, Di Credico and Gimperlein (2024) with boundary elements, by numpy and scipy only.
+
+The data are those that square, disk and embedded have for finite elements.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Plane frames of Euler–Bernoulli beams, numpy only: element matrices as any frame program would hand them over.
+"""Assemble plane frames of Euler–Bernoulli beams with numpy only, as any frame program would.
 
 Three unknowns a node: displacements along x and y, and the rotation, at rows 3 node + 0, 1, 2.
 """

@@ -58,6 +58,9 @@ class TwoBodies:
             provides("TwoBodies", name, getattr(self, name), ("operator", "contact", "condensed", "solve"),
                      "give a BoundaryProblem")
         optional(mask, "TwoBodies", "welded", self.welded, (len(self.one.operator.mesh),))
+        steps = [len(body.forces) for body in (self.one, self.two)]
+        if steps[0] != steps[1]:
+            raise InputError(f"TwoBodies: one has forces of {steps[0]} steps and two of {steps[1]}; give both as many")
         for name in ("jump", "traction"):
             if not callable(getattr(self, name)):
                 shape = (len(self.one.forces), 2, len(self.one.contact_nodes))
