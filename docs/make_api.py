@@ -10,6 +10,7 @@ It also puts the lines of every stub ``__init__.pyi``, the list of a room's publ
 from __future__ import annotations
 
 import ast
+import inspect
 import re
 import sys
 from collections.abc import Iterable, Iterator
@@ -49,13 +50,19 @@ VALUES = (
 PROMISED = {name for _, names in CONTRACT for name in names}
 HEAD = """# Names
 
-This page is made from the docstrings by `python3 docs/make_api.py`: mend them, then run it. `help(vc.simulate)` says
-more about each name: shapes, units, errors, sources.
+This page is for users who write Python and look up how a name is called, and for developers of classes of their own.
+In Python, `help(vc.simulate)` says more about each name: shapes, units, errors and sources.
 
 The contract comes first: what schemes, solvers, recorders, laws, excitations and obstacles promise to the loop. A class
-of your own needs these methods and no base class: [extend](../guide/extend.md) shows three. Then come
-the names of `import vi_contact as vc`, and each room with all its public names. Names are imported when they are first
-used, so that `import vi_contact` needs numpy and scipy only; `vi_contact.fem` needs DOLFINx, and `Volume` needs PETSc.
+of your own needs these methods and no base class: [extend](../guide/extend.md) shows three. Then come the names of
+`import vi_contact as vc`, and each *room* (a subpackage for one subject) with all its public names. Names are imported
+when they are first used. So `import vi_contact` needs numpy and scipy only; `vi_contact.fem` needs DOLFINx, and
+`Volume` needs PETSc.
+
+How to read an entry: a value `…` is a default that is made anew for every object. Words such as `Array` are types. A
+call that is [collective](glossary.md#collective) must be made on all ranks. Terms are in the [glossary](glossary.md).
+
+Developers: `python3 docs/make_api.py` makes this page from the docstrings. Mend a docstring, then run it.
 """
 STUB = (
     "# ruff: noqa",
@@ -74,13 +81,25 @@ def whole(node: Def) -> str:
     return re.sub(heading, listed, documentation(node), flags=re.MULTILINE)
 
 
+def below(where: Module, node: ast.stmt) -> str:
+    """Return the text that stands below an assignment and explains it, or nothing."""
+    after = where.tree.body[where.tree.body.index(node) + 1 :]
+    value = after[0].value if after and isinstance(after[0], ast.Expr) else None
+    return inspect.cleandoc(value.value) if isinstance(value, ast.Constant) and isinstance(value.value, str) else ""
+
+
 def first_paragraph(where: Module, node: Def) -> str:
-    """Return it on one line; where it refers to the module's equations, after that of the module."""
+    """Return it on one line; where it refers to its module, after the first paragraph of the module."""
     words = documentation(node).split("\n\n")[0]
-    if "the module's equations" in words:
-        more = words.removeprefix("Step by the module's equations.")
-        words = documentation(where.tree).split("\n\n")[0] + " " + more
-    return re.sub(r"\s+", " ", words).strip()
+    for given in ("Step by the module's equations.", "Hold the settings."):
+        if words.startswith(given):
+            words = documentation(where.tree).split("\n\n")[0] + " " + words.removeprefix(given)
+    return with_links(re.sub(r"\s+", " ", words).strip())
+
+
+def with_links(words: str) -> str:
+    """Return the words with a link to the glossary where a docstring says that a call is collective."""
+    return re.sub(r"(?<=[.:)] )Collective(?=[.;])", "[Collective](glossary.md#collective)", words)
 
 
 def entry(where: Module, name: str) -> str:
@@ -88,10 +107,11 @@ def entry(where: Module, name: str) -> str:
     there, node = definition(where, name)
     if not isinstance(node, Def):
         value = there.source(node.value)  # type: ignore[attr-defined]
-        return f"- **`{name}`**" + (f" is `{value}`." if len(value) < 60 else "")
+        told = f"is `{value}`." if len(value) < 60 else ""
+        return " ".join(filter(None, [f"- **`{name}`**", told, re.sub(r"\s+", " ", below(there, node))]))
     call = constructor(there, node) if isinstance(node, ast.ClassDef) else function(there, node)
     has = [one.name for one in methods(node)] if isinstance(node, ast.ClassDef) and name not in PROMISED else []
-    more = f" Has {', '.join(f'`.{one}`' for one in has if one != '__call__')}." if set(has) - {"__call__"} else ""
+    more = f" It has {', '.join(f'`.{one}`' for one in has if one != '__call__')}." if set(has) - {"__call__"} else ""
     return f"- **`{call}`** {first_paragraph(there, node)}{more}"
 
 
@@ -108,9 +128,9 @@ def contract() -> Iterator[str]:
     """Yield the protocols with every method, then the values they exchange, and the whole of every docstring."""
     yield "## The contract\n"
     for where, node, heading in listed(CONTRACT):
-        yield from (heading, f"{whole(node)}\n")
+        yield from (heading, f"{with_links(whole(node))}\n")
         for one in methods(node):
-            yield from (f"#### `{function(where, one, 1)}`\n", f"{whole(one)}\n")
+            yield from (f"#### `{function(where, one, 1)}`\n", f"{with_links(whole(one))}\n")
     yield "## Values of the contract\n"
     for where, node, heading in listed(VALUES):
         yield from (heading, f"`{constructor(where, node)}`\n", f"{whole(node)}\n")

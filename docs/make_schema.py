@@ -8,10 +8,13 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Mapping, Sequence
 from inspect import getdoc
 from pathlib import Path
 from typing import Any, get_args, get_origin
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # of this clone, installed or not
 
 from vi_contact.laws.materials import LinearElastic
 from vi_contact.studies.cases.case import _TABLES

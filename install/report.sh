@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# bash install/report.sh              jinja2 and plotly for reports that browsers show, in .venv/report of this clone; then
-#                                     .venv/report/bin/python -m vi_contact report DIR
-# bash install/report.sh --browser    the same, and Chromium, in which tests/plots/test_browser.py opens a report
+# bash install/report.sh              installs jinja2 and plotly, which write reports for browsers, into .venv/report of this clone;
+#                                     then run .venv/report/bin/python -m vi_contact report DIR
+# bash install/report.sh --browser    also installs Chromium, in which tests/plots/test_browser.py opens a report
 set -uo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 vi_clean_environment

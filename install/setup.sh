@@ -1,5 +1,5 @@
 # Shared by demos/run.sh, tests/run.sh and .ci/run, which source it: clean environment, Debian's packages, MPI settings.
-# Silent unless it installs something or fails.
+# It prints nothing unless it installs something or fails.
 
 vi_root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 vi_python=/usr/bin/python3
@@ -72,7 +72,7 @@ vi_install_packages() {
   command -v apt-get >/dev/null || vi_fail "needs Debian (there is no apt-get here) with $missing"
   [ "$(id -u)" -eq 0 ] || sudo -n true 2>/dev/null || { command -v sudo >/dev/null && [ -t 0 ]; } ||
     vi_fail "packages are missing and sudo cannot be used; as root: apt-get install --no-install-recommends $missing"
-  echo "vi_contact: installing $(wc -w <<<"$missing") Debian packages (once)…" >&2
+  echo "vi_contact: installing $(wc -w <<<"$missing") Debian packages and what they need. It takes some minutes, once." >&2
   said=$(vi_apt update)  # its status tells nothing: a broken third-party source fails it, being offline does not
   grep -qE '^(Hit|Get):' <<<"$said" || vi_fail "offline: no Debian mirror answers; missing: $missing"
   said=$(vi_apt install -y --no-install-recommends $missing)
