@@ -10,6 +10,8 @@ from __future__ import annotations
 import faulthandler
 import functools
 import gc
+import importlib.machinery
+import importlib.util
 import itertools
 import os
 import re
@@ -22,13 +24,14 @@ from collections import Counter
 from collections.abc import Generator, Iterator
 from math import inf
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, TextIO
 
 import pytest
 
 RANK = int(os.environ.get("OMPI_COMM_WORLD_RANK", os.environ.get("PMI_RANK", "0")))
 SIZE = int(os.environ.get("OMPI_COMM_WORLD_SIZE", os.environ.get("PMI_SIZE", "1")))
-LEFT_OUT = ("serial", "slow") if SIZE > 2 else ("serial",) if SIZE > 1 else ()
+LEFT_OUT = ("serial", "slow", "two_ranks") if SIZE > 2 else ("serial",) if SIZE > 1 else ()
 ABOVE = ("validation", "models", "soil", "studies", "house")  # what they are made of runs on three ranks, they on two
 TEST_SECONDS = 600  # a test that takes longer on an idle machine is taken to be stuck
 WATCH_SECONDS = 30  # how long one watch over the tests stands: a new one for each would wait for a thread to end
@@ -77,6 +80,14 @@ def pytest_configure(config: pytest.Config) -> None:
     config.stash[_stderr] = os.fdopen(os.dup(2), "w")  # the real one: pytest captures fd 2 during tests
     if RANK:  # rank 0 speaks for all
         config.pluginmanager.unregister(name="terminalreporter")
+    if _second_half(config) and config.args == ["tests"]:
+        config.args[:] = sorted({str(path.parent) for path in Path("tests").rglob("test_*.py")}, reverse=True)
+
+
+def _second_half(config: pytest.Config) -> bool:
+    """Whether this is every other process of several: those begin to collect from behind. In a fresh tree asserts are
+    rewritten, which takes longer than to import, and so the processes meet in the middle, where they find it done."""
+    return bool(int(getattr(config, "workerinput", {}).get("workerid", "gw0")[2:]) % 2)
 
 
 def pytest_ignore_collect(collection_path: Path) -> bool | None:
@@ -90,14 +101,16 @@ def pytest_ignore_collect(collection_path: Path) -> bool | None:
 
 
 def _left_out(item: pytest.Item) -> bool:
-    """Serial tests on several ranks; on three and more, which seldom have a core each, also those that are slow."""
+    """Serial tests on several ranks; on three and more, which seldom have a core each, also those that are slow and
+    those that say that two ranks show what they show."""
     return any(item.get_closest_marker(marker) for marker in LEFT_OUT)
 
 
 def _covering(items: list[pytest.Item]) -> set[pytest.Item]:
     """Of every function, on two ranks so many tests that each value of each parameter occurs, on three, which seldom
-    have a core each, one: their combinations run on one rank, where a law, a scheme or a shape takes the path that it
-    takes on several."""
+    have a core each, one; of validation, whose parts are tested in the rooms, one on two ranks too, unless ranks are in
+    its name. Their combinations run on one rank, where a law, a scheme or a shape takes the path that it takes on
+    several."""
     functions: dict[str, list[pytest.Item]] = {}
     for item in items:
         functions.setdefault(item.nodeid.split("[")[0], []).append(item)
@@ -105,6 +118,9 @@ def _covering(items: list[pytest.Item]) -> set[pytest.Item]:
         return {ones[-1] for ones in functions.values()}
     kept: set[pytest.Item] = set()
     for ones in functions.values():
+        if "validation" in ones[0].path.parts and "ranks" not in ones[0].name.split("[")[0]:
+            kept.add(ones[-1])
+            continue
         alike = set.intersection(*map(_parameters, ones)) if len(ones) > 1 else set()
         seen: set[tuple[str, int]] = set()
         for new in (all, any):  # those of new values only, then those of some new value
@@ -150,6 +166,8 @@ def _parameters(item: pytest.Item) -> set[tuple[str, int]]:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if hasattr(config, "workerinput"):  # alike in every process, wherever it began
+        items.sort(key=lambda item: str(item.path))
     kept = _paired(items) if SIZE == 1 else _covering([item for item in items if not _left_out(item)])
     if left_out := [item for item in items if item not in kept]:
         items[:] = [item for item in items if item in kept]
@@ -176,7 +194,8 @@ def pytest_collection_finish(session: pytest.Session) -> None:
 
 
 def _load_forms_once() -> None:
-    """FFCx lists its cache of thousands of files whenever a form is made, also one whose module is loaded already."""
+    """FFCx lists its cache of thousands of files whenever a form is made, also one whose module is loaded already, to
+    find a file whose name it knows."""
     jit = sys.modules.get("ffcx.codegeneration.jit")
     if jit is None:
         return
@@ -190,6 +209,35 @@ def _load_forms_once() -> None:
         return found
 
     jit.get_cached_module = once  # type: ignore[attr-defined]
+    known_file = SimpleNamespace(**vars(importlib.machinery) | {"FileFinder": _known_file})
+    jit.importlib = SimpleNamespace(**vars(importlib) | {"machinery": known_file})  # type: ignore[attr-defined]
+    _do_not_print_options(sys.modules["ffcx"])
+
+
+def _do_not_print_options(ffcx: Any) -> None:
+    """FFCx of DOLFINx 0.5 merges its options twice for every form, and formats them for a log that nobody reads."""
+    if not hasattr(ffcx, "get_parameters"):
+        return
+    merge, known = ffcx.get_parameters, dict[str, dict[str, Any]]()
+
+    def once(priority: dict[str, Any] | None = None) -> dict[str, Any]:
+        key = repr(priority or {})
+        if key not in known:
+            known[key] = merge(priority)
+        return dict(known[key])
+
+    ffcx.get_parameters = ffcx.parameters.get_parameters = once
+
+
+def _known_file(folder: str, kind: tuple[Any, list[str]]) -> SimpleNamespace:
+    """What FFCx asks of importlib.machinery.FileFinder, without a list of the folder."""
+    def find_spec(name: str) -> Any:
+        loader, ends = kind
+        paths = (os.path.join(folder, name + end) for end in ends)
+        path = next((path for path in paths if os.path.exists(path)), None)
+        return path and importlib.util.spec_from_file_location(name, path, loader=loader(name, path))
+
+    return SimpleNamespace(find_spec=find_spec, invalidate_caches=lambda: None)
 
 
 @pytest.hookimpl(hookwrapper=True)

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# bash tests/lint.sh     ruff and mypy in the versions of install/lint-requirements.txt, from PyPI, in .venv/lint
+# bash tests/lint.sh     runs ruff and mypy in the versions of install/lint-requirements.txt, from PyPI, in .venv/lint
 set -uo pipefail
 tests=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 . "$tests/../install/setup.sh"
@@ -18,7 +18,7 @@ install_checkers() {
     $venv/bin/pip install --target $venv/lib/python3*/site-packages $numpy
 }
 if [ "$(cat $venv/installed 2>/dev/null)" != "$wanted" ] || ! $venv/bin/python -c "" 2>/dev/null; then
-  echo "vi_contact: installing ruff and mypy into $venv (once)…" >&2
+  echo "vi_contact: installing ruff and mypy into $venv. This is done once." >&2
   said=$(install_checkers 2>&1) || vi_fail "could not install ruff and mypy (offline?): $(tail -n 1 <<<"$said")"
   echo "$wanted" >$venv/installed
 fi

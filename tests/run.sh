@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# bash tests/run.sh [--quick] [arguments of pytest…]     the whole suite on 1, 2 and 3 ranks; installs what is missing on Debian
-#   --quick                     one rank, without tests/validation and the tests marked slow: about a minute
-#   VI_CONTACT_RANKS="1 2"      other numbers of ranks
+# bash tests/run.sh [--quick] [arguments of pytest…]     runs the whole suite on 1, 2 and 3 ranks; installs what is missing on Debian
+#   --quick                     runs on one rank, without tests/validation and without slow tests: about a minute
+#   VI_CONTACT_RANKS="1 2"      runs on these numbers of ranks
 #   VI_CONTACT_TIMES=FILE       appends "ranks seconds file" for every test file
-#   VI_CONTACT_TIMEOUT=1800     seconds for all of them together; without it only single tests have a limit (tests/conftest.py)
+#   VI_CONTACT_TIMEOUT=1800     limits the seconds of all runs together; without it only single tests have a limit (tests/conftest.py)
 # Last line: "N passed, N failed, N skipped", summed over the runs.
 set -uo pipefail
 tests=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 from demo_runs import ROOT, demo
+from kept_figures import keep_figures
 
+from demos.pictures import beam_statements as pictures
 from demos.problems.beam_statements import FACTORS, HEAD, Row, row, turning_points
 
 pytestmark = pytest.mark.serial
@@ -69,3 +72,13 @@ def test_the_demo(capsys: pytest.CaptureFixture[str]) -> None:
              "statement_2", "factors")
     assert all(name in one for one in told for name in names) and len(told) == 6
     assert not any(one["statement_1"] and one["statement_2"] for one in told)
+
+
+def test_the_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both panels have labels; a line and a bar for each row."""
+    seen = keep_figures(monkeypatch, pictures)
+    rows = [Row(name, a2, (1, 1, 2, 3), (1, 2, 2, 2), 1e5, 1.0, 10.0 * a2) for a2 in (0.001, 2.0) for name in "ABC"]
+    pictures.plot_statements(rows, tmp_path / "statements.png")
+    swings, losses = seen[0].axes
+    assert all("[" in axis.get_xlabel() and "[" in axis.get_ylabel() for axis in (swings, losses))
+    assert len(swings.lines) == len(losses.patches) == 6 and (tmp_path / "statements.png").is_file()

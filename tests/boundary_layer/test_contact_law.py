@@ -282,6 +282,7 @@ def test_wall_tends_to_the_exact_inequality(comm):
     assert errors[1] < 0.65 * errors[0]
 
 
+@pytest.mark.serial
 @pytest.mark.slow
 def test_two_stiff_blocks(comm):
     """A layer between two bodies: with the reduced mass they part with e, and keep their momentum."""

@@ -180,3 +180,21 @@ def test_the_table_is_true():
 def test_a_false_row_is_found():
     assert not mentions("core/test_algebra.py", "soil.free_field")
     assert mentions("soil/test_free_field.py", "soil.free_field")
+
+
+def marks(test: ast.FunctionDef) -> set[str]:
+    """Names of the marks that a test has for all its parameters."""
+    return {one.attr for one in test.decorator_list if isinstance(one, ast.Attribute)}
+
+
+def test_a_file_with_tests_for_two_ranks_has_one_for_three():
+    """What is left out on three ranks stands beside a test of the same feature that is not."""
+    lone = []
+    for path in TESTS.glob("*/test_*.py"):
+        text = path.read_text(encoding="utf-8")
+        if "pytest.mark.two_ranks" in text:
+            tests = [one for one in ast.parse(text).body
+                     if isinstance(one, ast.FunctionDef) and one.name.startswith("test_")]
+            if all(marks(one) & {"serial", "slow", "two_ranks"} for one in tests):
+                lone.append(path.name)
+    assert not lone

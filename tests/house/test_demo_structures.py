@@ -14,6 +14,7 @@ from demos.exact.structures import DiskOnGround, LiftedBeam, disk_on_ground, squ
 from demos.problems.structures import plate_on_a_stop, residual
 
 
+@pytest.mark.serial
 def test_closed_forms() -> None:
     """Tables of the plate (Timoshenko, Woinowsky-Krieger: 0.00406, 0.01160); what holds where disk and beam touch."""
     assert square_plate() == pytest.approx((0.0040624, 0.0116008), abs=5e-8)
@@ -39,6 +40,7 @@ def test_a_plate_on_any_number_of_ranks(comm: Any) -> None:
     assert comm.allreduce(float(state.r_n.sum())) == pytest.approx(1.015565381173 * exact, rel=1e-9)
 
 
+@pytest.mark.serial
 @pytest.mark.slow
 def test_the_demo_of_structures(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Forces, lift-off, contact radius and times of touch beside closed forms; certificates, routes and ledgers."""

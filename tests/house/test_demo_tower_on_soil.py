@@ -8,6 +8,7 @@ import pytest
 from demo_runs import demo
 
 
+@pytest.mark.serial
 @pytest.mark.slow
 def test_the_tower_on_soil_demo(comm, shared_tmp, capsys):
     """Amplified by the soil, lifted off, certified; the base moves neither like the outcrop nor like half of it."""

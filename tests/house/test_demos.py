@@ -64,8 +64,11 @@ def test_the_wall_demo(comm: Any, shared_tmp: Path) -> None:
     assert numbers["frequency"] == pytest.approx(13.9983, abs=5e-5)
     assert numbers["dt"] == pytest.approx(1.785929e-3, abs=5e-10)
     assert numbers["decomposition"] < 1e-13  # u = u_1 + u_2, eq. (36)
-    for name in ("data.png", "decomposition.png"):
+    for name in ("data.png", "decomposition.png", "frames.png"):
         assert comm.rank or (shared_tmp / name).stat().st_size > 20_000
+    for page in ("README.md", "docs/index.md"):  # whose first picture is frames.png
+        told = f"displacements drawn {numbers.get('magnified', 0.0):g} times larger"
+        assert comm.rank or told in " ".join((ROOT / page).read_text(encoding="utf-8").split()), page
     for case, expected in {"a": (-58.38955, -1.74828, -9.18182), "b": (-58.38955, -1.74828, 0.0)}.items():
         assert 0.0 < numbers[f"{case}_certificate"] <= 1e-9
         assert 0.0 < numbers[f"{case}_cross_check"] <= 1e-9
@@ -194,11 +197,11 @@ def test_the_bouncing_bar_demo(comm: Any, shared_tmp: Path, capsys: pytest.Captu
         energy = numbers[f"{prefix}: energy at the end"]
         assert (energy > 2.0) if "do not use" in prefix else (0.85 < energy <= 1.0 + 1e-9), (prefix, energy)
     assert (shared_tmp / "bouncing_bar.png").stat().st_size > 10_000
+    assert len([path for path in shared_tmp.iterdir() if path.is_dir()]) == 9  # each run has a folder of its own
     assert comm.rank or "trapezoidal, redistributed mass (default)" in capsys.readouterr().out
 
 
 @pytest.mark.slow
-@pytest.mark.serial
 def test_the_hertz_impact_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """V3.3 with 4 cells in the contact radius: within 5 % of the theory, certified, rebound with full speed."""
     numbers = demo("hertz_impact").main(quick=True, out=shared_tmp, progress=False)

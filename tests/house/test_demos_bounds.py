@@ -54,6 +54,7 @@ def test_torsion(comm: Any, shared_tmp: Path) -> None:
     assert comm.rank or drawn(shared_tmp / "torsion.png")
 
 
+@pytest.mark.serial
 def test_the_bar_that_cracks(comm: Any, shared_tmp: Path) -> None:
     """Homogeneous: the closed form, unloading too. Broken: elastic energy is gone, the crack costs Gc (1 + h / (2 l))
     and damage before it does not heal."""

@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 
@@ -75,14 +76,14 @@ def test_other_examples_run_on_its_problem(tmp_path: Path) -> None:
     ready = code[: code.index("solution = ")]
     samples = "\n".join(f"{0.3 * (-1) ** k:.3f}" for k in range(50))
     (tmp_path / "elcentro.at2").write_text(f"A motion\nunits of g\nNPTS= 50, DT= .02000 SEC\n{samples}")
-    examples = [blocks(ROOT / "docs" / "guide" / name, "python") for name in ("records.md", "solvers.md")]
-    together([ready + example for (example,) in examples], tmp_path)
+    examples = [blocks(ROOT / "docs" / "guide" / name, "python")[-1] for name in ("records.md", "solvers.md")]
+    together([ready + example for example in examples], tmp_path)
 
 
 @pytest.mark.slow
 def test_programs_print_what_their_pages_say(tmp_path: Path) -> None:
-    """Soil in space, bounds, and all snippets of bring_your_own as one program; before DOLFINx 0.7 with the names that
-    spaces have there."""
+    """Soil in space, bounds, questions, and all snippets of bring_your_own as one program; before DOLFINx 0.7 with the
+    names that spaces have there."""
     from vi_contact.fem import compat
 
     soil, bounds, own = (ROOT / "docs" / "guide" / f"{name}.md" for name in ("soil", "bounds", "bring_your_own"))
@@ -90,8 +91,9 @@ def test_programs_print_what_their_pages_say(tmp_path: Path) -> None:
     if compat.VERSION < (0, 7):
         code = code.replace('functionspace(mesh, ("Lagrange", 1, (2,)))', 'VectorFunctionSpace(mesh, ("Lagrange", 1))')
         code = code.replace("fem.functionspace(", "fem.FunctionSpace(")
-    found = together([blocks(soil, "python")[-1], *blocks(bounds, "python"), code], tmp_path)
-    assert found == [text for page in (soil, bounds, own) for text in blocks(page, "text")]
+    faq = ROOT / "docs" / "reference" / "faq.md"
+    found = together([blocks(soil, "python")[-1], *blocks(bounds, "python"), *blocks(faq, "python"), code], tmp_path)
+    assert found == [text for page in (soil, bounds, faq, own) for text in blocks(page, "text")]
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
@@ -102,10 +104,14 @@ def test_commands_exist(document: Path) -> None:
         subprocess.run(["bash", "-n", str(ROOT / script)], check=True)
     for demo in set(re.findall(r"\bdemos/run\.sh (?:-n \d+ )?([a-z]\w*)", text)):
         assert (ROOT / "demos" / f"{demo}.py").is_file(), demo
-    for script in set(re.findall(r"\bpython3 ((?:meshes|demos|benchmarks)/[\w./]+\.py)", text)):
+    for script in set(re.findall(r"\bpython3 ((?:meshes|demos|benchmarks|docs)/[\w./]+\.py)", text)):
         assert (ROOT / script).is_file(), script
+    for wanted in set(re.findall(r"\btests/run\.sh -k (test_\w+)", text)):
+        assert any(f"{wanted}(" in file.read_text(encoding="utf-8") or wanted == file.stem
+                   for file in (ROOT / "tests").rglob("test_*.py")), wanted
 
 
+commands = cache(parser)  # read only
 COMMAND = r"\b(vi-contact|demos/run\.sh(?: -n \d+)? (?:wall|channel)(?= --)) ((?:\\\n|[^`\n#])+)"
 
 
@@ -114,7 +120,7 @@ def test_options_exist(document: Path) -> None:
     """Every option that a document gives to a command is one of its parser."""
     for start, line in re.findall(COMMAND, document.read_text(encoding="utf-8")):
         demo = start != "vi-contact"  # it takes the options of run, and one of its own
-        words, command = ["run"] * demo + line.split(), parser()
+        words, command = ["run"] * demo + line.split(), commands()
         for word in words:
             below = next((one for one in command._actions if isinstance(one, argparse._SubParsersAction)), None)
             if below is None or word not in below.choices:
@@ -147,10 +153,15 @@ def test_relative_links_resolve(document: Path) -> None:
         assert not anchor or anchor in anchors(there), target
 
 
-def test_every_document_is_linked_from_readme() -> None:
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    missing = [path.name for path in DOCUMENTS if path.name != "README.md" and f"{path.relative_to(ROOT)})" not in text]
-    assert missing == []
+def test_every_document_is_reached_from_readme() -> None:
+    """By links of pages, one after the other; what only the changelog links to is not reached."""
+    reached, waiting = set(), [ROOT / "README.md"]
+    while waiting:
+        reached.add(page := waiting.pop())
+        if page.name != "CHANGELOG.md":
+            found = re.findall(r"\]\(([^)\s#:]+\.md)(?:#[^)\s]*)?\)", page.read_text(encoding="utf-8"))
+            waiting += {(page.parent / target).resolve() for target in found} - reached
+    assert [str(page.relative_to(ROOT)) for page in DOCUMENTS if page not in reached] == []
 
 
 def test_figures_are_small_and_used() -> None:
@@ -183,7 +194,7 @@ ROOMS = ["core", "fem", "solvers", "schemes", "soil", "engineering", "ground_mot
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_names_are_public(document: Path) -> None:
     """Every ``vc.name`` and ``room.name`` that a document writes; the files that it names are there."""
-    if document.name in ("CHANGELOG.md", "extend.md"):  # old names; names that its reader adds, run by test_extend
+    if document.name in ("CHANGELOG.md", "upgrade.md", "extend.md"):  # old names; its reader's: test_extend
         return
     text = re.sub(r"--set \S+", "", document.read_text(encoding="utf-8"))  # keys of a case: others check them
     unknown = set(re.findall(r"\bvc\.(\w+)", text)) - set(vi_contact.__all__)
@@ -205,7 +216,8 @@ REGISTERS = {"verification.md", "sources.md", "petsc.md"}  # these explain the n
 def test_nothing_is_cited_by_a_private_name(document: Path) -> None:
     """Author, year and title instead."""
     if document.name not in REGISTERS:
-        assert not re.findall(f".*(?:{CIPHERS}).*", document.read_text(encoding="utf-8"))
+        lines = document.read_text(encoding="utf-8").splitlines()
+        assert [line for line in lines if re.search(CIPHERS, line)] == []
 
 
 def test_import_alone_is_quick() -> None:
@@ -227,8 +239,23 @@ def test_every_cited_id_is_explained(document: str) -> None:
     assert set(re.findall(IDS[document], text)) - set(re.findall(IDS[document], explained)) == set()
 
 
+def test_supported_versions_are_the_same_everywhere() -> None:
+    """README's table, that of install.md and that of releases.md, which gives the first numbers only."""
+    pages = [ROOT / "README.md", ROOT / "docs" / "start" / "install.md", ROOT / "docs" / "reference" / "releases.md"]
+    readme, install, releases = (page.read_text(encoding="utf-8") for page in pages)
+    named = re.findall(r"^\| (?:12|13|sid) \| (\S+) \| (\S+) \| (\S+) \|", releases, re.MULTILINE)
+    rows = ("DOLFINx", "PETSc, petsc4py (real numbers)", "Python")
+    for what, column in zip(rows, zip(*named, strict=True), strict=True):
+        for text in (readme, install):
+            (row,) = re.findall(rf"^\| {re.escape(what)} \| (.*) \|$", text, re.MULTILINE)
+            assert [".".join(one.split(".")[:2]) for one in row.split(" | ")] == list(column), what
+
+
 def test_version_is_the_same_everywhere() -> None:
     version = vi_contact.__version__
     assert re.search(rf'^version = "{re.escape(version)}"$', (ROOT / "pyproject.toml").read_text(), re.MULTILINE)
     assert re.search(rf"^version: {re.escape(version)}$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)
-    assert re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)[1] == version
+    newest = re.search(r"^## (\S+) \((\S+)\)$", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
+    assert newest and newest[1] == version and f'date-released: "{newest[2]}"' in (ROOT / "CITATION.cff").read_text()
+    for page in ("README.md", "docs/index.md", "docs/reference/releases.md", "SECURITY.md"):
+        assert re.search(rf"\b{re.escape(version)}\b", (ROOT / page).read_text(encoding="utf-8")), page

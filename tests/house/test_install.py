@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import ast
 import os
+import shutil
 import subprocess
 import sys
 import tomllib
 from fnmatch import fnmatch
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -158,3 +160,34 @@ print(os.environ["CONDA_PREFIX"], sum(os.environ["CONDA_PREFIX"] in one for one 
     build = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["build-system"]
     assert build["build-backend"] == "setuptools.build_meta" and "backend-path" not in build
     assert not (ROOT / "setup.py").exists() and not (ROOT / "setup.cfg").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.serial
+def test_pip_installs_the_command(tmp_path: Path) -> None:
+    """The commands of docs/start/install.md, without a package index: the virtual environment beside the system's
+    packages, and in it the command, which runs the case that ships."""
+    needed = (ROOT / "pyproject.toml").read_text(encoding="utf-8").partition('"setuptools>=')[2].partition('"')[0]
+    setuptools = pytest.importorskip("setuptools")
+    if int(setuptools.__version__.split(".")[0]) < int(needed) or not (
+            find_spec("packaging") and find_spec("packaging.licenses")):
+        pytest.skip(f"setuptools {setuptools.__version__} is older than {needed}, or packaging older than it needs")
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, tmp_path)
+    shutil.copytree(ROOT / "vi_contact", tmp_path / "vi_contact", ignore=shutil.ignore_patterns("__pycache__"))
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    for command in (
+        f"{sys.executable} -m venv --system-site-packages venv",
+        "venv/bin/pip install --quiet --no-deps --no-build-isolation --no-index .",
+        "venv/bin/vi-contact --version",
+        "venv/bin/vi-contact run wall --steps 2 --quiet",
+    ):
+        done = subprocess.run(command.split(), cwd=tmp_path, capture_output=True, encoding="utf-8", check=False,
+                              env=environment | {"PIP_DISABLE_PIP_VERSION_CHECK": "1"}, timeout=300)
+        assert done.returncode == 0, f"{command}\n{done.stderr}"
+    assert done.stdout.startswith("A concrete wall") and (tmp_path / "results" / "wall" / "history.csv").is_file()
+    (installed,) = (tmp_path / "venv" / "lib").glob("python3.*/site-packages/vi_contact")
+    files = {path.relative_to(ROOT).as_posix() for path in (ROOT / "vi_contact").rglob("*")
+             if path.is_file() and "__pycache__" not in path.parts}
+    assert files == {f"vi_contact/{path.relative_to(installed).as_posix()}" for path in installed.rglob("*")
+                     if path.is_file() and "__pycache__" not in path.parts}

@@ -1,4 +1,5 @@
-"""Pictures of few pixels, drawn once: matplotlib arranges a picture by drawing it a second time, and pixels take time.
+"""Pictures of few pixels, drawn once: matplotlib arranges a picture by drawing it a second time, labels and titles by
+measuring every number on the axes, and pixels take time.
 
 How they are arranged is seen in tests/plots, which draws them as users do, and in docs/figures.
 """
@@ -6,7 +7,7 @@ How they are arranged is seen in tests/plots, which draws them as users do, and 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any
 from unittest.mock import patch
 
@@ -15,8 +16,11 @@ DPI = 50
 
 @contextmanager
 def plain_pictures() -> Iterator[None]:
-    """Let figures have no layout engine, and files of them 50 dots per inch."""
+    """Let figures have no layout engine, labels and titles stay where they begin, and files have 50 dots per inch
+    and all of the canvas."""
     try:
+        from matplotlib.axes import Axes
+        from matplotlib.axis import Axis
         from matplotlib.figure import Figure
     except ImportError:
         yield
@@ -25,7 +29,15 @@ def plain_pictures() -> Iterator[None]:
 
     def saved(figure: Any, *target: Any, **more: Any) -> Any:
         film = more.get("format") == "rgba"  # its writer says how many pixels a frame has
-        return save(figure, *target, **(more if film else more | {"dpi": DPI}))
+        return save(figure, *target, **(more if film else more | {"dpi": DPI, "bbox_inches": None}))
 
-    with patch.object(Figure, "get_layout_engine", lambda figure: None), patch.object(Figure, "savefig", saved):
+    with ExitStack() as stack:
+        for owner, name, new in (
+            (Figure, "get_layout_engine", lambda figure: None), (Figure, "savefig", saved),
+            (Figure, "align_ylabels", lambda figure, axes=None: None),
+            (Axes, "_update_title_position", lambda axes, renderer: None),
+            (Axis, "_update_label_position", lambda axis, renderer: None),
+        ):
+            if hasattr(owner, name):  # matplotlib may rename what is its own
+                stack.enter_context(patch.object(owner, name, new))
         yield

@@ -10,6 +10,10 @@ import pytest
 
 from vi_contact.plots.web_page import can_write
 
+CHROMIUM_FLAGS = (
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+)
 ROOT = Path(__file__).resolve().parents[2]
 
 

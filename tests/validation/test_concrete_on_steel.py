@@ -38,8 +38,9 @@ def pressed(box: Square, law: str, scheme: Any, *, dt: float, t_end: float) -> M
     return {**history, "energy": history["energy_kinetic"] + history["energy_strain"]}
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("scheme", [vc.Midpoint(), pytest.param(None, marks=pytest.mark.serial)])
+@pytest.mark.parametrize("scheme", [vc.Midpoint(), None])
 def test_energies(scheme, law):
     """V7.2, 20 x 20 cells, dt = 0.05 ms: energies to all five digits with the midpoint rule, to 1e-4 with the default
     scheme; on steel the base sticks everywhere."""

@@ -99,6 +99,7 @@ def test_v2_1_flat_side(simplices, d, solver):
     assert surface.total == np.prod([n + 1 for i, n in enumerate(divisions) if i != 1]) and state.active.all()
 
 
+@pytest.mark.serial
 @solvers
 @dimensions
 @shapes
@@ -192,6 +193,7 @@ def test_v2_1_curved_side(simplices, d, solver):
         assert relative(found, P * areas) < 1e-12
 
 
+@pytest.mark.serial
 @dimensions
 @shapes
 def test_v2_1_forces_of_the_curved_side(simplices, d):

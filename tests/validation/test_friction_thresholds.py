@@ -88,6 +88,7 @@ def test_v2_7_below_the_threshold_sticks(body, law):
     assert np.abs(back - exact).max() < 1e-8 * np.abs(exact).max()
 
 
+@pytest.mark.serial
 @laws
 @bodies
 def test_v2_7_above_the_threshold_has_no_equilibrium(body, law):
@@ -100,6 +101,7 @@ def test_v2_7_above_the_threshold_has_no_equilibrium(body, law):
     assert way[:2] / np.linalg.norm(way) == pytest.approx([np.cos(angle), np.sin(angle)], abs=0.01)
 
 
+@pytest.mark.serial
 @laws
 def test_v2_7_load_steps_end_where_the_threshold_is(law):
     """Ten steps from 0.91 to 1.0 less 1e-6 of the threshold are equilibria, one with 1e-6 too much is not."""
@@ -113,6 +115,7 @@ def test_v2_7_load_steps_end_where_the_threshold_is(law):
         next(stages)
 
 
+@pytest.mark.serial
 @laws
 @pytest.mark.parametrize("share", [0.99, 1.01])
 def test_v2_7_with_lateral_contraction(law, share):

@@ -89,6 +89,7 @@ def test_v2_3_pressure_converges_with_h(simplices):
     assert np.all(orders(errors) > 0.9) and (simplices or np.all(orders(errors) < 1.1))
 
 
+@pytest.mark.serial
 def test_v2_3_does_not_depend_on_units():
     """The two data sets are one problem: p / p0 at x / a agree to 1e-9, nine orders of magnitude apart in pressure."""
     one, unit = (computed(name, per_a=11.3)[:2] for name in ("NAFEMS", "unit"))

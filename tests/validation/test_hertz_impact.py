@@ -127,6 +127,7 @@ def test_v3_3_converges(coarse: Impact, fine: Impact) -> None:
         assert found.errors["approach"] < 0.0 < found.errors["force"] and found.errors["duration"] < 0.0
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("mesh", ["coarse", pytest.param("fine", marks=FINE)])
 def test_v3_3_balances(mesh: str, request: pytest.FixtureRequest) -> None:
     """It rebounds with 0.1 m/s within 1e-3 (measured 2e-5: hardly any vibration is left, the pulse is long); the
@@ -167,6 +168,7 @@ def test_v3_3_course_of_the_theory() -> None:
     assert not np.any(hertz_motion(exact, [-1.0, 2.0 * exact.duration])[1])
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("friction", [None, Coulomb(0.3)])
 @pytest.mark.parametrize("obstacle", [HalfSpace(point=(0.0, 0.0, 0.0), normal=(0.0, 1.0, 0.0)), Touching()],
                          ids=["plane", "oblique"])
@@ -194,6 +196,7 @@ def test_inertia_of_the_ball_is_kept(obstacle: object, friction: Coulomb | None)
     assert moved.equations.kinetic_energy(massless * v) == 0.0
 
 
+@pytest.mark.serial
 def test_ball_refuses_what_makes_no_impact() -> None:
     """A sentence each."""
     with pytest.raises(InputError, match="2 cells in the contact radius"):

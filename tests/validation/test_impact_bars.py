@@ -68,9 +68,9 @@ def follow(bar: Bar, courant: float, t_end: float, *, scheme: Any = None, mass: 
 
 
 @pytest.mark.parametrize("body, courant", [
-    *((body, 1.0) for body in BODIES),
-    *(pytest.param(body, courant, marks=pytest.mark.serial)
-      for body, courant in (("bar", 0.1), ("strip", 0.5), ("triangles", 0.5))),
+    ("strip", 1.0),
+    *(pytest.param(body, courant, marks=pytest.mark.serial)  # one body on two ranks: the others have the same path
+      for body, courant in (("bar", 1.0), ("triangles", 1.0), ("bar", 0.1), ("strip", 0.5), ("triangles", 0.5))),
 ])
 def test_thrown_bar(body: str, courant: float) -> None:
     """V1.1: force within 1 % of 300 in the window, contact 2/3 s ± 2 dt, mean rebound 10 ± 2 %, energy within 1 %."""

@@ -54,6 +54,7 @@ def test_v2_5_flat_punch():
     assert np.all(result.r_n[under] > 0.0) and not result.r_n[~under].any()
 
 
+@pytest.mark.serial
 def test_v2_5_singularity_converges_with_the_root_of_h():
     """The force of the edge node is O(√h), the integral of the singular pressure over its cell; the slope, freed of the
     smooth factor √(a + x), goes to -1/2 from above."""

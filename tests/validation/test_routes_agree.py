@@ -95,6 +95,7 @@ def busiest_step(problem: ContactProblem, dt: float, steps: int) -> StepProblem:
     return found
 
 
+@pytest.mark.serial
 @pytest.mark.slow
 @many_routes
 def test_warm_start_at_the_solution_costs_nothing(name):
@@ -114,6 +115,7 @@ def test_warm_start_at_the_solution_costs_nothing(name):
         assert max_over_ranks(COMM, again.x - first.x) < 1e-13 * max_over_ranks(COMM, first.x)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("solver", [Condensed(), Volume(method=ReducedNewton())])
 def test_bilateral_points_by_both_routes(solver):
     """Held points: u_n = 0 all along, reactions of both signs, the same by every route."""
@@ -125,6 +127,7 @@ def test_bilateral_points_by_both_routes(solver):
     assert checked.worst < 1e-9
 
 
+@pytest.mark.serial
 def test_stiff_springs_tend_to_the_rigid_wall():
     """Ground of 1e13 to 1e15 Pa/m under the shaken wall, without impact law: the distance to the rigid ground's motion
     falls as 1/k. (Points on springs have no impacts: the law is for rigid supports.)"""
@@ -156,6 +159,7 @@ def same(found: Run, other: Run, *, u: Any = None, r_n: float = 1.0, digits: flo
     assert max(found.certificate.max(), other.certificate.max()) < 1e-11
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("angle", [pi / 6.0, pi / 2.0, -2.0])
 def test_turned_wall_moves_like_the_straight_one(angle):
     """Mesh, ground, contact directions and shaking turned together: the same motion, turned, to 1e-9."""
@@ -163,6 +167,7 @@ def test_turned_wall_moves_like_the_straight_one(angle):
     same(found, reference("quadrilaterals"), u=lambda u: turned(u, -angle))
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("simplices", [False, True])
 def test_inclined_box_moves_like_the_level_one(simplices):
     """The same in three dimensions, with gravity and the throw turned about the z axis."""
@@ -192,6 +197,7 @@ def test_the_number_of_ranks_does_not_matter(name):
     same(reference(name), reference(name, alone=True), digits=1e-10)
 
 
+@pytest.mark.serial
 def test_listed_points_may_come_in_any_order():
     """The conditions are numbered as the points are listed; the motion is the same."""
     heights = [3.0, 6.0, 9.0]

@@ -66,6 +66,7 @@ CASES = {
 }
 
 
+@one_rank
 @pytest.mark.parametrize("case", CASES)
 def test_v4_1_displacements(case):
     """u12 at six steps, minima and maxima of u12, u6, u7, u26 [1e-6 m]; a printed 0 is exactly 0."""
@@ -81,6 +82,7 @@ def test_v4_1_displacements(case):
     assert found.certificate < 1e-12
 
 
+@one_rank
 def test_v4_1_bilateral():
     """Statement 7: held on the ground, the contact side does not move at all; the opposite side does."""
     found = history("bilateral")
@@ -90,6 +92,7 @@ def test_v4_1_bilateral():
     assert 1e6 * found.u[:, 3].max() == printed("2.108")
 
 
+@one_rank
 def test_v4_1_frequency_and_time_step():
     """f1 of the clamped wall, f = f1/2 and dt = 1/(40 f), for rho = 2400 and for 240 kg/m³."""
     one = model()
@@ -100,6 +103,7 @@ def test_v4_1_frequency_and_time_step():
     assert lowest_frequency(model(light).system) == printed("88.533")
 
 
+@one_rank
 @pytest.mark.parametrize(
     "case, count, eigenvalues",
     [("a", 3, "2.15713256e9 2.35809399e9 2.57581072e9"), ("b", 11, "8.41545514e8 4.00791403e9")],
@@ -119,6 +123,7 @@ LEDGERS = {
 }
 
 
+@one_rank
 @pytest.mark.parametrize("case", LEDGERS)
 def test_v4_1_energy_ledger(case):
     """Input work = reset loss + contact work of the steps + energy at the end [J], closed to round-off (V9.7)."""
@@ -184,6 +189,7 @@ def test_statement_8_hildreth_needs_few_sweeps(case, primal):
 
 # V4.0: three forms of one problem -------------------------------------------------------------------------------------
 
+@one_rank
 @pytest.mark.parametrize("case", ["a", "b"])
 def test_v4_0_condensed_matrix_is_the_schur_complement(case):
     """D~ = K_cc - K_ci K_ii^-1 K_ic of the dense effective matrix, symmetric to 1e-12 and positive definite.
@@ -211,6 +217,7 @@ def test_v4_0_condensed_matrix_is_the_schur_complement(case):
     assert np.abs(found - z).max() < 1e-11 * np.abs(z).max()
 
 
+@one_rank
 @pytest.mark.parametrize("case", ["a", "b"])
 def test_v4_0_primal_dual_and_active_set_agree(case):
     """(46, 49), (42) and the active set give the same (u_N, S_N) to 1e-10 at every step."""
@@ -222,6 +229,7 @@ def test_v4_0_primal_dual_and_active_set_agree(case):
 
 # The statements about Figs. 4 and 5 -----------------------------------------------------------------------------------
 
+@one_rank
 @pytest.mark.parametrize("case", ["a", "b"])
 def test_statement_1_linear_before_first_contact(case):
     """Up to the first contact, at or after step 20, all cases are the linear run."""
@@ -232,6 +240,7 @@ def test_statement_1_linear_before_first_contact(case):
     assert np.abs(found.u[first] - free.u[first]).max() > 1e-3 * np.abs(free.u).max()
 
 
+@one_rank
 @pytest.mark.parametrize("case", ["a", "b"])
 def test_statement_2_contact_points_never_penetrate(case):
     """u_n <= 0 without exception; in case a the points between and above the three contacts do pass the line."""
@@ -241,6 +250,7 @@ def test_statement_2_contact_points_never_penetrate(case):
         assert 1e6 * found.u[:, 0].max() > 20.0 and 1e6 * found.u[:, 1].max() > 9.0
 
 
+@one_rank
 def test_statements_3_and_4_cases_differ():
     """Case b: the whole side is one-sided, point 26 moves to +9. Peaks to the right: 22.4 against 0; left: alike."""
     a, b = history("a").u * 1e6, history("b").u * 1e6
@@ -250,6 +260,7 @@ def test_statements_3_and_4_cases_differ():
     assert 0.8 < b[:, 0].min() / a[:, 0].min() < 1.0
 
 
+@one_rank
 @pytest.mark.parametrize("projection", [False, True])
 def test_statement_5_energy_is_lost_in_contact_only(projection):
     """Undamped and no longer shaken: constant in free flight to 1e-12, lost in contact. The M-orthogonal reset and the
@@ -272,6 +283,7 @@ def test_statement_5_energy_is_lost_in_contact_only(projection):
         assert change.max() < 1e-12 * before[0]
 
 
+@one_rank
 @pytest.mark.parametrize("case", ["a", "b"])
 def test_statement_6_positive_homogeneity(case):
     """2.5 times the ground acceleration gives 2.5 times every displacement and the same contact sets."""

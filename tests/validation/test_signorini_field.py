@@ -135,6 +135,7 @@ def test_v2_2_rates(simplices):
     assert orders([error.l2 for error in found]).mean() == pytest.approx(2.0, abs=0.15)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("n", [8, 16, 32, pytest.param(64, marks=one_rank)])
 @pytest.mark.parametrize("simplices", [False, True])
 def test_v2_2_contact_set_ends_within_one_element(n, simplices):
@@ -147,6 +148,7 @@ def test_v2_2_contact_set_ends_within_one_element(n, simplices):
     assert surface.everywhere(surface.normal_values(state.u)).max() == 0.0 and state.r_n.min() == 0.0
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("n", [8, 16])
 def test_v2_2_total_reaction(n):
     """The contact force is the integral of the exact pressure, (2/3) a (1 + x0)^(3/2), up to the clamped corner's half

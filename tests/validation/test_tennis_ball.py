@@ -23,11 +23,10 @@ pytestmark = pytest.mark.slow
 
 LAWS = {"none": vc.Frictionless(), "coulomb": vc.Coulomb(2.0), "tresca": vc.Tresca(2.0)}
 SCHEMES: dict[str, Any] = {"midpoint": vc.Midpoint(), "default": None}
-one_rank = pytest.mark.serial  # whole marches, slow on several ranks: these have two of the runs
-SEVERAL = {("midpoint", "coulomb"), ("default", "none")}
+one_rank = pytest.mark.serial  # whole marches, slow on several ranks: these have one of the runs
 every_run = pytest.mark.parametrize(
     ("scheme", "law"),
-    [pytest.param(*run, marks=() if run in SEVERAL else one_rank) for run in product(SCHEMES, LAWS)],
+    [pytest.param(*run, marks=() if run == ("default", "none") else one_rank) for run in product(SCHEMES, LAWS)],
 )
 
 
@@ -73,6 +72,7 @@ def test_flight(scheme, law):
         assert history["traction_t"][flight].any() == (law == "tresca")
 
 
+@pytest.mark.serial
 @every_run
 def test_momentum_and_energy_have_their_sources(scheme, law):
     """V7.3: momentum is the impulse of the contact forces, to 1e-10; none sideways, none angular. The energy is the
@@ -132,6 +132,7 @@ def test_faster_push_gives_more_to_a_disk_that_sticks(scheme):
     assert rubbed["energy"][-1] / free["energy"][-1] == pytest.approx(1.0035, abs=1e-3)
 
 
+@pytest.mark.serial
 def test_gap_of_the_moving_plane():
     """V7.3: g(x, t) = R - sqrt(R² - x²) - s(t), vertical, at every point of the foot; s goes up by 0.05
     (1 - cos pi t)/2 and down as it came."""
@@ -161,6 +162,7 @@ def test_disk_mesh():
     assert np.array_equal(mesh.points, again.points) and np.array_equal(mesh.cells, again.cells)
 
 
+@pytest.mark.serial
 def test_bad_input_is_refused():
     for wrong in ({"size": 0.0}, {"size": 0.4}, {"foot": 1.6}, {"foot": 0.01}, {"radius": float("nan")}):
         with pytest.raises(InputError, match="of a disk|disk of radius"):

@@ -19,6 +19,7 @@ COMM = MPI.COMM_WORLD
 BENT = 0.2  # [1/m]: curvature of the curved faces
 
 
+@pytest.mark.serial  # fem/test_thrown_bodies_on_ranks.py has what may depend on ranks
 @pytest.mark.parametrize(("bent", "gap", "friction", "simplices"), [
     (0.0, 0.0, 0.0, False), (0.0, 0.0, 0.4, True), (BENT, 0.0, 0.0, True), (BENT, 0.0, 0.4, False),
     (BENT, 0.02, 0.0, False),

@@ -88,6 +88,7 @@ def collide(case: TwoBars, d: int, courant: float, *, triangles: bool = False, *
 BODIES: dict[str, dict[str, Any]] = {"bars": {"d": 1}, "strips": {"d": 2}, "triangles": {"d": 2, "triangles": True}}
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize(
     ("body", "courant"),
     [("bars", 1.0), ("bars", 0.5), pytest.param("bars", 0.1, marks=pytest.mark.serial), ("strips", 0.5),
@@ -120,6 +121,7 @@ def test_v1_4_other_impedances():
     assert found.velocities == pytest.approx([case.velocity1, case.velocity2], abs=0.01)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("body", BODIES)
 def test_v1_4_contact_stabilised(body):
     """Consistent mass, Courant number 1: pressure at every step within 1.5 %, duration, velocities within 1 %; no step
@@ -205,6 +207,7 @@ routes = pytest.mark.parametrize(("scheme", "mass"), ROUTES, ids=["midpoint", "t
 frictions = pytest.mark.parametrize("friction", [None, Coulomb(0.3)], ids=["smooth", "rough"])
 
 
+@pytest.mark.serial
 @routes
 @frictions
 @pytest.mark.parametrize("d", [2, 3])
@@ -256,6 +259,7 @@ def test_condensed_and_volume_agree(d, scheme, mass):
     assert compared.worst <= 1e-9
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("frictional", [False, True])
 @pytest.mark.parametrize("d", [1, 2, 3])
 def test_redistributed_mass_keeps_the_inertia_of_each_body(d, frictional):
@@ -284,6 +288,7 @@ def test_redistributed_mass_keeps_the_inertia_of_each_body(d, frictional):
     assert np.abs(grams[1][:half, half:]).max() < 1e-12 * np.abs(grams[0]).max()
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("simplices", [False, True], ids=["tensor", "simplices"])
 @pytest.mark.parametrize("d", [2, 3])
 def test_welded_blocks_move_like_one(d, simplices):

@@ -46,8 +46,8 @@ def run(model: WallModel, case: str, name: str, *, refined: int = 1, steps: int 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "case"), [  # on two ranks one of either kind of mass: they solve the same equations
-    pytest.param(name, case, marks=() if name in ("trapezoidal", "zwt", "moreau-jean") else pytest.mark.serial)
+@pytest.mark.parametrize(("name", "case"), [  # on two ranks one: test_on_finite_elements.py has others there
+    pytest.param(name, case, marks=() if name == "zwt" else pytest.mark.serial)
     for name, case in zip(SCHEMES, "ab" * 6, strict=True)
 ])
 def test_every_scheme_is_certified_and_closes_its_ledger(name: str, case: str) -> None:
