@@ -17,7 +17,7 @@ make_tree() {
     command -v debootstrap >/dev/null || { why="debootstrap cannot be installed"; return 1; }
     mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 'Origin: Debian' 'Label: Debian' | head -n 1)
     [ -n "$mirror" ] || { why="the apt sources name no Debian mirror"; return 1; }
-    echo "vi_contact: building a tree of Debian $release (once)…"
+    echo "vi_contact: building a tree of Debian $release. This is done once."
     rm -rf --one-file-system "$tree"
     said=$(timeout 600 debootstrap --variant=minbase --include=ca-certificates,git "$release" "$tree" "$mirror" 2>&1 </dev/null) ||
       { why="debootstrap failed (offline?): $(tail -n 1 <<<"$said")"; return 1; }
@@ -34,7 +34,7 @@ fill_tree() {
   local tree=$1 said
   rm -rf --one-file-system "$tree/srv/vi_contact"
   mkdir -p "$tree/srv/vi_contact"
-  tar -C "$root" --exclude=./.venv --exclude=__pycache__ -cf - . | tar -C "$tree/srv/vi_contact" --no-same-owner -xf -
+  tar -C "$root" --exclude=./.venv --exclude=./build --exclude=__pycache__ -cf - . | tar -C "$tree/srv/vi_contact" --no-same-owner -xf -
   said=$(in_tree "$tree" bash -c '. /srv/vi_contact/install/setup.sh; vi_setup' 2>&1) || { why=$(tail -n 1 <<<"$said"); return 1; }
 }
 
@@ -48,5 +48,7 @@ in_tree() {
   timeout -k 10 "$(left)" unshare --mount --pid --fork --kill-child bash -c '
     mount -t proc proc "$0/proc" && mount --rbind /dev "$0/dev" && mount --rbind /sys "$0/sys" || exit
     mountpoint -q "$0/dev/shm" || { mkdir -p "$0/dev/shm" && mount -t tmpfs tmpfs "$0/dev/shm"; }
+    null=$0/run/null # its own: where root made that of the machine unwritable for others, an ordinary user could start nothing
+    [ -c "$null" ] || mknod -m 666 "$null" c 1 3 2>/dev/null && mount --bind "$null" "$0/dev/null"
     exec chroot "$0" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 CI=true "$@"' "$tree" "$@" </dev/null
 }
