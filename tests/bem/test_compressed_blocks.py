@@ -57,7 +57,7 @@ def both(shape: str, threads: int = 1) -> tuple[EnergeticBlocks, CompressedBlock
 
 def expanded(short: CompressedBlocks) -> EnergeticBlocks:
     """Dense blocks from compressed ones."""
-    matrices = (matrix.real.copy() for matrix in short.combined(np.eye(short.steps)))
+    matrices = (np.array(kind).real for kind in zip(*short.combined(np.eye(short.steps)), strict=True))
     return EnergeticBlocks(short.mesh, short.c_p, short.c_s, short.dt, *matrices)
 
 

@@ -9,7 +9,7 @@ for then the points of the integrals stay where they are (quadrature.py). All st
 of the tail those from which the others are interpolated (tails.py); of symmetric matrices, one half. Blocks are kept
 AHEAD times as long as asked for: the circle of frequencies needs them (frequency_circle.py)."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -65,17 +65,18 @@ class CompressedBlocks:
         """Return (3,) bounds of what interpolation, not rounding, changes of entries of single, double and hyper."""
         return np.asarray(np.max([part.errors for part in self.stretches], axis=0))
 
-    def combined(self, weights: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-        """Return complex sums (f, ...) of single, double and hyper over all steps with weights (f, up to reach)."""
-        f, n, found = len(weights), len(self.mesh), []
+    def combined(self, weights: NDArray) -> Iterator[tuple[NDArray, NDArray, NDArray]]:
+        """Yield complex sums of single, double and hyper over all steps, for each of the weights (f, up to reach)."""
+        f, n, start = len(weights), len(self.mesh), 0
         weights = np.pad(weights, ((0, 0), (0, self.reach - weights.shape[1])))
+        numbers = np.empty((2 * f, sum(len(part.places) for part in self.stretches)))
         for part in self.stretches:
             kept = np.hstack([weights[:, part.first : part.smooth], weights[:, part.smooth :] @ part.weights])
-            real, imag = np.split(np.concatenate([kept.real, kept.imag]) @ part.values, 2)
-            found.append(real + 1j * imag)
-        numbers = np.concatenate(found, axis=1)[:, self.places]
-        single, double, hyper = np.split(numbers, [16 * n**2, 24 * n**2], axis=1)
-        return single.reshape(f, 4 * n, -1), double.reshape(f, 4 * n, -1), hyper.reshape(f, 2 * n, -1)
+            np.matmul(np.concatenate([kept.real, kept.imag]), part.values, numbers[:, start : start + len(part.places)])
+            start += len(part.places)
+        for real, imag in zip(*np.split(numbers, 2), strict=True):  # one full matrix at a time: half of the memory
+            single, double, hyper = np.split((real + 1j * imag)[self.places], [16 * n**2, 24 * n**2])
+            yield single.reshape(4 * n, -1), double.reshape(4 * n, -1), hyper.reshape(2 * n, -1)
 
     @cached_property
     def _entries(self) -> tuple[Indices, Indices, Indices]:

@@ -51,7 +51,7 @@ def on_circle(
     p = np.empty((len(u), 2 * len(free), len(kept)), complex)
     for start in range(0, len(circle), BATCH):
         powers = circle[start : start + BATCH, None] ** np.arange(blocks.reach)
-        for i, single, double, hyper in zip(range(start, len(circle)), *blocks.combined(powers), strict=False):
+        for i, (single, double, hyper) in enumerate(blocks.combined(powers), start):
             z = circle[i]
             right = double + (0.5 / (1.0 - z)) * mass
             traction = lu_solve(lu_factor(single, check_finite=False), right, check_finite=False)
