@@ -2,8 +2,7 @@
 
 The names most runs need, imported when they are first used: ``import vi_contact`` needs numpy and scipy only.
 All else has a room: ``vi_contact.fem`` (meshes, assembly, surfaces), ``solvers``, ``laws``, ``ground_motion``,
-``soil``, ``engineering``, ``bem``, ``studies``, ``plots``.
-"""
+``soil``, ``engineering``, ``bem``, ``studies``, ``plots``."""
 
 from .core.lazy import lazy
 

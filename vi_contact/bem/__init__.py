@@ -4,8 +4,7 @@ In this order: a ``BoundaryMesh``, ``energetic_blocks``, ``PoincareSteklov``, ``
 ``march_contact``. Theory and an example: docs/theory/bem.md; four problems: ``demos/problems/boundary_elements.py``.
 >>> from vi_contact.bem import circle
 >>> round(circle(radius=1.0, count=64).area, 3)  # of the polygon, m²
-3.137
-"""
+3.137"""
 
 from ..core.lazy import lazy
 

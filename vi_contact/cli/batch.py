@@ -2,8 +2,7 @@
 
 The one argument is a JSON object: "case", the file; "settings", "folders" and "restart", an entry for each run; "allow"
 and "wall_time" as of ``vi-contact run``. Lines of JSON tell how a run ended, {"ended": its number, "status", "said"},
-and now and then {"share": of the steps that are done}.
-"""
+and now and then {"share": of the steps that are done}."""
 
 import json
 import sys

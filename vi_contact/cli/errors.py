@@ -44,8 +44,7 @@ class Parser(argparse.ArgumentParser):
 def told(run: Callable[[], Any], spelling: Mapping[str, str]) -> Any:
     """Return what the call returns; ViContactError of one sentence for errors of memory, files and sizes of numbers.
 
-    spelling: argument -> option: what sentences call units= is --units here.
-    """
+    spelling: argument -> option: what sentences call units= is --units here."""
     try:
         return run()
     except ViContactError as error:

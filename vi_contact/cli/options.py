@@ -22,8 +22,7 @@ def add_command(commands: Any, name: str, run: Callable[[argparse.Namespace], st
                 words: Mapping[str, Any] | None = None) -> argparse.ArgumentParser:
     """Add a command, or an action of one such as "motion info", with these parts of options.toml; return its parser.
 
-    run: what it calls. words: what the texts there, and the names of types, are looked up in.
-    """
+    run: what it calls. words: what the texts there, and the names of types, are looked up in."""
     known, command = {"float": float, "int": int} | dict(words or {}), _TOLD[name]
     told = command["help"]
     about = command.get("description", f"{told[0].upper()}{told[1:]}.")
@@ -67,8 +66,7 @@ def output_file(path: str | Path, *, reads: Iterable[str | Path] = (), picture: 
     """Return the file that a command is about to write, checked before any work is done.
 
     reads: files of its input, which it must not overwrite; picture: whether its name says the format of a picture.
-    InputError for a folder, a file in no folder, one of ``reads``, or a name without the ending of a picture.
-    """
+    InputError for a folder, a file in no folder, one of ``reads``, or a name without the ending of a picture."""
     out = Path(path)
     try:
         with suppress(FileNotFoundError):

@@ -3,8 +3,7 @@
 Everything above this file (schemes, condensed solver, recorders) is written against the protocols below and never
 asks how many ranks there are. ``SerialAlgebra`` (scipy) serves one process and needs no finite element package;
 ``fem.petsc_algebra`` serves any number of ranks. Rules: a vector is the float64 array of its owned entries; scalars
-returned by ``dot`` and by ``Comm`` are the same number on every rank.
-"""
+returned by ``dot`` and by ``Comm`` are the same number on every rank."""
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -132,8 +131,7 @@ class EffectiveMatrix:
     """Hold the matrix A of a step and its factor. A prepared solver belongs to one of these; it lives as long as dt.
 
     ``space``: what its unknowns mean (core.system.Space); ``inertia``: (m, M) of A = m M + c C + k K. None: not known.
-    ``image(x)``: A x, made of products with M, C and K that others need too, where that is told.
-    """
+    ``image(x)``: A x, made of products with M, C and K that others need too, where that is told."""
 
     def __init__(self, matrix: Matrix, algebra: Algebra, *, space: Any = None,
                  inertia: tuple[float, Matrix] | None = None, image: Callable[[Array], Array] | None = None) -> None:

@@ -1,8 +1,7 @@
 """Check what a user gives: one sentence that names the owner, the field, the value and the remedy.
 
 Every constructor and every entry point of the package asks here, before any work is done. A check returns the value in
-the type that the caller goes on with, so that one line reads and checks an argument.
-"""
+the type that the caller goes on with, so that one line reads and checks an argument."""
 
 import math
 import re

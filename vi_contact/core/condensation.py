@@ -5,8 +5,7 @@
 With the contact unknowns last in the factor (``contact_last``) a step costs one forward and one backward substitution,
 and G comes from the corner of the factor. Where there is no such factor it costs two whole ones, and G one for each
 contact unknown. Contact values here are those of all ranks, on every rank: the normal unknowns by the numbers of the
-conditions or, with friction, (r_n, r_t) node by node. What cannot move (a prescribed tangent) stays at zero.
-"""
+conditions or, with friction, (r_n, r_t) node by node. What cannot move (a prescribed tangent) stays at zero."""
 
 from typing import Any
 

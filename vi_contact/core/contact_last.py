@@ -6,8 +6,7 @@
 L_cc L_ccᵀ is A condensed onto c (the Schur complement), so its inverse is the block c of A⁻¹, and any x_c that contact
 asks for may be put in between the two substitutions: with it the rest is in equilibrium.
 
-Loads, answers and contact values may also be of several runs, a row for each: L is then read once for eight of them.
-"""
+Loads, answers and contact values may also be of several runs, a row for each: L is then read once for eight of them."""
 
 import ctypes
 import weakref
@@ -31,8 +30,7 @@ class ContactLast:
     """Hold the factor of a symmetric positive definite matrix, with the unknowns ``last`` in the last rows of L.
 
     Every rank may hold a copy of it: ``whole`` gathers a vector of owned entries, ``mine`` are the owned rows. Vectors
-    of c are in the order of ``last``. ``corner``: L_cc, lower triangular.
-    """
+    of c are in the order of ``last``. ``corner``: L_cc, lower triangular."""
 
     def __init__(self, library: Any, A: sp.csr_matrix, last: Indices, *, whole: Callable[[Array], Array] | None = None,
                  mine: slice = slice(None)) -> None:

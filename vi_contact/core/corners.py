@@ -2,8 +2,7 @@
 
 With the directions n_i of a node its unknowns are û_i = n_i·u, and a force on them is Σ f̂_i n_i. Where the directions
 are oblique, with the cosines G_ij = n_i·n_j, a change of velocity along one normal changes the others' û too, Δû = G a,
-and a lumped mass m is m G⁻¹.
-"""
+and a lumped mass m is m G⁻¹."""
 
 from itertools import permutations
 
@@ -45,8 +44,7 @@ def corner_of(directions: Array) -> tuple[list[int], Array]:
 def tangent_vectors(normals: Array, nodes: Indices | None) -> Array:
     """Return the tangents (m, d, d - 1) of contact directions (m, d) at nodes (m,), along which slip and r_t are.
 
-    Of a node with several directions they are the other vectors of its frame. ``nodes``: None for one each.
-    """
+    Of a node with several directions they are the other vectors of its frame. ``nodes``: None for one each."""
     column, blocks = nodal_blocks(nodal_frames(normals))
     for rows in () if nodes is None else same_node(nodes):
         if np.linalg.matrix_rank(normals[rows]) == len(rows):  # else two nodes at one place

@@ -18,8 +18,7 @@ class StepFailure(ViContactError, RuntimeError):
 class Interrupted(KeyboardInterrupt):
     """Say that a signal (Ctrl-C, SIGTERM, SIGHUP) ended a run after a step, on all ranks; its folder has all so far.
 
-    Like Ctrl-C it is no ``Exception``: no loop over runs goes on. ``number``: the signal; ``status``: 128 + number.
-    """
+    Like Ctrl-C it is no ``Exception``: no loop over runs goes on. ``number``: the signal; ``status``: 128 + number."""
 
     def __init__(self, message: str = "interrupted", number: int = signal.SIGINT) -> None:
         super().__init__(message, number)
@@ -32,8 +31,7 @@ class Interrupted(KeyboardInterrupt):
 class OutOfTime(Interrupted):
     """Say that a run ended, on all ranks, because its wall time was nearly over; a restart goes on.
 
-    ``status`` is 75, which says that the command may be given again (EX_TEMPFAIL).
-    """
+    ``status`` is 75, which says that the command may be given again (EX_TEMPFAIL)."""
 
     def __init__(self, message: str) -> None:
         super().__init__(message)

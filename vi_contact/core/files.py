@@ -37,8 +37,7 @@ def frames_of(folder: Path) -> dict[int, tuple[Path, str]]:
 def on_root(comm: Comm, action: Callable[[], T]) -> T | None:
     """Return the action's value on rank 0, None elsewhere; what it raises there is raised on every rank.
 
-    An OSError becomes a ViContactError of one sentence with path and reason. Collective.
-    """
+    An OSError becomes a ViContactError of one sentence with path and reason. Collective."""
     value: T | None = None
     failure: Exception | None = None
     if comm.rank == 0:

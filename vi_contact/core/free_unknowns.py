@@ -13,8 +13,7 @@ def solve_free(algebra: Algebra, A: Matrix, b: Array, held: Mask, x: Array) -> A
     """Return x of A x = b in the rows that are not held; held unknowns keep the values that ``x`` has.
 
     A is symmetric and positive definite on the others; it is preconditioned by its diagonal. StepFailure when it takes
-    too long. Collective; a product and two reductions of one number an iteration.
-    """
+    too long. Collective; a product and two reductions of one number an iteration."""
     diagonal = A.diagonal()
     inverse = np.divide(1.0, diagonal, out=np.zeros(len(b)), where=~held & (diagonal != 0.0))
     x, d = x.copy(), np.zeros(len(b))

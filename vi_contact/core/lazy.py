@@ -14,8 +14,7 @@ def lazy(package: str, file: str) -> tuple[list[str], Callable[[str], Any], Call
     """Return ``__all__``, ``__getattr__``, ``__dir__`` of a package (PEP 562) by the stub beside its ``__init__.py``.
 
     A line ``from .module import Name as Name`` of ``__init__.pyi`` is a public name and its module, here and for
-    checkers of types (Scientific Python, SPEC 1); ``from .room import *`` imports a room and hands on all its names.
-    """
+    checkers of types (Scientific Python, SPEC 1); ``from .room import *`` imports a room and hands on all its names."""
     home: dict[str, str] = {}
     with open(splitext(file)[0] + ".pyi", encoding="utf-8") as stub:  # importing pathlib takes longer than all stubs
         listed = ast.parse(stub.read()).body

@@ -1,8 +1,7 @@
 """Check matrices that a user brings: finite, symmetric, and masses that are not negative, on any number of ranks.
 
 A matrix is seen through its products A w and Aᵀ w with a vector made of the numbers of the unknowns, in units in which
-its diagonal is one: nothing is stored, and the answer depends neither on the ranks nor on the units.
-"""
+its diagonal is one: nothing is stored, and the answer depends neither on the ranks nor on the units."""
 
 from collections.abc import Iterator
 from typing import Any

@@ -18,14 +18,12 @@ class Obstacle(Protocol):
         """Return the unit contact directions (k, d), from the body to the obstacle.
 
         ``points``: (k, d) positions of contact nodes [m], each rank its own; ``normals``: (k, d) unit outward normals
-        of the body there. Asked before ``gap``, with the same arrays; InputError when body and support do not fit.
-        """
+        of the body there. Asked before ``gap``, with the same arrays; InputError when body and support do not fit."""
 
     def gap(self, points: Array, normals: Array) -> Array:
         """Return the initial gaps (k,) [m] along these directions, >= 0 but for round-off.
 
-        ``points`` and ``normals`` as in ``directions``. gap - u·direction is what is left when the point moves by u.
-        """
+        ``points`` and ``normals`` as in ``directions``. gap - u·direction is what is left when the point moves by u."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +41,7 @@ class Touching:
 class HalfSpace:
     """Describe a rigid half-space behind the plane through ``point``, whose ``normal`` points towards the body.
 
-    The condition is exact for any boundary shape: (X + u - point)·normal >= 0, so the contact direction is -normal.
-    """
+    The condition is exact for any boundary shape: (X + u - point)·normal >= 0, so the contact direction is -normal."""
 
     point: tuple[float, ...]
     normal: tuple[float, ...]
@@ -94,8 +91,7 @@ def facing(obstacle: Obstacle, points: Array, normals: Array) -> tuple[Array, Ar
     """Return the contact directions (m, d) and gaps (m,) [m] of an obstacle, checked.
 
     InputError for other shapes, what are no real numbers, and directions that point into the body: away from the
-    outward normals of all faces of a point (at right angles it may touch with an edge).
-    """
+    outward normals of all faces of a point (at right angles it may touch with an edge)."""
     owner, m = type(obstacle).__name__, len(points)
     directions = array(owner, "what directions returns", obstacle.directions(points, normals), points.shape)
     length = np.linalg.norm(directions, axis=1)

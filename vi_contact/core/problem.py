@@ -24,8 +24,7 @@ class ContactProblem:
     The system is turned into the nodal frames of the surface here, once. ``impact=None`` leaves velocities unchanged.
     ``mass=None`` leaves the choice of the mass matrix to the time scheme. InputError is raised on all ranks for parts
     of the wrong kind or size, and for a surface of another system. A friction law that is a dataclass may hold tuples
-    with a value for every contact point: of this rank, or of all ranks by their numbers. Collective.
-    """
+    with a value for every contact point: of this rank, or of all ranks by their numbers. Collective."""
 
     system: SemiDiscreteSystem
     surface: ContactSurface
@@ -139,8 +138,7 @@ def check_parts(problem: Any) -> None:
     """Raise InputError, on all ranks, for parts of the wrong kind or size, or made for another system. Collective.
 
     Identity counts: a surface that ``fem`` made carries the space it was made on, and only systems of that space take
-    it. Sizes are compared on all ranks together, so that all of them raise the same sentence.
-    """
+    it. Sizes are compared on all ranks together, so that all of them raise the same sentence."""
     owner, system, surface, excitations = "ContactProblem", problem.system, problem.surface, problem.excitations
     instance(owner, "system", system, SemiDiscreteSystem, "give a system, such as fem.assemble returns")
     instance(owner, "surface", surface, ContactSurface, "give a contact surface, such as fem.contact_surface returns")

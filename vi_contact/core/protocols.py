@@ -29,8 +29,7 @@ class Excitation(Protocol):
     def acceleration(self, t: float) -> float:
         """Return the acceleration [m/s²] at time ``t`` [s], positive along the direction.
 
-        Asked for at any time >= 0, also twice and between the steps; the same on every rank, a finite number.
-        """
+        Asked for at any time >= 0, also twice and between the steps; the same on every rank, a finite number."""
 
     def __call__(self, t: float) -> Array:
         """Return the vector acceleration(t) · direction [m/s²] at time ``t`` [s], shape (d,)."""
@@ -60,8 +59,7 @@ def finite_tuple(owner: str, name: str, values: Sequence[float]) -> tuple[float,
 class FrictionLaw(Protocol):
     """Bound the tangential reaction by the normal one: what a solver asks of a friction law.
 
-    |r_t| <= limit(r_n) = cohesion + slope max(r_n, 0); r_t = limit along the slip where there is one.
-    """
+    |r_t| <= limit(r_n) = cohesion + slope max(r_n, 0); r_t = limit along the slip where there is one."""
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
         """Return the largest tangential reaction of each condition, (m,), in the unit of ``r_n``; >= 0.
@@ -69,8 +67,7 @@ class FrictionLaw(Protocol):
         Args:
             r_n: normal reactions (m,), ``scale`` times newtons; of either sign, tension counts as zero.
             weights: tributary lengths times thickness, or areas (m,) [m²]: what turns stresses into forces.
-            scale: of the step: 1 for forces, dt [s] for impulses. A limit that ignores r_n is multiplied by it.
-        """
+            scale: of the step: 1 for forces, dt [s] for impulses. A limit that ignores r_n is multiplied by it."""
 
     def slope(self, weights: Array) -> Array:
         """Return d limit / d r_n >= 0 of each condition under pressure, (m,); ``weights`` as in ``limit``."""
@@ -106,8 +103,7 @@ class Impact:
     Attributes:
         before: (m,) normal velocities before the step [m/s], > 0 towards the obstacle.
         v_n: (m,) normal velocities that the step left [m/s].
-        active: (m,) which are closed. closing: (m,) which have just closed.
-    """
+        active: (m,) which are closed. closing: (m,) which have just closed."""
 
     before: Array
     v_n: Array
@@ -122,8 +118,7 @@ class ImpactLaw(Protocol):
     def target(self, impact: Impact) -> Array:
         """Return the normal velocities (m,) [m/s] after ``impact``; NaN where the law leaves the velocity alone.
 
-        > 0 is towards the obstacle, so a rebound is negative. Called only when some condition is active.
-        """
+        > 0 is towards the obstacle, so a rebound is negative. Called only when some condition is active."""
 
     def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
         """Return the velocity vector (n,) [m/s] that has the normal velocities ``target`` (m,), where they are not NaN.
@@ -131,8 +126,7 @@ class ImpactLaw(Protocol):
         Args:
             system: the equations that are marched, whose M says what an impulse does.
             surface: its contact conditions, ``surface.normal_values(v)`` are the velocities to change.
-            v: the velocity (n,) [m/s] that the step left; not to be written to. Collective.
-        """
+            v: the velocity (n,) [m/s] that the step left; not to be written to. Collective."""
 
 
 class MassLaw(Protocol):

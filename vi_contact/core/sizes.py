@@ -19,6 +19,5 @@ def small(comm: Comm, unknowns: int, conditions: int, *, worth: int = 1) -> bool
     """Say whether what the package solves beside the steps is small, by unknowns and contact conditions of this rank.
 
     Such problems are condensed with a factor of their own, whatever solves the steps; larger ones are solved by
-    conjugate gradients. ``worth``: for problems that come again and again, so many times larger. Collective.
-    """
+    conjugate gradients. ``worth``: for problems that come again and again, so many times larger. Collective."""
     return total(comm, unknowns) <= worth * OWN_UNKNOWNS and total(comm, conditions) <= OWN_CONDITIONS

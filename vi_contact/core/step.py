@@ -42,8 +42,7 @@ class State:
 
     ``r_n`` (m,), ``r_t`` (m, d - 1) [N] are the reactions of the step that led here, mean or end values as the scheme
     says. ``active`` (m,) are the closed conditions. ``memory`` holds what a scheme carries besides u and v: vectors
-    (n,), and arrays that are the same on every rank.
-    """
+    (n,), and arrays that are the same on every rank."""
 
     t: float
     k: int
@@ -70,8 +69,7 @@ class StepProblem:
 
     ``rate_factor``: slip rate [m/s] = rate_factor (B_t x - slip0): 1/dt for displacements, 1 for velocities, 0 in
     static problems, where friction is that of rest. ``lower`` (m,): bounds from below too, which ``Volume`` alone
-    knows (``vi``); None in the steps of a scheme.
-    """
+    knows (``vi``); None in the steps of a scheme."""
 
     A: EffectiveMatrix
     b: Array
@@ -107,8 +105,7 @@ class StepResult:
 
     ``iterations`` count changes of the active set, sweeps or Newton steps, as ``method`` says.
     ``history``: how the method converged, in a measure of its own. ``aim``: the residual at which an
-    iterative method stopped because it was told to, 0 for one that goes on to round-off.
-    """
+    iterative method stopped because it was told to, 0 for one that goes on to round-off."""
 
     x: Array
     r_n: Array
@@ -143,8 +140,7 @@ class Balance:
 
         M a + C v + K u = f - B_nᵀ r_n - B_tᵀ r_t
 
-    Multiplying it by the displacement increment gives the energy ledger of any scheme (verify.energy_balance).
-    """
+    Multiplying it by the displacement increment gives the energy ledger of any scheme (verify.energy_balance)."""
 
     u: Array
     v: Array
@@ -160,8 +156,7 @@ class Scheme(Protocol):
     One whose contact condition is on velocities says ``penetrates = True``: states of its own runs may lie inside the
     obstacle, and it goes on from them. A scheme is a value without state of its own: what it carries from step to step
     is in ``State.memory``, so that a checkpoint holds all of it. One that says ``by_rows = True`` steps several runs at
-    once: ``step`` and ``finish`` then also get vectors as rows, (k, n) and (k, m), and return them.
-    """
+    once: ``step`` and ``finish`` then also get vectors as rows, (k, n) and (k, m), and return them."""
 
     @property
     def mass(self) -> MassLaw:
@@ -180,34 +175,29 @@ class Scheme(Protocol):
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
         """Return ``state`` with the velocity ``v`` (n,) [m/s] that the impact law of ``problem`` gave, same u and t.
 
-        What the scheme remembers of accelerations has to fit the new velocity before the next step of ``dt`` [s].
-        """
+        What the scheme remembers of accelerations has to fit the new velocity before the next step of ``dt`` [s]."""
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """Return A (n rows) of ``problem`` for all steps of ``dt`` [s], as a rule ``problem.equations.effective(…)``.
 
-        A is symmetric positive definite; nothing in it depends on time or state. It is made once for every dt.
-        """
+        A is symmetric positive definite; nothing in it depends on time or state. It is made once for every dt."""
 
     def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
         """Return the problem of the step of ``problem`` from ``state`` to state.t + dt, whose matrix ``A`` is.
 
         ``dt`` [s] is that of A. The meaning of x is the scheme's own (u1 or v1, say); ``bound`` and ``scale`` fit it,
-        and ``scale`` is the same in all steps of one dt.
-        """
+        and ``scale`` is the same in all steps of one dt."""
 
     def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
         """Return the state of ``problem`` at the end of a step of ``dt`` [s], before the impact law.
 
         ``state`` is the one the step began with, ``step`` what ``step()`` returned for it and ``result`` its certified
-        answer: reactions in it are ``scale`` times newtons, those of the new state are newtons.
-        """
+        answer: reactions in it are ``scale`` times newtons, those of the new state are newtons."""
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the equation of motion that the step of ``dt`` [s] from ``old`` to ``new`` satisfied, for the ledger.
 
-        ``new`` is what ``finish`` returned: before the impact law of ``problem``. Called when a recorder asks.
-        """
+        ``new`` is what ``finish`` returned: before the impact law of ``problem``. Called when a recorder asks."""
 
 
 class PreparedSolver(Protocol):
@@ -218,8 +208,7 @@ class PreparedSolver(Protocol):
         """Return x, reactions and closed conditions of ``step``, whose A, surface and scale are those it was made for.
 
         The answer is judged by its certificate, so the method may stop where it finds best. StepFailure, on all ranks,
-        when there is none. Collective.
-        """
+        when there is none. Collective."""
 
 
 class Solver(Protocol):
@@ -231,16 +220,14 @@ class Solver(Protocol):
     def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> PreparedSolver:
         """Return a solver of steps with the matrix ``A`` on ``surface`` whose reactions are ``scale`` times newtons.
 
-        Called once for every dt; factors and whatever else depends on A alone belong here. Collective.
-        """
+        Called once for every dt; factors and whatever else depends on A alone belong here. Collective."""
 
 
 @dataclass(frozen=True)
 class Report:
     """Tell recorders what happened in one step. ``new.v`` is after the impact law, ``v_minus`` before it.
 
-    ``problem`` is the one that was solved, with the mass matrix that the scheme chose when none was given.
-    """
+    ``problem`` is the one that was solved, with the mass matrix that the scheme chose when none was given."""
 
     problem: ContactProblem
     old: State
@@ -265,21 +252,18 @@ class Recorder(Protocol):
     def columns(self) -> Mapping[str, tuple[str, str]]:
         """Return what ``start`` and ``row`` fill in: name -> (unit, meaning). Called after ``start``, always the same.
 
-        Names are made of letters, digits and underscores; no two recorders of a run have one in common.
-        """
+        Names are made of letters, digits and underscores; no two recorders of a run have one in common."""
 
     def start(self, problem: ContactProblem, state: State,
               resumed: Mapping[str, float] | None = None) -> Mapping[str, Any]:
         """Return the row of the initial ``state`` of ``problem``; forget whatever an earlier run has left.
 
-        ``resumed``: the last row of the run that a restart continues, from which sums over time go on; else None.
-        """
+        ``resumed``: the last row of the run that a restart continues, from which sums over time go on; else None."""
 
     def row(self, report: Report) -> Mapping[str, Any]:
         """Return the row of the step that ``report`` tells of: numbers, or arrays of one shape (to HDF5 only).
 
-        Called once a step, in order, on all ranks: collective operations are allowed here.
-        """
+        Called once a step, in order, on all ranks: collective operations are allowed here."""
 
 
 Columns = Mapping[str, tuple[str, str]]

@@ -4,8 +4,7 @@ A contact condition bounds one unknown: after the change of basis u = T û (noda
 direction) the normal displacement u_n of a contact point *is* an entry of û, and B_n is a selection of entries.
 Contact arrays (bounds, reactions, active sets, slips) have one row for every condition of this rank, and none of
 another's: what is asked of all of them (``some``, ``everywhere``) is asked on all ranks.
-Sign: the direction n points from the body to the obstacle, u_n = u·n, gap = gap0 - u_n >= 0, reaction r_n >= 0.
-"""
+Sign: the direction n points from the body to the obstacle, u_n = u·n, gap = gap0 - u_n >= 0, reaction r_n >= 0."""
 
 import logging
 from collections.abc import Callable
@@ -49,8 +48,7 @@ class ContactSurface:
         space: of the systems that it was made for; None when it was made by hand.
         companions: motions of the obstacle that are marched beside the run, with its scheme and time steps.
         nodes: (m,) numbers of the nodes, to be told apart only: several conditions may be of one. None: one each.
-        frictionless_corners: True when nodes with several conditions are allowed beside friction.
-    """
+        frictionless_corners: True when nodes with several conditions are allowed beside friction."""
 
     comm: Comm
     points: Array
@@ -208,8 +206,7 @@ class ContactSurface:
 
         What such a node could rub on one face is a force across the other, which the conditions, each a bound on one
         unknown, do not hold. In space it still rubs along its edge, with the normal force of its first condition (of
-        one group: that of the face with the lowest node numbers). Collective.
-        """
+        one group: that of the face with the lowest node numbers). Collective."""
         corners = total(self.comm, len(self.corners))
         if corners and self.comm.rank == 0:
             log.info("%d contact nodes with several contact directions slide without friction", corners)
@@ -218,8 +215,7 @@ class ContactSurface:
     def on_springs(self, stiffness: float) -> "ContactSurface":
         """Return the surface on a linearly deformable support of foundation modulus ``stiffness`` [Pa/m].
 
-        Each point presses a fictitious spring k = stiffness * weight, whose far end obeys the unilateral law.
-        """
+        Each point presses a fictitious spring k = stiffness * weight, whose far end obeys the unilateral law."""
         stiffness = number("on_springs", "the foundation modulus", stiffness, positive=True, unit="Pa/m")
         return replace(self, compliance=1.0 / (stiffness * self.weights))
 
@@ -245,8 +241,7 @@ def same_node(nodes: Indices) -> tuple[Indices, ...]:
 def nodal_frames(directions: Array) -> Array:
     """Return orthonormal frames (k, d, d) whose first column is the contact direction n, the others tangential.
 
-    2D: t = (-n_y, n_x). 3D: t1 is the projection of the axis least aligned with n, t2 = n x t1.
-    """
+    2D: t = (-n_y, n_x). 3D: t1 is the projection of the axis least aligned with n, t2 = n x t1."""
     k, d = directions.shape
     frames = np.empty((k, d, d))
     frames[:, :, 0] = directions
@@ -265,8 +260,7 @@ def nodal_blocks(frames: Array) -> tuple[Indices, Array]:
     """Return (c, Q): nodal frames (k, d, d) with the contact direction in column c: component c is the normal one.
 
     c is the direction's largest component. Axes at right angles to the direction keep their own columns: these are the
-    components that may be prescribed.
-    """
+    components that may be prescribed."""
     k, d, _ = frames.shape
     directions, every = frames[:, :, 0], np.arange(k)
     size = np.abs(directions)

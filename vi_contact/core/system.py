@@ -20,16 +20,14 @@ class Companion(Protocol):
 
         Called on every rank before each base step, so binding the same again must change nothing; another scheme or
         other steps begin the motion anew, from rest at t = 0. ``dt`` is a number or a plan of ``run.time_steps``.
-        InputError for a plan that the motion cannot follow.
-        """
+        InputError for a plan that the motion cannot follow."""
 
 
 class Space(Protocol):
     """Say what the unknowns mean: how an owned vector of unknowns becomes displacements of points.
 
     ``ids``: numbers of the owned unknowns on any ranks, node * dimension + component; ``coordinates`` (rows, d) [m];
-    ``hierarchy``: of displacements whose contact conditions need one, else None.
-    """
+    ``hierarchy``: of displacements whose contact conditions need one, else None."""
 
     dimension: int
     unknowns: int
@@ -60,8 +58,7 @@ class Load:
 
     Separable parts cost one vector update a step; the others are evaluated anew at every time. Viscous and inertial
     parts are the shares in C u' and M u'' of what moves in a given way (a base, a free field): a mass law that changes
-    C changes the former alike, and a body at rest feels neither.
-    """
+    C changes the former alike, and a body at rest feels neither."""
 
     constant: Array
     separable: tuple[tuple[Array, Callable[[float], float]], ...] = ()
@@ -143,8 +140,7 @@ class SemiDiscreteSystem:
             place, and a body with such nodes cannot turn.
         notes: which motion its boundaries expect and the like, for log and summary of a run.
         absolute: True when a boundary lets waves in: displacements are those of space, and nothing else may shake it.
-        companions: motions among its loads that are marched beside the run, with its scheme and time steps.
-    """
+        companions: motions among its loads that are marched beside the run, with its scheme and time steps."""
 
     algebra: Algebra
     M: Matrix
@@ -246,8 +242,7 @@ class SemiDiscreteSystem:
     def effective(self, *, m: float, c: float, k: float, shares: bool = False) -> EffectiveMatrix:
         """Return A = m M + c C + k K for all steps of one size; its factor is made when it is first needed.
 
-        ``shares``: whether the scheme needs M x, C x and K x in its next step, so that A x may be made of them.
-        """
+        ``shares``: whether the scheme needs M x, C x and K x in its next step, so that A x may be made of them."""
         terms = [(m, self.M), (k, self.K)]
         if self.C is not None:
             terms.append((c, self.C))
@@ -280,15 +275,13 @@ class SemiDiscreteSystem:
     def in_basis(self, T: Matrix, dual: Matrix | None = None) -> "SemiDiscreteSystem":
         """Return the same system in the unknowns û of u = T û: TᵀMT, TᵀCT, TᵀKT, Tᵀf.
 
-        Initial values and influence vectors turn with T⁻¹: ``dual`` is T⁻ᵀ, T itself where it is orthogonal (None).
-        """
+        Initial values and influence vectors turn with T⁻¹: ``dual`` is T⁻ᵀ, T itself where it is orthogonal (None)."""
         return self._in_unknowns(T, (T if dual is None else dual).transpose_apply)
 
     def in_relative(self, R: Matrix) -> "SemiDiscreteSystem":
         """Return the same system in the unknowns ǔ of û = R ǔ, in which contact points move relative to the other body.
 
-        R = 1 + N with N N = 0 (nobody's partner is somebody's partner), so that R⁻¹ = 2 - R.
-        """
+        R = 1 + N with N N = 0 (nobody's partner is somebody's partner), so that R⁻¹ = 2 - R."""
         return self._in_unknowns(R, lambda x: 2.0 * x - R @ x)
 
     def _in_unknowns(self, T: Matrix, inverse: Callable[[Array], Array]) -> "SemiDiscreteSystem":

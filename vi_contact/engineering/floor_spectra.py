@@ -3,8 +3,7 @@
 Which motion: a column a_x_<label> of ``Probe(..., acceleration=True)`` is the absolute acceleration, that of the
 equations, relative to the ground, plus that of the ground. Equipment on a floor and a layer on rock feel the absolute
 one, so it is the default; with ``relative`` the ground's is taken off again. In a run whose ground moves by prescribed
-displacements no ground acceleration is recorded, and both are the same.
-"""
+displacements no ground acceleration is recorded, and both are the same."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -87,8 +86,7 @@ def transfer_function(history: Mapping[str, Array], surface: str, base: str = "a
     Amplitudes are smoothed alike with Konno and Ohmachi's window (1998), which widens peaks, before they are divided;
     ``bandwidth=None`` takes the raw ones. The motion has to die away before the run ends, or be periodic, else its end
     leaks into all frequencies. ``frequencies`` None: 200, from four periods in the run to four samples in a period; raw
-    all of the transform. nan where the base has below ``floor`` of its peak. InputError for a base without motion.
-    """
+    all of the transform. nan where the base has below ``floor`` of its peak. InputError for a base without motion."""
     number("transfer_function", "floor", floor, positive=True)
     optional(number, "transfer_function", "bandwidth", bandwidth, positive=True)
     top, below = recorded_motion(history, surface), recorded_motion(history, base)

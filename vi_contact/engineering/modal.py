@@ -15,8 +15,7 @@ def lowest_frequency(system: SemiDiscreteSystem, *, max_iterations: int = 2000) 
 
     The start vector is the static answer to a uniform acceleration in all directions: deterministic, and not
     orthogonal to the first mode of structures that a base motion can excite.
-    Raises InputError for a floating body (K singular) and when the iteration does not settle.
-    """
+    Raises InputError for a floating body (K singular) and when the iteration does not settle."""
     instance("lowest_frequency", "system", system, SemiDiscreteSystem, "give a system, such as fem.assemble returns")
     whole("lowest_frequency", "max_iterations", max_iterations, least=1)
     if system.floating:
@@ -42,8 +41,7 @@ def natural_frequencies(algebra: Algebra, K: Matrix, M: Matrix, *, count: int = 
     """Return (lowest frequencies above zero [Hz], ascending; number of rigid motions) of K phi = (2 pi f)² M phi.
 
     rigid: there are no more rigid motions than these. Solved on rank 0, by Lanczos' method and one factor of K + s M,
-    which there is where bodies float, too. Collective.
-    """
+    which there is where bodies float, too. Collective."""
     from scipy.sparse import vstack  # late: no step needs it
     from scipy.sparse.linalg import LinearOperator, eigsh
 

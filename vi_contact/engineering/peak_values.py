@@ -63,8 +63,7 @@ def write_peaks(path: str | Path, rows: Sequence[Peak]) -> Path:
 class Loop:
     """Hold deformation, force and work, (rows,) each: work is ∫ F dx since the start by the trapezoidal rule.
 
-    For a closed loop run through clockwise it is the area, the work that the structure took up.
-    """
+    For a closed loop run through clockwise it is the area, the work that the structure took up."""
 
     deformation: Array
     force: Array

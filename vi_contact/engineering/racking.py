@@ -34,8 +34,7 @@ class Racking:
     """Record racking: label -> four corner points (x, y) [m], at the nodes nearest to them.
 
     Columns racking_<label>, rotation_<label> [rad]: see ``racking``. A rigid motion of the frame, and of the ground,
-    leaves racking alone. InputError for corners that are not four, on one line, or outside the body.
-    """
+    leaves racking alone. InputError for corners that are not four, on one line, or outside the body."""
 
     frames: Mapping[str, Sequence[Sequence[float]]]
 

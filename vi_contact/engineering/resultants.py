@@ -20,8 +20,7 @@ tell how it turns about the vertical. ``Resultants`` adds what a report asks of 
     level = h / H,    sliding = (sum w slip / sum w)·t̄,    margin = 1 - |T| / sum limit(r_n)    (mu N - |T| over mu N)
 
 h is the height of the thrust above the lowest point of the part, H the height of the part; pressure_low and
-pressure_high are r_n / weight at its two ends, of the heel and the toe of a wall's base.
-"""
+pressure_high are r_n / weight at its two ends, of the heel and the toe of a wall's base."""
 
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -58,8 +57,7 @@ class Part:
     ``where``: points (m, d), normals (m, d) -> mask (m,); all points when None. InputError for a part without points,
     a centre of other dimension, or directions that cancel (a closed ring), unless ``normal`` says which N is meant.
     ``centre`` None: the middle of the part by weight, at the level of its lowest point.
-    ``slots``: the numbers of the conditions whose share in it is held; those of one rank, all when None.
-    """
+    ``slots``: the numbers of the conditions whose share in it is held; those of one rank, all when None."""
 
     def __init__(self, name: str, geometry: Geometry, centre: Sequence[float] | None, where: Where | None,
                  normal: Sequence[float] | None, slots: Indices | None = None) -> None:
@@ -180,8 +178,7 @@ class Resultants:
             where: points (m, d), normals (m, d) -> boolean mask (m,). The whole surface when both are None.
         normal: direction of N towards the support; the part's mean contact direction when None.
     Reactions are those of the step (mean or end value, as the scheme says), on a unilateral and on a held support.
-    InputError for both part and where, and for a part of no contact points.
-    """
+    InputError for both part and where, and for a part of no contact points."""
 
     name: str = ""
     centre: Sequence[float] | None = None
@@ -271,8 +268,7 @@ def contact_summary(history: Mapping[str, Array], geometry: Geometry, *, centre:
     """Return the resultants of a run that recorded ``Contact()``: quantity -> (rows,), without theta and settlement.
 
     ``geometry``: the surface of the problem (then collective), or ``read_run(folder).contact``. Slip and friction count
-    where they were recorded, with friction. InputError without arrays of the contact points.
-    """
+    where they were recorded, with friction. InputError without arrays of the contact points."""
     instance("contact_summary", "history", history, Mapping, "give the history of a solution")
     provides("contact_summary", "geometry", geometry, ("points", "normals", "weights"), "give a contact surface")
     column_name("part name", name)

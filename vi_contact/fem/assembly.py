@@ -3,8 +3,7 @@
     sigma = lambda_eff tr(eps) I + 2 mu eps,   M = ∫ rho u·v,   K = ∫ sigma(u):eps(v),   C = alpha M + beta K
 
 integrated over the mesh times the section's thickness. Prescribed displacements are eliminated: u = P u_free + U(t),
-so M, C, K are Pᵀ(·)P and the load gets -Pᵀ(K U + C U' + M U'').
-"""
+so M, C, K are Pᵀ(·)P and the load gets -Pᵀ(K U + C U' + M U'')."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -74,8 +73,7 @@ def assemble(mesh: Any, material: Materials | None = None, *, forms: Forms | Non
         quadrature_degree: degree of all integrals; None means UFL's estimate, exact on cells with parallel sides.
     Raises:
         InputError: cells without a material, of an order that does not fit the degree, or folded; NaN in data,
-            components that do not exist, dashpots on held facets, groups of another mesh or kind, contradictions.
-    """
+            components that do not exist, dashpots on held facets, groups of another mesh or kind, contradictions."""
     V, degree = taken_space(mesh, space, as_tuple(bcs), degree)
     section, damping = check_body(mesh, material, forms, section, damping, base_inertia, degree, integration)
     held, moved, boundaries = as_tuple(clamped), as_tuple(prescribed), as_tuple(dashpots)

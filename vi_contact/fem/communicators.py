@@ -42,8 +42,7 @@ def kept(comm: Any) -> Any:
     """Return the communicator of the ranks of ``comm`` that lasts as long as the program. Collective the first time.
 
     PETSc objects that Python drops wait on their communicator for ``give_back``. A mesh frees its own at its end: what
-    waits there would wait for ever.
-    """
+    waits there would wait for ever."""
     alike = (MPI.IDENT, MPI.CONGRUENT)
     found = next((one for one in _KEPT if MPI.Comm.Compare(one, comm) in alike), None)
     if found is None:

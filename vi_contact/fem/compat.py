@@ -3,8 +3,7 @@
 Supported: 0.5 (Debian 12), 0.9 (Debian 13) and 0.11. Nothing else in `fem` asks for the version. What changed:
 dofmaps became two-dimensional arrays and the ghost mode went to the partitioner (0.6), UFL elements became Basix
 elements and function spaces take tuples (0.7), `create_mesh` swapped two arguments (0.10), the geometry has one dofmap
-per cell type (0.11).
-"""
+per cell type (0.11)."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -47,8 +46,7 @@ def create_mesh(comm: MPI.Comm, cell: str, cells: npt.NDArray[np.int64], x: npt.
     `cell` is a UFL name ("interval", "triangle", "quadrilateral", "tetrahedron", "hexahedron"). `cells`
     (n_cells, n_nodes) holds rows of `x` in DOLFINx's order of vertices and mid-points, `x` (n_points, gdim) the points
     [m], `destinations` the ranks each cell goes to, its owner first, and the offsets of the cells in that list. A rank
-    without input passes arrays of the right width and no rows. Collective.
-    """
+    without input passes arrays of the right width and no rows. Collective."""
 
     def told(*_: Any) -> Any:  # the arguments of a partitioner changed twice, what it returns did not
         return dolfinx.cpp.graph.AdjacencyList_int32(*destinations)
@@ -182,8 +180,7 @@ def dof_to_node(space: Any) -> Indices:
 
     Only of a space that has a node for every node of the mesh: P1 or Q1 on first-order, P2 or Q2 on second-order cells.
 
-    Unknown c of block i (index bs*i + c) is component c at the point `mesh.geometry.x[dof_to_node(space)[i]]`.
-    """
+    Unknown c of block i (index bs*i + c) is component c at the point `mesh.geometry.x[dof_to_node(space)[i]]`."""
     index_map = space.dofmap.index_map
     nodes = np.full(index_map.size_local + index_map.num_ghosts, -1, dtype=np.int32)
     nodes[cell_blocks(space)] = geometry_dofmap(space.mesh)

@@ -10,8 +10,7 @@ A compliant base adds the traction of an upgoing wave v_up, whatever its directi
 
     sigma_n += 2 rho c_P v_up_n,    tau += 2 rho c_S v_up_t.
 
-The wave that comes back down passes through the dashpots: the record of the base is not the input, but up + down.
-"""
+The wave that comes back down passes through the dashpots: the record of the base is not the input, but up + down."""
 
 import logging
 from collections.abc import Callable, Sequence
@@ -101,8 +100,7 @@ class CompliantBase(Dashpots):
 class DashpotMatrix:
     """Assemble the full matrix D of some dashpots (PETSc), with n·D v the force that resists them.
 
-    InputError for facets that are not on the outer boundary, or prescribed in a direction that the dashpots resist.
-    """
+    InputError for facets that are not on the outer boundary, or prescribed in a direction that the dashpots resist."""
 
     def __init__(self, space: FemSpace, forms: Any, dashpots: Dashpots) -> None:
         self.space, self.dashpots = space, dashpots

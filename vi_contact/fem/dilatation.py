@@ -5,8 +5,7 @@
 All else is integrated as usual, so that an element has no other zero-energy modes than its rigid motions. On
 quadrilaterals and parallelepipeds the mean is the value in the middle: selective reduced integration, the volumetric
 term by one point (Hughes, Int. J. Numer. Methods Eng. 15 (1980), 1413-1418; Nagtegaal, Parks and Rice, Comput. Methods
-Appl. Mech. Eng. 4 (1974), 153-177). On other hexahedra the mean passes the patch test, which one point does not.
-"""
+Appl. Mech. Eng. 4 (1974), 153-177). On other hexahedra the mean passes the patch test, which one point does not."""
 
 from typing import Any
 

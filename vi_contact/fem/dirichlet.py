@@ -21,8 +21,7 @@ REMEDY = "give dirichletbc(value, dofs, V) on the vector-valued Lagrange space V
 class GivenValues:
     """Hold components of nodes as a ``Prescribed`` at rest does: those of a ``dirichletbc``, as they were when given.
 
-    mask, values: (local blocks of V, d), ghosts too; moves: whether some value, of any rank, is not zero.
-    """
+    mask, values: (local blocks of V, d), ghosts too; moves: whether some value, of any rank, is not zero."""
 
     name: str
     mask: Mask

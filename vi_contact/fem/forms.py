@@ -2,8 +2,7 @@
 
     sigma = lambda_eff tr(eps) I + 2 mu eps,   M = ∫ rho u·v,   K = ∫ sigma(u):eps(v),   C = alpha M + beta K
 
-Orthotropic cells have sigma = C eps instead, KelvinVoigt damping adds its viscous stresses to C.
-"""
+Orthotropic cells have sigma = C eps instead, KelvinVoigt damping adds its viscous stresses to C."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -39,8 +38,7 @@ class ElasticForms:
         materials: (local cells, material) as they were given.
         dilatation: with ``selective``, the mean of tr eps over each cell, which takes its place in K, in C = beta K
             and in stresses (``fem.dilatation``); None otherwise.
-        tells_stress: whether ``stress`` is known; symmetric: whether all matrices are; notes: what comes from where.
-    """
+        tells_stress: whether ``stress`` is known; symmetric: whether all matrices are; notes: what comes from where."""
 
     boundaries: tuple[Dashpots, ...] = ()  # of the same system
     initial: Any = None  # InitialStrains

@@ -1,7 +1,6 @@
 """Check groups of facets and cells where they are given: the right kind, of the mesh they are used on.
 
-Their numbers are local ones of one mesh. On another mesh, or taken for those of cells, they would name other places.
-"""
+Their numbers are local ones of one mesh. On another mesh, or taken for those of cells, they would name other places."""
 
 from typing import Any, cast
 

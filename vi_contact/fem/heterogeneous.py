@@ -39,8 +39,7 @@ class Heterogeneous:
     section forces through elements take means over cells.
 
     Raises InputError: neither number nor function; and when a body is assembled, values outside E > 0, -1 < nu < 1/2,
-    rho > 0, 0 <= xi < 1, with the first place of them, and Functions or expressions of another mesh.
-    """
+    rho > 0, 0 <= xi < 1, with the first place of them, and Functions or expressions of another mesh."""
 
     E: Values
     nu: Values

@@ -5,8 +5,7 @@
 v are displacements of vertices, e what edges bend beside them: a field is that of first order plus one bubble an edge.
 Rigid translations have e = 0, so that row sums of a mass matrix in these unknowns are those of first order, positive,
 where nodal ones of vertices are negative (tetrahedra) or zero (triangles). Rotations have e = 0 too where edges are
-straight. The nodal unknowns are u = H û with H = 1 + N, N N = 0, so that H⁻¹ = 2 - H.
-"""
+straight. The nodal unknowns are u = H û with H = 1 + N, N N = 0, so that H⁻¹ = 2 - H."""
 
 from typing import Any
 
@@ -31,8 +30,7 @@ class Hierarchy:
     """Hold the edges of a space of P2 fields and the change of its unknowns. Collective, as all it does.
 
     Attributes:
-        vertices: the P1 space, and the owned blocks of ``V`` that its own are; H, back: H and H⁻¹ = 2 - H.
-    """
+        vertices: the P1 space, and the owned blocks of ``V`` that its own are; H, back: H and H⁻¹ = 2 - H."""
 
     def __init__(self, space: Any) -> None:
         V, self._space = space.V, space

@@ -37,8 +37,7 @@ class LinearForm:
             a restart goes on with the same update is looked at in the first steps only.
     Raises:
         InputError: history and update together; from ``assemble``, on all ranks: what is no linear form in v on this
-            mesh; from ``assemble`` and in steps: NaN or infinite forces, an update that ends in an error.
-    """
+            mesh; from ``assemble`` and in steps: NaN or infinite forces, an update that ends in an error."""
 
     form: Callable[[Any], Any]
     history: Callable[[float], float] | None = None

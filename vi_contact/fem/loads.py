@@ -1,8 +1,7 @@
 """Describe what acts on a body: prescribed displacements, tractions and body forces (boundary method, eqs. 3, 4, 6).
 
 Fields are given at points: a callable takes points (k, d) [m] and the time [s] and returns values (k, d). They are
-interpolated at the nodes and then integrated exactly, so a load costs one sparse product a step.
-"""
+interpolated at the nodes and then integrated exactly, so a load costs one sparse product a step."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -59,8 +58,7 @@ class Prescribed:
 
     ``components``: which displacement components are prescribed (all when None); the others stay free (rollers).
     The mass and damping of the boundary nodes enter the equations, so all three time functions are needed;
-    left out they are zero (a clamped part, or a displacement constant in time).
-    """
+    left out they are zero (a clamped part, or a displacement constant in time)."""
 
     facets: Facets
     displacement: Value = _zero
@@ -158,8 +156,7 @@ class ActingLoad:
 class Traction(ActingLoad):
     """Apply the traction S_i = F_i(x, t) [Pa] on facets. ``history`` is a factor f(t) of a value constant in time.
 
-    With a history, or with a tuple, the load is assembled once; a callable without history is evaluated every step.
-    """
+    With a history, or with a tuple, the load is assembled once; a callable without history is evaluated every step."""
 
     facets: Facets
     value: Value
@@ -188,8 +185,7 @@ class Pressure(Traction):
 
     ``value``: a number, or a function of points (k, d) [m] and the time [s] -> (k,), asked at all nodes of the body; it
     is kept as the first component of a vector field. p is interpolated at nodes: resultants of one that is linear
-    between them are exact, so let a node lie at the water level. ``history``: as of ``Traction``.
-    """
+    between them are exact, so let a node lie at the water level. ``history``: as of ``Traction``."""
 
     value: float | Callable[[Array, float], Array]  # type: ignore[assignment]  # what is given
 

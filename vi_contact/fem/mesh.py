@@ -1,8 +1,7 @@
 """Distribute meshes with named groups, read from a file or built in memory by a Gmsh script.
 
 Rank 0 reads and checks (vi_contact.meshes.extract), all ranks get the mesh or the same InputError. Groups are
-recognised on each rank by the vertices of their members, numbered as in the input: a facet may be in several.
-"""
+recognised on each rank by the vertices of their members, numbered as in the input: a facet may be in several."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -58,8 +57,7 @@ class Group:
     def tagged(cls, name: str, meshtags: Any, value: int, mesh: Mesh) -> Self:
         """Return the group of the facets, or cells, that have this value in DOLFINx MeshTags. Collective.
 
-        InputError, on all ranks, for tags of another mesh or dimension and for a value that none of any rank has.
-        """
+        InputError, on all ranks, for tags of another mesh or dimension and for a value that none of any rank has."""
         owner, things = f"{cls.__name__}.tagged", cls.__name__.lower()
         instance(owner, "mesh", mesh, Mesh, "give the DOLFINx mesh of the tags")
         provides(owner, "meshtags", meshtags, ("dim", "indices", "values"), "give DOLFINx MeshTags")
@@ -83,8 +81,7 @@ class Group:
         """Return the group of the facets of the boundary, or of the cells, whose vertices are all marked. Collective.
 
         ``marker``: x (3, n) [m] -> (n,) truth values, as in DOLFINx. InputError, on all ranks, when it fails or marks
-        none on any rank.
-        """
+        none on any rank."""
         owner, things, defects = f"{cls.__name__}.where", cls.__name__.lower(), [""]
         instance(owner, "mesh", mesh, Mesh, "give a DOLFINx mesh")
         function(owner, "marker", marker, "give a function of x (3, n) that returns n truth values")
@@ -111,8 +108,7 @@ class Facets(Group):
     """Name a part of the boundary or of an inner surface: local facets, ghosts included; kept ascending. Collective.
 
     ``Facets.tagged`` takes them from DOLFINx MeshTags, ``Facets.where`` from a function that marks points.
-    InputError, on all ranks, for numbers that are no facets of this mesh.
-    """
+    InputError, on all ranks, for numbers that are no facets of this mesh."""
 
     codimension: ClassVar[int] = 1
 
@@ -122,8 +118,7 @@ class Cells(Group):
     """Name a part of the body: local cells, ghosts included; kept ascending. Collective.
 
     ``Cells.tagged`` takes them from DOLFINx MeshTags, ``Cells.where`` from a function that marks points.
-    InputError, on all ranks, for numbers that are no cells of this mesh.
-    """
+    InputError, on all ranks, for numbers that are no cells of this mesh."""
 
     codimension: ClassVar[int] = 0
 
@@ -158,8 +153,7 @@ def read_mesh(path: str | Path, comm: MPI.Comm) -> tuple[Mesh, Tags]:
 
     Cells of second order, which may be curved, need ``assemble(…, degree=2)``. Coordinates are in metres. The file is
     in Gmsh's own format, MSH 2 to 4, text or binary. InputError is raised on every rank if the file is missing, is a
-    script, or is not a usable mesh (`vi_contact.meshes.extract.extract` lists the reasons). Collective.
-    """
+    script, or is not a usable mesh (`vi_contact.meshes.extract.extract` lists the reasons). Collective."""
     instance("read_mesh", "path", path, (str, Path), "give the path of a mesh file")
     return _distribute(comm, lambda: arrays_from_file(path))
 
@@ -167,8 +161,7 @@ def read_mesh(path: str | Path, comm: MPI.Comm) -> tuple[Mesh, Tags]:
 def build_mesh(mesh: MeshScript, comm: MPI.Comm) -> tuple[Mesh, Tags]:
     """Build a mesh without a file from a script of ``vi_contact.meshes``, or from any object with `build(gmsh)`.
 
-    It raises the errors of `read_mesh`. Collective.
-    """
+    It raises the errors of `read_mesh`. Collective."""
     provides("build_mesh", "mesh", mesh, ("build",), "give a script of vi_contact.meshes, BlockMesh(…) for example")
     return _distribute(comm, lambda: arrays_from_script(mesh))
 
@@ -176,8 +169,7 @@ def build_mesh(mesh: MeshScript, comm: MPI.Comm) -> tuple[Mesh, Tags]:
 def node_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
     """Number local geometry nodes (owned, then ghosts) as the input does, from 0: the rank among the nodes in use.
 
-    Collective. A part of a mesh (``create_submesh``) knows the numbers of the whole, and is numbered in their order.
-    """
+    Collective. A part of a mesh (``create_submesh``) knows the numbers of the whole, and is numbered in their order."""
     given = np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)
     if mesh.comm.allreduce(given.max(initial=-1), op=MPI.MAX) < mesh.geometry.index_map().size_global:
         return given

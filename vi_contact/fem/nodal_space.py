@@ -20,8 +20,7 @@ class NodalSpace:
         nodes: (k,) numbers of the owned nodes; points: their coordinates (k, d) [m].
         free_index: (k d,) the owned unknown that a component is, -1 where it is none; numbers: (k, d) the same among
             those of all ranks, also of a component that follows another; held: (k, d) components that are given.
-        ids: (n,) numbers of the owned unknowns on any ranks (node * d + component); unknowns: how many on all ranks.
-    """
+        ids: (n,) numbers of the owned unknowns on any ranks (node * d + component); unknowns: how many on all ranks."""
 
     algebra: Algebra
     comm: Comm
@@ -70,8 +69,7 @@ class NodalSpace:
     def find_nodes(self, points: Array) -> Indices:
         """Find the numbers of the nodes nearest to the points (k, d), equal on all ranks. Collective.
 
-        InputError for a point farther from every node than the body is large (5 % of its diagonal).
-        """
+        InputError for a point farther from every node than the body is large (5 % of its diagonal)."""
         found = np.empty(len(points), dtype=np.int64)
         for i, point in enumerate(np.atleast_2d(np.asarray(points, dtype=float))):
             if point.shape != (self.dimension,):

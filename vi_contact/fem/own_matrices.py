@@ -42,8 +42,7 @@ def system_from_arrays(M: Any, C: Any, K: Any, *, coordinates: Any, unknowns: An
         u0, v0: (n,) initial displacement [m] and velocity [m/s], zero when None.
     Raises:
         InputError: matrices that are not real, finite, square and of one size, M that is not symmetric or has masses
-            below zero; coordinates, unknowns or vectors that do not fit them.
-    """
+            below zero; coordinates, unknowns or vectors that do not fit them."""
     matrices = {name: _serial(name, A) for name, A in (("M", M), ("C", C), ("K", K)) if name != "C" or A is not None}
     n = matrices["K"].csr.shape[0]
     for name, one in matrices.items():
@@ -138,8 +137,7 @@ class MatrixSpace(NodalSpace):
 
     Attributes:
         coordinates: (n, d) position of the node of each unknown [m]; component: (n,), -1 for what is no displacement;
-            bodies: (n,) body of each.
-    """
+            bodies: (n,) body of each."""
 
     def __init__(self, algebra: Algebra, points: Array, block: Indices, component: Indices, K: Matrix) -> None:
         """``block``: (n,) the owned node of each unknown; nodes are numbered over the ranks. Collective."""

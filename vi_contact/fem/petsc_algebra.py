@@ -88,8 +88,7 @@ class PetscFactor:
     several ranks each keeps a whole copy of it, so that results do not depend on the order of messages, as those of
     MUMPS do. MUMPS takes the rest: large 3D matrices on several ranks, and what is too large to be copied.
     Options with the prefix vi_contact_factor_ choose otherwise. InputError when the matrix cannot be factorised.
-    ``symmetric`` False: LU of MUMPS.
-    """
+    ``symmetric`` False: LU of MUMPS."""
 
     def __init__(self, matrix: PetscMatrix, *, symmetric: bool = True) -> None:
         mat = matrix.mat

@@ -35,8 +35,7 @@ def system_from_matrices(M: Any, C: Any, K: Any, *, coordinates: Any, unknowns: 
         unknowns: (n, 2) this rank's node (0, 1, … on every rank) and component of each of its rows.
         clamped: its rows that stand still, counted from 0 on every rank.
     Raises:
-        InputError: matrices of another type, layout or communicator; what ``system_from_arrays`` refuses.
-    """
+        InputError: matrices of another type, layout or communicator; what ``system_from_arrays`` refuses."""
     given = {"coordinates": coordinates, "unknowns": unknowns, "clamped": clamped, "load": load, "u0": u0, "v0": v0}
     if not isinstance(K, PETSc.Mat):
         raise InputError(f"{OWNER}: K is {shown(K)}; give a PETSc.Mat, or scipy matrices to vc.system_from_arrays")

@@ -7,8 +7,7 @@ dashpots or free sides instead, what these supports carried goes on as the const
 
 so that u_0, its stresses and its contact are an equilibrium of the new problem too. A support that is added holds the
 body where the stage before has left it: its own displacement counts from there. Staging as in PLAXIS, LS-DYNA
-(INTERFACE_SSI_STATIC) and Abaqus (*GEOSTATIC).
-"""
+(INTERFACE_SSI_STATIC) and Abaqus (*GEOSTATIC)."""
 
 import logging
 from collections.abc import Sequence
@@ -35,8 +34,7 @@ def release(static: ContactProblem, state: State, problem: ContactProblem, *,
     ``state``: of ``static_equilibrium`` on ``static``; ``problem``: on the same mesh, with the same materials, loads
     and contact points, and a motion that starts from rest. t = 0. ``earlier``: problems of the stages before
     ``static``, whose supports may be released already. The space of ``problem`` notes where added supports hold it.
-    InputError for another mesh or other contact points, or when forces are missing where nothing was released.
-    """
+    InputError for another mesh or other contact points, or when forces are missing where nothing was released."""
     for one in (static, problem, *earlier):
         check_problem_given("release", one)
     check_sizes("release", static, state)

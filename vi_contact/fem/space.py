@@ -51,8 +51,7 @@ def space_of(owner: str, system: Any) -> "FemSpace":
 def bodies_of(system: SemiDiscreteSystem, cells: Cells) -> tuple[int, ...]:
     """Return the numbers of the bodies that a cell group is, parts of the mesh that share no node. Collective.
 
-    They are those of ``with_weight(system, bodies=…)``. InputError for a group that is only a part of a body.
-    """
+    They are those of ``with_weight(system, bodies=…)``. InputError for a group that is only a part of a body."""
     space = space_of("bodies_of", system)
     cells_of("bodies_of", "cells", cells, space.mesh)
     body = body_numbers(space.mesh)[compat.geometry_dofmap(space.mesh)[:, 0]]
@@ -67,8 +66,7 @@ def bodies_of(system: SemiDiscreteSystem, cells: Cells) -> tuple[int, ...]:
 def known_matrices(owner: str, system: SemiDiscreteSystem, names: str) -> None:
     """Warn when M, C or K of a system is not what fem.assemble made, for outputs that go by the materials given there.
 
-    Springs added to K leave the stresses of the elements as they are; another material does not.
-    """
+    Springs added to K leave the stresses of the elements as they are; another material does not."""
     found = system.space.forms.foreign(system, names)  # type: ignore[attr-defined]
     if found and system.algebra.comm.rank == 0:
         log.warning("%s: %s of the system is not the one that fem.assemble made: this output uses the materials, "
@@ -89,8 +87,7 @@ class FemSpace(NodalSpace):
         nodes: numbers of the nodes of the owned blocks, those of the mesh (``fem.numbering``: of mid-points too);
             points: their coordinates (k, d); node_of_block: the numbers, those of ghosts too.
         ids: rank-independent numbers of the free unknowns (node * d + component).
-        unknowns: number of free unknowns on all ranks.
-    """
+        unknowns: number of free unknowns on all ranks."""
 
     def __init__(self, mesh: Any, prescribed: Sequence[Prescribed | GivenValues], tied: Sequence[Tied] = (),
                  degree: int = 1, V: Any = None, quadrature_degree: int | None = None) -> None:
@@ -236,8 +233,7 @@ class FemSpace(NodalSpace):
     def prescribed_values(self, t: float, derivative: int = 0) -> Array:
         """Return the full owned vector of U(x, t) or its time derivative; zero on free components.
 
-        Where conditions meet, the later one counts; what they say is added to where an earlier stage left the nodes.
-        """
+        Where conditions meet, the later one counts; what they say is added to where an earlier stage left the nodes."""
         values = np.zeros((len(self.nodes), self.dimension))
         defects = []
         for condition, places in zip(self.prescribed, self._where_held, strict=True):

@@ -5,8 +5,7 @@
 The nodes of the second boundary are eliminated: P of u_full = P u_free + U gets, in their rows, the ones of their
 partners, and Pᵀ adds their forces to them. Exact, no penalty. Tied sides reproduce the one-dimensional motion of a
 layered soil exactly and send every other wave through: what leaves on the right comes back in from the left.
-Source: Zienkiewicz, Bicanic and Shen (1988); compared with others by Kontoe et al. (2007).
-"""
+Source: Zienkiewicz, Bicanic and Shen (1988); compared with others by Kontoe et al. (2007)."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -58,8 +57,7 @@ def linked(tied: Sequence[Tied], dimension: int, near: float, nodes: NodesOf) ->
 
     What several ties join moves as one: of the four vertical edges of a box whose sides are tied both ways, three
     follow the one that is on no second boundary. InputError for nodes without a partner, boundaries that share nodes,
-    and a component that does not exist.
-    """
+    and a component that does not exist."""
     if not tied:
         return Links(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
     pairs = [_pairs(tie, dimension, near, nodes) for tie in tied]

@@ -18,8 +18,7 @@ class Processing:
     each end; low, high: Butterworth corners [Hz] with order and causal; resample: time step [s]; baseline: degree of
     `baseline_corrected`; then one of scale (factor), pga [m/s²], arias [m/s], psa (value [m/s²], period [s]).
     Filtering and tapering need the record's own step, the baseline the final samples; scaling commutes with all.
-    Raises InputError when more than one scaling is asked for; calling raises that of the steps.
-    """
+    Raises InputError when more than one scaling is asked for; calling raises that of the steps."""
 
     trim: tuple[float, float | None] | None = None
     pad: tuple[float, float] | None = None
@@ -71,24 +70,21 @@ class Processing:
 def scaled_to_pga(record: Record, target: float) -> Record:
     """Scale a record so that its largest |acceleration| is `target` [m/s²], and keep its sign.
 
-    Raises InputError unless target > 0 and the record is not all zero.
-    """
+    Raises InputError unless target > 0 and the record is not all zero."""
     return scaled(record, factor=_ratio(record, "scaled_to_pga", target, pga(record)))
 
 
 def scaled_to_psa(record: Record, target: float, period: float, *, damping: float = 0.05) -> Record:
     """Scale a record so that its pseudo-acceleration at `period` [s] is `target` [m/s²], and keep its sign.
 
-    Raises InputError unless target > 0 and the record is not all zero.
-    """
+    Raises InputError unless target > 0 and the record is not all zero."""
     return scaled(record, factor=_ratio(record, "scaled_to_psa", target, psa(record, period, damping=damping)))
 
 
 def scaled_to_arias(record: Record, target: float) -> Record:
     """Scale a record so that its Arias intensity is `target` [m/s], and keep its sign.
 
-    Raises InputError unless target > 0 and the record is not all zero.
-    """
+    Raises InputError unless target > 0 and the record is not all zero."""
     return scaled(record, factor=math.sqrt(_ratio(record, "scaled_to_arias", target, arias(record))))
 
 

@@ -21,8 +21,7 @@ class EC8Spectrum:
 
     ag: design ground acceleration on ground A, gamma_I a_gR [m/s²]; s: soil factor; tb, tc, td [s]; damping: ratio;
     plateau: 2.5, or 3.0 vertically. A National Annex may give other numbers.
-    Raises InputError unless ag, s > 0, 0 < tb <= tc <= td and 0 <= damping < 1.
-    """
+    Raises InputError unless ag, s > 0, 0 < tb <= tc <= td and 0 <= damping < 1."""
 
     ag: float
     s: float

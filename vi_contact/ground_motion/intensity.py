@@ -42,8 +42,7 @@ def arias(record: Record) -> float:
 def d5_95(record: Record) -> float:
     """Return the time between 5 % and 95 % of the Arias intensity [s], zero for a record that is all zero.
 
-    Both instants are interpolated linearly in the Husid curve, the Arias intensity accumulated up to t.
-    """
+    Both instants are interpolated linearly in the Husid curve, the Arias intensity accumulated up to t."""
     return significant_duration(record, 0.05, 0.95)
 
 
@@ -104,8 +103,7 @@ def predominant_period(record: Record, *, damping: float = 0.05) -> float:
 def mean_period(record: Record) -> float:
     """Return the mean period of Rathje, Abrahamson and Bray (1998) [s]: sum(C²/f) / sum(C²), 0.25 <= f <= 20 Hz.
 
-    C are the Fourier amplitudes. Raises InputError when nothing lies in that band.
-    """
+    C are the Fourier amplitudes. Raises InputError when nothing lies in that band."""
     frequencies, amplitudes = fourier_spectrum(record)
     inside = (frequencies >= 0.25) & (frequencies <= 20.0)
     power = amplitudes[inside] ** 2

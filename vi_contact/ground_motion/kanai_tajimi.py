@@ -18,8 +18,7 @@ class KanaiTajimi:
     S = S0 (wg⁴ + 4 zg² wg² w²) / ((wg² - w²)² + 4 zg² wg² w²) · w⁴ / ((wf² - w²)² + 4 zf² wf² w²), the last factor
     only when omega_f > 0 (Clough and Penzien, 1975). s0: density of the rock's white noise [m²/s³]; omega_g, omega_f
     [rad/s]; zeta_g, zeta_f: damping ratios. The default is firm ground.
-    Raises InputError unless s0, omega_g, zeta_g, zeta_f > 0 and omega_f >= 0.
-    """
+    Raises InputError unless s0, omega_g, zeta_g, zeta_f > 0 and omega_f >= 0."""
 
     s0: float
     omega_g: float = 15.6
@@ -46,8 +45,7 @@ class KanaiTajimi:
 class Envelope:
     """Describe an envelope (t/rise)², then 1, then exp(-decay (t - end)): Jennings, Housner and Tsai (1968).
 
-    rise, end: [s], 0 <= rise <= end; decay: [1/s] >= 0. Raises InputError otherwise.
-    """
+    rise, end: [s], 0 <= rise <= end; decay: [1/s] >= 0. Raises InputError otherwise."""
 
     rise: float
     end: float
@@ -71,8 +69,7 @@ def synthetic(spectrum: KanaiTajimi, duration: float, dt: float, *, seed: int,
     Spectral representation (Shinozuka and Deodatis, 1991) with w_k = k dw, dw = 2 pi / period; the period, the next
     power of two of steps from twice the duration, keeps the motion from repeating. Without an envelope it is stationary
     over all seeds, of mean 0 and variance 2 sum S(w_k) dw. One seed gives one motion on all ranks. Scale with
-    `scaled_to_pga`; correct the baseline where displacements are prescribed. InputError unless 0 < dt < duration.
-    """
+    `scaled_to_pga`; correct the baseline where displacements are prescribed. InputError unless 0 < dt < duration."""
     if not 0.0 < dt < duration < math.inf:
         raise InputError(f"synthetic: duration={duration!r}, dt={dt!r} s; give 0 < dt < duration")
     counted("synthetic", f"duration={duration!r} and dt={dt!r} s", 4.0 * duration / dt)

@@ -1,7 +1,6 @@
 """Scale, resample, integrate, cut, lengthen, taper and filter records, and correct their baselines.
 
-Every function returns a new value and notes what it did. Between samples the acceleration is a straight line.
-"""
+Every function returns a new value and notes what it did. Between samples the acceleration is a straight line."""
 
 import math
 from dataclasses import replace
@@ -32,8 +31,7 @@ def resampled(record: Record, dt: float) -> Record:
     that does not start and end near zero is bent towards zero over ten steps, of the longer kind, at each end. dt must
     be the record's step times a ratio of whole numbers up to 1000; `GroundMotion` interpolates for any other step.
     Sample 0 stays at t = 0; the new record ends at the last multiple of dt inside the old one.
-    Raises InputError when dt is not positive, not such a ratio, or longer than the record.
-    """
+    Raises InputError when dt is not positive, not such a ratio, or longer than the record."""
     dt = number("resampled", "dt", dt, positive=True, unit="seconds")
     counted("resampled", f"dt={dt!r} s", record.duration / dt)
     from scipy.signal import resample_poly  # late: it takes longer to import than the rest of the package
@@ -58,8 +56,7 @@ def integrated(record: Record) -> tuple[Array, Array]:
 
     Exact for an acceleration that is a straight line between samples: the trapezoidal rule for the velocity,
     v_{k+1} = v_k + dt (a_k + a_{k+1}) / 2, and u_{k+1} = u_k + dt v_k + dt² (2 a_k + a_{k+1}) / 6.
-    Nothing is filtered and no baseline is corrected: what is left at the end is the drift of the record.
-    """
+    Nothing is filtered and no baseline is corrected: what is left at the end is the drift of the record."""
     a, dt = record.acceleration, record.dt
     velocity = np.concatenate(([0.0], np.cumsum(0.5 * dt * (a[:-1] + a[1:]))))
     displacement = np.concatenate(([0.0], np.cumsum(dt * velocity[:-1] + dt**2 / 6.0 * (2.0 * a[:-1] + a[1:]))))
@@ -69,8 +66,7 @@ def integrated(record: Record) -> tuple[Array, Array]:
 def trimmed(record: Record, start: float = 0.0, end: float | None = None) -> Record:
     """Keep the samples at start <= t <= end [s]; the first one kept becomes t = 0. end: the record's last sample.
 
-    Raises InputError unless 0 <= start < end <= duration and two samples are left.
-    """
+    Raises InputError unless 0 <= start < end <= duration and two samples are left."""
     last = record.duration if end is None else end
     slack = 1e-9 * record.dt
     if not -slack <= start < last <= record.duration + slack:
@@ -86,8 +82,7 @@ def trimmed(record: Record, start: float = 0.0, end: float | None = None) -> Rec
 def padded(record: Record, before: float = 0.0, after: float = 0.0) -> Record:
     """Add zeros for `before` seconds ahead of the record and `after` seconds behind it, rounded up to whole steps.
 
-    Raises InputError unless both are zero or positive.
-    """
+    Raises InputError unless both are zero or positive."""
     if not all(0.0 <= length < math.inf for length in (before, after)):
         raise InputError(f"padded: before={before!r} and after={after!r} s; give zero or positive lengths")
     asked = [length / record.dt * (1.0 - 1e-9) for length in (before, after)]
@@ -100,8 +95,7 @@ def padded(record: Record, before: float = 0.0, after: float = 0.0) -> Record:
 def without_mean(record: Record, *, until: float | None = None) -> Record:
     """Subtract the mean of the record, or of the samples at t <= until [s], the quiet before the shaking.
 
-    Raises InputError when until is not within the record.
-    """
+    Raises InputError when until is not within the record."""
     end = record.duration if until is None else until
     if not 0.0 <= end <= record.duration:
         raise InputError(f"without_mean: until is {until!r} s; give a time within the record's {record.duration:g} s")
@@ -133,8 +127,7 @@ def filtered(record: Record, *, low: float | None = None, high: float | None = N
     pass forward, which delays. Otherwise (default) forward and backward: no phase shift and the gain |H|², -6 dB at the
     corners. The record is taken as zero outside; it keeps its length, so what a zero-phase filter sends out before the
     start and after the end is cut off: use `padded` before where that matters.
-    Raises InputError for corners that are not 0 < low < high < Nyquist frequency, or an order outside 1 to 10.
-    """
+    Raises InputError for corners that are not 0 < low < high < Nyquist frequency, or an order outside 1 to 10."""
     nyquist = 0.5 / record.dt
     corners = [corner for corner in (low, high) if corner is not None]
     if not corners or not all(0.0 < corner < nyquist for corner in corners) or sorted(set(corners)) != corners:
@@ -167,8 +160,7 @@ def baseline_corrected(record: Record, *, degree: int = 2, displacement: bool = 
     c minimises the sum of squares of the velocity left over (of the displacement, if `displacement`), subject to
     v(T) = u(T) = 0; v and u are those of `integrated`, so both end at zero to round-off. A second correction
     changes nothing, and a record that is itself such a polynomial becomes zero.
-    Raises InputError unless degree is a whole number from 1 to 6 and below the number of samples.
-    """
+    Raises InputError unless degree is a whole number from 1 to 6 and below the number of samples."""
     if degree not in range(1, min(HIGHEST, record.acceleration.size - 1) + 1):
         raise InputError(f"baseline_corrected: degree is {degree!r}; give a whole number from 1 to {HIGHEST}, below "
                          "the number of samples")

@@ -26,8 +26,7 @@ class Record:
     notes: what the file says about station and processing, then every change made since, one line each; station and
     component (direction): as the file names them, empty where it does not.
     Between samples the acceleration is a straight line. Two records are equal only if they are the same object.
-    Raises InputError for NaN or infinite samples, fewer than two of them, or a time step that is not positive.
-    """
+    Raises InputError for NaN or infinite samples, fewer than two of them, or a time step that is not positive."""
 
     acceleration: Array
     dt: float

@@ -3,8 +3,7 @@
 Nigam and Jennings (1969): between samples the acceleration is a straight line, so the oscillator
 u'' + 2 zeta omega u' + omega² u = -a(t) has a closed solution from one sample to the next, exact for any period and
 step. Peaks between samples are found too: the same solution is read at 64 instants a period or more, and 4 a step, so
-the peak of a vibration is at most 1 - cos(pi/64) = 0.12 % low. The free vibration after the last sample counts.
-"""
+the peak of a vibration is at most 1 - cos(pi/64) = 0.12 % low. The free vibration after the last sample counts."""
 
 import math
 from dataclasses import dataclass
@@ -32,8 +31,7 @@ class ResponseSpectrum:
     """Hold the peaks of the response of damped oscillators at rest at t = 0, each of shape (m,).
 
     periods [s]; damping: ratio zeta; displacement: relative, SD [m]; velocity: relative, SV [m/s]; acceleration:
-    absolute, SA = max |u'' + a| [m/s²].
-    """
+    absolute, SA = max |u'' + a| [m/s²]."""
 
     periods: Array
     damping: float
@@ -95,8 +93,7 @@ def response_spectrum(record: Record, periods: Array, *, damping: float = 0.05) 
     """Return the peaks of relative displacement, relative velocity and absolute acceleration at each period [s].
 
     A record says little about periods below ten of its steps: between its samples nothing is known but the straight
-    line assumed here. Raises InputError unless every period is positive and 0 <= damping < 1.
-    """
+    line assumed here. Raises InputError unless every period is positive and 0 <= damping < 1."""
     row = np.atleast_1d(np.asarray(periods, dtype=float))
     if row.ndim != 1 or not row.size or not np.all(np.isfinite(row)) or np.any(row <= 0.0):
         raise InputError(f"response_spectrum: periods are {periods!r}; give a row of positive numbers of seconds")
@@ -118,8 +115,7 @@ def fourier_spectrum(record: Record) -> tuple[Array, Array]:
     """Return the frequencies [Hz] and Fourier amplitudes |A(f)| [m/s], from 0 to the Nyquist frequency.
 
     A(f) is the integral of a(t) exp(-2 pi i f t), by the rectangle rule: dt times the discrete transform, no window.
-    Two-sided: the integral of |A|² over all f, negative ones too, is dt sum a² (Parseval).
-    """
+    Two-sided: the integral of |A|² over all f, negative ones too, is dt sum a² (Parseval)."""
     amplitudes = record.dt * np.abs(np.fft.rfft(record.acceleration))
     return np.fft.rfftfreq(record.acceleration.size, record.dt), amplitudes
 

@@ -4,8 +4,7 @@ An excitation is a frozen value with `acceleration(t)` (a float), `direction` (a
 (the time [s] after which it is zero, or negligible, for good); called, it returns the vector a(t) · direction of shape
 (d,). The direction is used as given, never normalised: (1, 0.5) shakes the second axis half as much. The vector is the
 acceleration of the ground; in the frame that moves with the ground it loads the body with -M r a(t). Horizontal and
-vertical motion together are a sequence of excitations.
-"""
+vertical motion together are a sequence of excitations."""
 
 import math
 from bisect import bisect_right
@@ -23,8 +22,7 @@ from ..core.protocols import check_excitation, finite_tuple, vector
 class Harmonic:
     """Shake with a(t) = amplitude · sin(2 pi frequency t + phase) at all times.
 
-    amplitude [m/s²]; frequency [Hz] > 0; phase [rad]. Raises InputError for values out of range or not finite.
-    """
+    amplitude [m/s²]; frequency [Hz] > 0; phase [rad]. Raises InputError for values out of range or not finite."""
 
     amplitude: float
     frequency: float
@@ -48,8 +46,7 @@ class Ricker:
 
     amplitude [m/s²], the peak; frequency [Hz] > 0, where the spectrum peaks; delay [s] >= 0, the time of the peak, by
     default 1.5 / frequency, which makes |a(0)| < 1e-8 |amplitude|; a smaller one starts with a jump. Velocity and
-    displacement both return to zero. Raises InputError for values out of range or not finite.
-    """
+    displacement both return to zero. Raises InputError for values out of range or not finite."""
 
     amplitude: float
     frequency: float
@@ -124,8 +121,7 @@ class Rectangular(Pulse):
 class Tabulated:
     """Shake with accelerations [m/s²] at given times [s], straight lines between them, zero before and after them.
 
-    times: strictly increasing, at least two; values: as many, kept as tuples. InputError for others, NaN, infinity.
-    """
+    times: strictly increasing, at least two; values: as many, kept as tuples. InputError for others, NaN, infinity."""
 
     times: Sequence[float]
     values: Sequence[float]

@@ -6,8 +6,7 @@ With r_n >= 0 the normal reaction of a contact node and r_t its tangential react
 
 and differs only in `limit`, which is affine in the pressure: limit = cohesion + slope max(r_n, 0). Reactions are forces
 [N] for displacement schemes and impulses [N s] for velocity schemes; `scale` (1 or the time step [s]) is the factor
-between the two, so that a stress times a nodal weight becomes either. The slope may depend on the slip rate: `at`.
-"""
+between the two, so that a stress times a nodal weight becomes either. The slope may depend on the slip rate: `at`."""
 
 import math
 from collections.abc import Callable
@@ -26,8 +25,7 @@ class Tresca:
     """Bound friction by a threshold [Pa] >= 0, whether or not the node touches: limit = threshold · weight · scale.
 
     ``threshold``: a number, or one per contact point (then kept as a tuple). Raises InputError when one is negative or
-    not a finite number, and, when used, for a wrong count.
-    """
+    not a finite number, and, when used, for a wrong count."""
 
     threshold: float | Array | tuple[float, ...]
 
@@ -52,8 +50,7 @@ class Coulomb:
     """Bound dry friction by a coefficient mu >= 0: limit = mu · r_n, zero for an open node.
 
     ``mu`` is a number, or has one per contact point (then kept as a tuple). InputError is raised when one is negative
-    or not a finite number, and, when the law is used, if their count is wrong.
-    """
+    or not a finite number, and, when the law is used, if their count is wrong."""
 
     mu: float | Array | tuple[float, ...]
 
@@ -80,8 +77,7 @@ class SlipRateCoulomb:
     ``mu``: ExponentialDecay, StaticKinetic, or any function that takes speeds [m/s] >= 0, shape (n,), and returns as
     many coefficients, or one. InputError for no function and, when used, a negative or infinite coefficient.
 
-    Implicit: |v| is that of the step being solved, (B_t u1 - B_t u0)/dt or B_t v1. mu(0) is the static coefficient.
-    """
+    Implicit: |v| is that of the step being solved, (B_t u1 - B_t u0)/dt or B_t v1. mu(0) is the static coefficient."""
 
     mu: "ExponentialDecay | StaticKinetic | Callable[[Array], Any]"
 
@@ -135,8 +131,7 @@ class TwoCoefficients:
 class ExponentialDecay(TwoCoefficients):
     """Give mu(v) = mu_k + (mu_s - mu_k) exp(-v/v_c): from static to kinetic friction over the speed v_c [m/s] > 0.
 
-    mu_s, mu_k: numbers >= 0, or one per contact point. InputError for other values.
-    """
+    mu_s, mu_k: numbers >= 0, or one per contact point. InputError for other values."""
 
     v_c: float
 
@@ -156,8 +151,7 @@ class ExponentialDecay(TwoCoefficients):
 class StaticKinetic(TwoCoefficients):
     """Give mu_s at rest, mu_k in motion: the limit of ExponentialDecay for v_c -> 0. Where both hold, rest is chosen.
 
-    mu_s >= mu_k >= 0: numbers, or one per contact point. InputError for other values.
-    """
+    mu_s >= mu_k >= 0: numbers, or one per contact point. InputError for other values."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -174,8 +168,7 @@ def project(r_t: Array, limit: Array) -> Array:
     """Return the nearest point of the friction disks |r_t| <= limit: r_t · min(1, limit / |r_t|), node by node.
 
     r_t: tangential reactions, shape (n, d - 1); limit: radii >= 0, shape (n,), infinite for a node that cannot slip.
-    Returns a new array of the shape of r_t. Raises InputError when the shapes do not match.
-    """
+    Returns a new array of the shape of r_t. Raises InputError when the shapes do not match."""
     if r_t.ndim != 2 or limit.shape != r_t.shape[:1]:
         raise InputError(f"project: r_t has shape {r_t.shape} and limit {limit.shape}; "
                          "give one row of tangential components and one limit per node")

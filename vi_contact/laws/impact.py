@@ -10,8 +10,7 @@ After each step a law says which normal velocity every contact condition shall h
 A law sees the velocity before the contact (the old state's) and the one the step left. Restitution refers to the
 former: what the step leaves of the approach depends on when in the step the gap closed. The step's contact work and the
 impact loss are therefore to be read together: what the step took beyond the collision, the law gives back. Restitution
-here is a nodal law; on a fine mesh it has no macroscopic effect.
-"""
+here is a nodal law; on a fine mesh it has no macroscopic effect."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -48,8 +47,7 @@ class ComponentReset:
     """Set the normal components: the literal rule of the boundary method.
 
     At a corner with oblique faces of which some only are closed the velocity of the node changes along the normals of
-    these, and with it the normal components on its other faces, as at any other node.
-    """
+    these, and with it the normal components on its other faces, as at any other node."""
 
     by_rows: ClassVar[bool] = True
 
@@ -66,8 +64,7 @@ class ImpulseUpdate:
     The system keeps M condensed onto the contact unknowns, and M⁻¹Bᵀ where it is sparse, as it decays to round-off
     within thirty elements; else an impact costs half a substitution (``core.condensation``). Large systems, from 50 000
     unknowns in space and 300 000 in the plane, are not factorised: M (v⁺ - v⁻) = 0 off the chosen unknowns, by
-    conjugate gradients to round-off at every impact.
-    """
+    conjugate gradients to round-off at every impact."""
 
     def __call__(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
         worth = IN_PLANE if surface.points.shape[1] == 2 else 1
@@ -138,8 +135,7 @@ class Inelastic(ByUpdate):
 class Newton(ByUpdate):
     """Apply Newton's law v_n⁺ = -e v_n⁻ on points that have just closed; points that stay closed are left to the step.
 
-    v_n⁻ is the velocity of approach before the step: a single mass rebounds with e times its speed at every dt.
-    """
+    v_n⁻ is the velocity of approach before the step: a single mass rebounds with e times its speed at every dt."""
 
     e: float
     update: VelocityUpdate = field(default_factory=ComponentReset)

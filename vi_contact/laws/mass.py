@@ -3,8 +3,7 @@
 With mass at the contact nodes every closure is an impact of that mass: forces ring and, with contact in the
 acceleration balance, energy grows. Without it the contact unknowns follow the body statically (Khenous, Laborde and
 Renard 2008; Hager, Hüeber and Wohlmuth 2008), the semi-discrete problem has a unique energy-conserving solution, and
-contact forces are those of the waves alone.
-"""
+contact forces are those of the waves alone."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -49,8 +48,7 @@ class Redistributed:
     of plane triangles, which does no harm, and may be negative on curved ones: those want lumping 0. P2 tetrahedra are
     not lumped: their vertices would bear it all, and frequencies fall by per cents. InputError for lumping outside
     [0, 1] or above 0 with negative row sums, a contact node with no material behind it, or a mesh too coarse to hold
-    the inertia.
-    """
+    the inertia."""
 
     lumping: float = 0.4
 

@@ -5,8 +5,7 @@ best, weighted with their entries w_J of the mass matrix:
 
     v_i = R_i a,   G a = sum_J w_J R_Jᵀ v_J,   G = sum_J w_J R_Jᵀ R_J,   R = (q, q·(e_k x (X - X_c)) for rotations k)
 
-so that every rigid motion is kept exactly. In 1D it is the velocity of the neighbour.
-"""
+so that every rigid motion is kept exactly. In 1D it is the velocity of the neighbour."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -83,8 +82,7 @@ def _alike(counts: Indices, chosen: Mask) -> Iterator[Indices]:
 class _Neighbours:
     """Unknowns of all donor nodes next to the contact nodes of this rank, and some others, sorted by column.
 
-    columns: numbers over all ranks; node: 0, 1, … of their nodes; directions, points: (k, d).
-    """
+    columns: numbers over all ranks; node: 0, 1, … of their nodes; directions, points: (k, d)."""
 
     columns: Indices
     node: Indices

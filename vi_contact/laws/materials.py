@@ -1,7 +1,6 @@
 """Describe what a body is made of: isotropic elasticity, the section it is cut to, and the damping of its motion.
 
-Everything here is a frozen value checked when it is built; SI units throughout; no finite element is needed.
-"""
+Everything here is a frozen value checked when it is built; SI units throughout; no finite element is needed."""
 
 import math
 from dataclasses import dataclass
@@ -18,8 +17,7 @@ class LinearElastic:
     """Describe isotropic elasticity, sigma = lame_lambda tr(eps) I + 2 shear_modulus eps.
 
     E: Young's modulus [Pa] > 0; nu: Poisson's ratio, -1 < nu < 1/2; rho: mass density [kg/m³] > 0.
-    InputError is raised when one of them is outside its range or not finite.
-    """
+    InputError is raised when one of them is outside its range or not finite."""
 
     E: float
     nu: float
@@ -45,8 +43,7 @@ class LinearElastic:
         """Return the material whose pressure and shear waves travel at c_p and c_s [m/s].
 
         nu = (c_p² - 2 c_s²) / (2 (c_p² - c_s²)), shear_modulus = rho c_s², E = 2 shear_modulus (1 + nu).
-        Raises InputError unless c_p > sqrt(4/3) c_s > 0, which is nu > -1.
-        """
+        Raises InputError unless c_p > sqrt(4/3) c_s > 0, which is nu > -1."""
         for name, speed in (("c_p [m/s]", c_p), ("c_s [m/s]", c_s), ("rho [kg/m³]", rho)):
             number("LinearElastic.from_wave_speeds", name, speed, positive=True)
         if 3.0 * c_p**2 <= 4.0 * c_s**2:
@@ -174,8 +171,7 @@ class Rayleigh:
     """Damp by C = alpha M + beta K; alpha [1/s] >= 0, beta [s] >= 0, K the stiffness without any contact term.
 
     Once a body lifts off, alpha M also resists its rigid rocking, which nothing physical does: with uplift prefer
-    alpha = 0. Raises InputError for a negative or non-finite coefficient.
-    """
+    alpha = 0. Raises InputError for a negative or non-finite coefficient."""
 
     alpha: float
     beta: float
@@ -190,8 +186,7 @@ class Rayleigh:
 
         alpha = 2 w1 w2 (w2 xi1 - w1 xi2) / (w2² - w1²), beta = 2 (w2 xi2 - w1 xi1) / (w2² - w1²); for equal ratios xi
         alpha = 2 xi w1 w2 / (w1 + w2) and beta = 2 xi / (w1 + w2). 5 % at 1 and 10 Hz: 0.5712 1/s and 1.4469e-3 s.
-        Raises InputError when f1 = f2 or when the solution needs a negative coefficient.
-        """
+        Raises InputError when f1 = f2 or when the solution needs a negative coefficient."""
         for name, f in (("f1", f1), ("f2", f2)):
             number("Rayleigh.from_frequencies", f"the frequency {name} [Hz]", f, positive=True)
         for name, xi in (("xi1", xi1), ("xi2", xi2)):
@@ -215,8 +210,7 @@ class Rayleigh:
     def ratio(self, f: float) -> float:
         """Return the damping ratio alpha / (2 w) + beta w / 2 of a mode of frequency f = w / 2 pi [Hz] > 0.
 
-        Smallest at w = sqrt(alpha / beta), where it is sqrt(alpha beta).
-        """
+        Smallest at w = sqrt(alpha / beta), where it is sqrt(alpha beta)."""
         number("Rayleigh.ratio", "the frequency f [Hz]", f, positive=True)
         w = 2.0 * math.pi * f
         return 0.5 * (self.alpha / w + self.beta * w)
@@ -230,8 +224,7 @@ class DampingRatio:
         C = alpha M + beta K,    alpha = 2 xi w1 w2 / (w1 + w2),    beta = 2 xi / (w1 + w2),    w = 2 pi f
 
     ``second`` is f2, or zero for damping of the stiffness alone: xi f/f1 at f. With two frequencies the ratio is less
-    than xi between them and more outside, and alpha M also resists rigid rocking (see ``Rayleigh``).
-    """
+    than xi between them and more outside, and alpha M also resists rigid rocking (see ``Rayleigh``)."""
 
     frequency: float
     second: float = 0.0
@@ -258,8 +251,7 @@ class KelvinVoigt:
     without lateral strain. Not for PlaneStress, where the strain across the panel would have a motion of its own
     (``assemble`` refuses it). With viscosities beta times the shear and bulk moduli, mu and lambda + 2/3 mu, it is
     Rayleigh(0, beta), the solid of one retardation time, which goes with PlaneStress too.
-    Raises InputError for a viscosity that is negative or not finite.
-    """
+    Raises InputError for a viscosity that is negative or not finite."""
 
     shear: float
     bulk: float = 0.0

@@ -33,8 +33,7 @@ class Orthotropic:
             whose columns are the axes 1, 2, 3. A body in the plane needs z among the axes.
     Raises:
         InputError: a modulus or density that is not positive, ratios with which some strain would have negative energy,
-            axes that are no rotation.
-    """
+            axes that are no rotation."""
 
     E1: float
     E2: float
@@ -92,8 +91,7 @@ class Orthotropic:
     def matrix(self, section: Section, dimension: int) -> Array:
         """Return the stresses (rows in the order of ``VOIGT``, in the plane then sigma_zz) of unit strains [Pa].
 
-        (4, 3) in the plane, (6, 6) in space; InputError for material axes that leave the plane, and on a line.
-        """
+        (4, 3) in the plane, (6, 6) in space; InputError for material axes that leave the plane, and on a line."""
         if dimension not in VOIGT:
             raise InputError("Orthotropic is for bodies in the plane or in space: give a LinearElastic here")
         C = self.stiffness

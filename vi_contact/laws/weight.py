@@ -19,8 +19,7 @@ def with_weight(system: SemiDiscreteSystem, *, acceleration: float = STANDARD_GR
     acceleration: g [m/s²]; direction: where it acts, of length one, (0, -1) or (0, 0, -1) by default, in one dimension
     (-1,). bodies: the numbers of those that have weight (``fem.bodies_of``), all by default. It is the load of
     ``BodyForce`` with the density of every material. InputError for a direction of another length, and a system without
-    ``base_inertia``: it lost the mass at held nodes.
-    """
+    ``base_inertia``: it lost the mass at held nodes."""
     instance("with_weight", "system", system, SemiDiscreteSystem, "give a system, such as fem.assemble returns")
     number("with_weight", "acceleration", acceleration, unit="m/s²")
     d = system.influence.shape[1]

@@ -1,8 +1,7 @@
 """Mesh a bar, rectangle or box, evenly divided, if wanted bent by a smooth map and turned: the body of most tests.
 
 Physical groups: cells "block"; boundary "left", "right" (x lowest, highest), "bottom", "top" (y), "back", "front" (z,
-front towards the viewer). A bar has the first two, a rectangle four, a box six.
-"""
+front towards the viewer). A bar has the first two, a rectangle four, a box six."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -23,8 +22,7 @@ class BlockMesh:
     """Describe a mesh of a d-dimensional box, d = len(lengths) = 1, 2 or 3.
 
     A node starts at corner + (i lengths_x/n_x, ...), is moved by `deform`, then turned by `angle` [rad] about the
-    origin (the z axis in space). `deform` takes and returns points (n, d) [m]. InputError if the sizes make no box.
-    """
+    origin (the z axis in space). `deform` takes and returns points (n, d) [m]. InputError if the sizes make no box."""
 
     lengths: tuple[float, ...] = (1.0, 1.0)
     divisions: tuple[int, ...] = (1, 1)

@@ -3,8 +3,7 @@
 Physical groups: cells "channel", "soil"; boundary "bedrock" (y = 0), "left_side", "right_side" (x = 0, width),
 "surface" (y = depth); the interface from both sides, "channel_left", "channel_base", "channel_right" and "soil_left",
 "soil_base", "soil_right", divided alike; "channel_inside" (what the water wets) and "channel_top" (the tops of its
-walls, which end at the surface). Of two nodes at one place the channel's comes first.
-"""
+walls, which end at the surface). Of two nodes at one place the channel's comes first."""
 
 import math
 from collections.abc import Sequence
@@ -28,8 +27,7 @@ class ChannelMesh:
     `left` is x of the outer left side of the channel, which is in the middle by default. Every part is divided evenly
     into rectangles of about `size` [m], or with `triangles` into their halves. With `far` [m] the mesh has irregular
     triangles, which grow from `size` at the channel to `far` at bedrock and sides. Raises InputError for sizes that
-    make no such layer.
-    """
+    make no such layer."""
 
     width: float = 24.0
     depth: float = 8.0
@@ -92,8 +90,7 @@ class ChannelMesh:
 def channel_grid(x: Sequence[float], y: Sequence[float], size: float, *, triangles: bool = False) -> MeshArrays:
     """Divide channel and soil between the lines x (6,) and y (4,) of `ChannelMesh` into cells of about `size` [m].
 
-    Diagonals of triangles run upwards to the middle of the channel on both sides of it: symmetric layers stay so.
-    """
+    Diagonals of triangles run upwards to the middle of the channel on both sides of it: symmetric layers stay so."""
     xs, ys = _divided(x, size), _divided(y, size)
     middle_x, middle_y = (0.5 * (line[1:] + line[:-1]) for line in (xs, ys))
     right, up = np.meshgrid(middle_x, middle_y, indexing="ij")

@@ -1,8 +1,7 @@
 """Check what a solver asks of a mesh: cells with volume, neither twisted nor folded; boundary groups of their sides.
 
 Pure arithmetic on arrays: points (n, d) [m], cells (n_cells, n_vertices) as rows of points, vertices in Gmsh's order.
-Cells may run either way round (finite elements use |det J|), neighbours may not lie on the same side of a facet.
-"""
+Cells may run either way round (finite elements use |det J|), neighbours may not lie on the same side of a facet."""
 
 import numpy as np
 

@@ -1,8 +1,7 @@
 """Make joints and cracks: nodes along an inner boundary are doubled, or those of two bodies welded into one.
 
 Two bodies that may part need nodes of their own on either side. A mesh of one geometry, fragmented along the joint and
-conforming there, gets them by `CutOpen`; bodies meshed one by one have them already.
-"""
+conforming there, gets them by `CutOpen`; bodies meshed one by one have them already."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -51,8 +50,7 @@ def cut_open(arrays: MeshArrays, group: str, *, inside: str | None = None,
     Side 1 is that of the cell group `inside`, or the one from which the vector `towards` leads across the boundary:
     give one of them. Cells around a node of the boundary keep a common node as long as they hang together through
     other facets: a crack that ends inside a body stays closed at its tip, and boundaries cut one after the other may
-    meet and cross. InputError for a group that does not exist or lies on the outside, or sides that cannot be told.
-    """
+    meet and cross. InputError for a group that does not exist or lies on the outside, or sides that cannot be told."""
     facets = _group(arrays, group)
     if (inside is None) == (towards is None):
         raise InputError(f"cut of '{group}': give its first side, either by inside=a cell group or by towards=a vector")

@@ -1,8 +1,7 @@
 """Turn Gmsh's current model into plain arrays: nodes renumbered, groups named, what solvers choke on refused; and back.
 
 DOLFINx's own readers fail on node tags that do not start at 1, on facets in two groups and on missing groups, so
-nothing of them is used. Vertices stay in Gmsh's order here.
-"""
+nothing of them is used. Vertices stay in Gmsh's order here."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -29,8 +28,7 @@ class MeshArrays:
     """Hold a mesh without its library.
 
     `cell` is UFL's name, `points` (n_points, d) are in metres, `cells` (n_cells, n_nodes) rows of points, vertices
-    first. Groups by name: of cells as masks (n_cells,), of facets as rows of points (n_facets, n_facet_vertices).
-    """
+    first. Groups by name: of cells as masks (n_cells,), of facets as rows of points (n_facets, n_facet_vertices)."""
 
     cell: str
     points: Array
@@ -92,8 +90,7 @@ def extract(gmsh: Any, source: str) -> MeshArrays:
     as a group "all". Nodes no cell uses are dropped, the others numbered from 0 in the order of their tags. Raises
     InputError for a model without cells; mixed cells, or of an order above 2; cells without volume, twisted, or folded
     over a neighbour; a mesh of triangles or quadrilaterals outside the plane z = 0; named facets that are no sides of
-    cells.
-    """
+    cells."""
     model = gmsh.model
     d = max((model.mesh.getElementProperties(kind)[1] for kind in model.mesh.getElements()[0]), default=0)
     body, sides = _named_entities(model, d), _named_entities(model, d - 1)
@@ -210,8 +207,7 @@ def _facets(model: Any, entities: list[int], kind: int, tags: Rows, points: Arra
     """Return the facets of a group as rows of points at their vertices, each once; -1 for nodes that are at no point.
 
     OpenCASCADE may copy a curve or surface when it bounds a body with it, and the named original is then meshed by
-    itself, with nodes at the places of the body's (dolfinx#2456). Such a node stands for the one point at its place.
-    """
+    itself, with nodes at the places of the body's (dolfinx#2456). Such a node stands for the one point at its place."""
     found = _elements(model, model.mesh.getElementProperties(kind)[1], entities)
     if not found:
         return np.empty((0, 1), dtype=np.int64)

@@ -3,8 +3,7 @@
 Gmsh runs commands of the shell and opens files from scripts, so none is given to it as it stands. The script is cut
 into words, and written anew from those that geo_words.toml lists; names of its own get a prefix, so that none can be a
 command, and texts stand only where groups are named. A process of its own meshes it, for a limited time and in half of
-the machine's memory.
-"""
+the machine's memory."""
 
 import ctypes
 import os

@@ -22,8 +22,7 @@ class MeshScript(Protocol):
         """Add geometry, named physical groups and cells to the current (empty) model.
 
         They are of first order unless it says ``gmsh.model.mesh.setOrder(2)`` at its end, which puts mid-points on the
-        curves of the geometry.
-        """
+        curves of the geometry."""
 
 
 @contextmanager
@@ -31,8 +30,7 @@ def session(name: str = "vi_contact") -> Iterator[Any]:
     """Give the gmsh module with an empty current model; all traces are removed afterwards.
 
     A Gmsh the caller has already initialised is borrowed: its models, current model and options are left as they
-    were. Raises InputError if Gmsh is not installed.
-    """
+    were. Raises InputError if Gmsh is not installed."""
     try:
         import gmsh
     except (ImportError, OSError) as error:  # OSError: the module is there, its library is not
@@ -82,8 +80,7 @@ def _is_initialised(gmsh: Any) -> bool:
     """Tell whether Gmsh runs.
 
     4.8 (Debian 12) lists no model before initialize() and complains after finalize(), from C++ and past sys.stderr, by
-    an option that it has not set yet, and ends the process if that is 4: new memory is zeroed so that it is not.
-    """
+    an option that it has not set yet, and ends the process if that is 4: new memory is zeroed so that it is not."""
     if hasattr(gmsh, "isInitialized"):
         return bool(gmsh.isInitialized())
     perturb = getattr(ctypes.CDLL(None), "mallopt", lambda option, value: 0)  # of glibc: 0xFF fills with about 0

@@ -1,7 +1,6 @@
 """Mesh bars, rectangles and boxes node by node: Gmsh's transfinite curves are only exact to 1e-11.
 
-A script that says which ``grids`` it is made of needs no Gmsh to become arrays, only to be written as a file.
-"""
+A script that says which ``grids`` it is made of needs no Gmsh to become arrays, only to be written as a file."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,8 +27,7 @@ class Grid:
     """Describe a structured mesh of one body.
 
     `nodes` (n_1+1, ..., n_d+1, d) are the points of the deformed lattice [m]; `sides[a]` names the two sides on which
-    lattice index a is lowest and highest; `body` names all cells. `simplices` splits boxes along a diagonal (Kuhn).
-    """
+    lattice index a is lowest and highest; `body` names all cells. `simplices` splits boxes along a diagonal (Kuhn)."""
 
     nodes: Array
     simplices: bool
@@ -73,8 +71,7 @@ def add_outline(model: Any, name: str, outline: Sequence[tuple[float, float]], n
                 sizes: Sequence[float], cells: Sequence[int] = ()) -> int:
     """Add a surface within an outline, its curves in the groups ``names``; return its tag, to be meshed irregularly.
 
-    ``sizes``: of the cells at the corners [m]; ``cells``: exact numbers of them on the first curves.
-    """
+    ``sizes``: of the cells at the corners [m]; ``cells``: exact numbers of them on the first curves."""
     points = [model.geo.addPoint(*place, 0.0, size) for place, size in zip(outline, sizes, strict=True)]
     curves = [model.geo.addLine(one, two) for one, two in zip(points, [*points[1:], points[0]], strict=True)]
     for curve, count in zip(curves, cells, strict=False):

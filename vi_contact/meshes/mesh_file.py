@@ -2,8 +2,7 @@
 
 Gmsh runs as a script whatever it does not recognise as a mesh, and a script may run any command of the shell. It
 decides by the name of a file, else by the first word in it, and it runs FILE.opt beside a mesh too. So a mesh file is
-read only if its first bytes are those of Gmsh's own format, and from a copy called mesh.msh, alone in a new folder.
-"""
+read only if its first bytes are those of Gmsh's own format, and from a copy called mesh.msh, alone in a new folder."""
 
 import mmap
 import re
@@ -22,8 +21,7 @@ SHORT = 80  # bytes in which what comes first is found
 def safe_copy(file: Path, folder: Path) -> Path:
     """Copy a mesh file into this folder, safe for Gmsh to read.
 
-    InputError for a file that is missing, empty, no MSH file (a script), cut short, or announces more than it holds.
-    """
+    InputError for a file that is missing, empty, no MSH file (a script), cut short, or announces more than it holds."""
     copy = folder / "mesh.msh"
     try:
         there = file.is_file()

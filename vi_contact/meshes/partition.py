@@ -1,7 +1,6 @@
 """Assign cells to ranks by repeated halving across the longest side, the same every time.
 
-Graph partitioners give smaller interfaces but, in parallel, another answer, and so other results, on every run.
-"""
+Graph partitioners give smaller interfaces but, in parallel, another answer, and so other results, on every run."""
 
 import numpy as np
 import numpy.typing as npt
@@ -34,8 +33,7 @@ def halve(centres: Array, n: int) -> Ranks:
 def destinations(points: Array, cells: Rows, cell: str, n: int) -> tuple[Ranks, Ranks]:
     """Return the ranks each cell goes to, as one list and the n_cells + 1 offsets of the cells in it.
 
-    First its owner, then, as a ghost, the owners of its neighbours across a facet.
-    """
+    First its owner, then, as a ghost, the owners of its neighbours across a facet."""
     owner = halve(points[cells].mean(axis=1), n)
     sides, at = cell_sides(cells, cell)
     (number,) = number_alike(sides)

@@ -30,8 +30,7 @@ def cell_sides(cells: Rows, cell: str) -> tuple[Rows, Rows]:
 def number_alike(*tables: Rows) -> list[Rows]:
     """Number the rows of tables of one width: rows with equal members, in any order, have equal numbers.
 
-    Members are at least -1. Much faster than np.unique(axis=0).
-    """
+    Members are at least -1. Much faster than np.unique(axis=0)."""
     rows = np.sort(np.concatenate(tables), axis=1) + 1
     if not len(rows):
         return [np.zeros(0, dtype=np.int64) for _ in tables]

@@ -1,8 +1,7 @@
 """Mesh bars, rectangles or boxes that touch without sharing a node: bodies of their own, meshed each for itself.
 
 Physical groups of a body called "lower": cells "lower"; boundary "lower_left", "lower_right" (x lowest, highest),
-"lower_bottom", "lower_top" (y), "lower_back", "lower_front" (z).
-"""
+"lower_bottom", "lower_top" (y), "lower_back", "lower_front" (z)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

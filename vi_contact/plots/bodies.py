@@ -127,8 +127,7 @@ def plot_deformed(run: RunFolder, path: str | Path, *, times: Sequence[float] | 
     None: the first, the last, and when most happens. The edges of elements have the colour of their body. In the plane
     dots show the contact pressure, and below them which points are open, stick and slip. In space y points upwards
     where contact is along y rather than z, else z. ``magnified``: how many times larger displacements are drawn; None:
-    a round number that shows them. InputError for a run without fields or in one dimension.
-    """
+    a round number that shows them. InputError for a run without fields or in one dimension."""
     scene = Scene.of(run, moments(run.history) if times is None else times, magnified)
     flat = scene.points.shape[1] == 2
     with_states = flat and scene.contact is not None
@@ -157,8 +156,7 @@ def film(run: RunFolder, path: str | Path, *, times: Sequence[float] | None = No
     None: up to 48 frames around the one in which most happens. In space the pressure on each contact face is beside
     the bodies. Below them is a ``column`` of the history with the moment marked, and dashed the motion of the ground.
     InputError for another kind of file, .mp4 without ffmpeg, a column that the run does not have, and as
-    ``plot_deformed``.
-    """
+    ``plot_deformed``."""
     import matplotlib
     from matplotlib.animation import FFMpegWriter, PillowWriter
     from matplotlib.figure import Figure
@@ -229,8 +227,7 @@ def draw_run(run: RunFolder, out: str | Path, *, title: str, times: Sequence[flo
     """Draw the bodies of a run with fields as deformed.png and, in space with ``Contact()``, its contact faces as
     faces.png, into the folder ``out``, next to the ``times`` [s]. None: the first, the last, and when most happens.
 
-    ``magnified``: how many times larger displacements are drawn, None: so that they are seen.
-    """
+    ``magnified``: how many times larger displacements are drawn, None: so that they are seen."""
     drawn, contact, history = [], run.contact, run.history
     if frames_of(run.folder) and read_frames(run).cells.shape[1] > 2:  # no bars
         drawn.append(plot_deformed(run, Path(out) / "deformed.png", times=times, magnified=magnified, title=title))

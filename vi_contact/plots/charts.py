@@ -129,8 +129,7 @@ def shown_periods(record: Record) -> Array:
 def smoothed(run: Run, name: str) -> tuple[Record, Record, float]:
     """Return an acceleration raw and low-passed, with the corner [Hz]: Butterworth of order 4, forward and backward.
 
-    That of column v_<axis>_<label> where it was recorded: it has the jumps of an impact law.
-    """
+    That of column v_<axis>_<label> where it was recorded: it has the jumps of an impact law."""
     speed = "v" + name[1:]
     raw = recorded_motion(run.history, speed if speed in run.history else name)
     corner = min(LOW_PASS, 1.0 / (STEPS_A_PERIOD * raw.dt))

@@ -1,7 +1,6 @@
 """Read bodies and what happens on their contact from the folder of a run, in the plane and in space, to draw them.
 
-A run that writes fields (``fields=fem.XDMF(every=...)``) and records ``Contact()`` leaves all that is needed there.
-"""
+A run that writes fields (``fields=fem.XDMF(every=...)``) and records ``Contact()`` leaves all that is needed there."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -105,8 +104,7 @@ def nearest(t: Array, times: Sequence[float] | Array) -> Indices:
 def contact_states(history: Mapping[str, Array]) -> Array:
     """Return 1 open, 2 stick, 3 slip, (rows, m): closed points slip when their slip changed since the row before.
 
-    Changes below 1e-9 of the largest one are rounding. In the first row, and without friction, closed points stick.
-    """
+    Changes below 1e-9 of the largest one are rounding. In the first row, and without friction, closed points stick."""
     rows = len(history["t"])
     active = np.reshape(history["active"], (rows, -1)).astype(bool)
     change = np.zeros(active.shape)

@@ -190,8 +190,7 @@ def plot_faces(run: RunFolder, path: str | Path, *, times: Sequence[float] | Non
     Every face has a row with its pressure, and one with its open, sticking and slipping points and its slip. Flat
     faces are drawn in their plane, curved ones in projection. Each point colours its share of the element sides around
     it, where the run stored fields, or is a dot. Arrows are the tangential displacements on the support of closed
-    points. InputError for a run in the plane or without arrays of ``Contact()``.
-    """
+    points. InputError for a run in the plane or without arrays of ``Contact()``."""
     contact, history = run.contact, run.history
     if contact is None or "active" not in history or contact.points.shape[1] != 3:
         raise InputError(f"'{run.folder}' is not a finished run in space with Contact(): finish one that has it")

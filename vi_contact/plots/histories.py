@@ -1,7 +1,6 @@
 """Draw recorded histories and save them as PNG on rank 0.
 
-matplotlib is imported late, and its state is left alone: neither the user's backend nor his settings change.
-"""
+matplotlib is imported late, and its state is left alone: neither the user's backend nor his settings change."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -21,8 +21,7 @@ def arc_position(points: Array, normals: Array | None = None) -> tuple[Array, st
     With ``normals`` (m, 2) the conditions of a corner follow each other as its sides do, by nothing that can be seen.
 
     Points on a straight line along an axis: their coordinate; on another one: the length along it; else the arc length
-    of the chain that starts at the highest point (of those the leftmost) and goes on to the nearest one each time.
-    """
+    of the chain that starts at the highest point (of those the leftmost) and goes on to the nearest one each time."""
     arms = points - points.mean(axis=0)
     _, values, axes = np.linalg.svd(arms, full_matrices=False)
     if values[-1] <= STRAIGHT * values[0]:

@@ -23,8 +23,7 @@ SAMPLES_A_PERIOD = 10  # a spectrum is drawn pale at periods with fewer samples 
 def plot_motion(record: Record, path: str | Path, *, title: str | None = None, units: str = "m/s2") -> Path:
     """Draw acceleration in `units`, velocity, displacement and the Husid curve, with peaks marked and D5-95 shaded.
 
-    title: default the record's. Nothing is corrected: a drift of the record shows.
-    """
+    title: default the record's. Nothing is corrected: a drift of the record shows."""
     figure, axes = panels(4, (9.0, 8.0))
     velocity, displacement = integrated(record)
     _line(axes[0], record.times, record.acceleration / UNITS[units], f"acceleration [{_pretty(units)}]")
@@ -42,8 +41,7 @@ def plot_spectra(spectra: Mapping[str, ResponseSpectrum], path: str | Path, *, t
                  steps: Mapping[str, float] | None = None, title: str = "Response spectra", units: str = "g") -> Path:
     """Draw pseudo-acceleration in `units` and displacement over the period, one line for each label, the target dashed.
 
-    steps: time step [s] of the record behind each label; below ten of them its line is pale.
-    """
+    steps: time step [s] of the record behind each label; below ten of them its line is pale."""
     figure, ((top,), (bottom,)) = canvas(2, 1, (8.0, 7.5), sharex=True)
     bottom.set_xscale("log")
     plain_numbers(bottom.xaxis)

@@ -1,7 +1,6 @@
 """Write sections about a run as one HTML file that loads nothing and runs no script but its own two.
 
-Texts of files are escaped by the template's engine, those in curves once more, for Plotly reads some HTML in them.
-"""
+Texts of files are escaped by the template's engine, those in curves once more, for Plotly reads some HTML in them."""
 
 from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
@@ -39,8 +38,7 @@ def write_web_page(path: Path, title: str, facts: Sequence[tuple[str, str]], sec
                    foot: str) -> Path:
     """Write a page: the title, (name, value) of facts, the sections with curves to zoom and tables to sort, a foot.
 
-    Histories are thinned; largest and smallest values stay. InputError without jinja2 or plotly.
-    """
+    Histories are thinned; largest and smallest values stay. InputError without jinja2 or plotly."""
     if not can_write():
         raise InputError(MISSING)
     from jinja2 import Environment, FileSystemLoader

@@ -1,7 +1,6 @@
 """Compare independent routes to the same step, step by step from the same state.
 
-Whole runs of an energy-growing scheme may drift apart by round-off; single steps from one state must not.
-"""
+Whole runs of an energy-growing scheme may drift apart by round-off; single steps from one state must not."""
 
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
@@ -46,8 +45,7 @@ class Disagreement:
 class CrossChecked:
     """Solve by one solver, whose answer counts, ask others at every step too, and remember how far they are off.
 
-    ``found``: without attempts that ``HalvedAtImpact`` threw away.
-    """
+    ``found``: without attempts that ``HalvedAtImpact`` threw away."""
 
     primary: Solver
     others: Sequence[Solver]
@@ -122,8 +120,7 @@ def cross_check(problem: ContactProblem, *, scheme: Scheme | None = None, solver
                 steps: int, state: State | None = None) -> CrossChecked:
     """March with the first solver and compare the others with it at every step. ``report()`` of the result tells.
 
-    ``dt`` and ``steps`` as in ``march``: ``steps`` counts base steps, the statistics all accepted ones.
-    """
+    ``dt`` and ``steps`` as in ``march``: ``steps`` counts base steps, the statistics all accepted ones."""
     given = several("cross_check", "solvers", solvers, "give a list of two or more solvers")
     if len(given) < 2:
         raise InputError(f"cross_check: {len(given)} solvers are given; give two or more")

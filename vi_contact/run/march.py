@@ -28,8 +28,7 @@ def march(problem: ContactProblem, *, scheme: Scheme | None = None, solver: Solv
     a halved step are yielded one by one, and ``state.k`` counts them, but they are one of the ``steps``.
     A step whose certificate exceeds ``tolerance`` goes to the solvers of ``escalation`` in turn. If all of them fail,
     StepFailure is raised with step, time, residuals and advice. ``state`` is that of a static stage or a checkpoint.
-    InputError is raised at the call: arguments of the wrong kind, a state of another problem or inside the obstacle.
-    """
+    InputError is raised at the call: arguments of the wrong kind, a state of another problem or inside the obstacle."""
     method = checked_method("march", problem, scheme, (solver, escalation), dt, steps=steps, t_end=t_end, state=state,
                             tolerance=tolerance)
     state = initial_state(method.problem) if state is None else state
@@ -41,8 +40,7 @@ class March:
 
     Attributes, at the time a step is handed out:
         base: base steps done. ended: whether this step ended one, so that a restart may begin here.
-        dt: the length of this step [s]. halved: attempts that were thrown away.
-    """
+        dt: the length of this step [s]. halved: attempts that were thrown away."""
 
     def __init__(self, method: Method, step_plan: StepPlan, state: State, base: int = 0, halved: int = 0) -> None:
         self.method, self.step_plan, self.state = method, step_plan, state

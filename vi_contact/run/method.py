@@ -43,8 +43,7 @@ def checked_method(owner: str, problem: ContactProblem, scheme: Scheme | None,
                    t_end: float | None, state: State | None, tolerance: float) -> Method:
     """Return the method with its defaults; ``solvers``: the first one, None for Automatic(), and the escalation.
 
-    InputError for arguments of the wrong kind, and a state of another problem or inside the obstacle. Collective.
-    """
+    InputError for arguments of the wrong kind, and a state of another problem or inside the obstacle. Collective."""
     check_methods(owner, *solvers, tolerance)
     problem, scheme = with_defaults(problem, scheme)
     first, others = solvers
@@ -64,8 +63,7 @@ def with_defaults(problem: ContactProblem, scheme: Scheme | None,
 
     Without a scheme: the trapezoidal rule on redistributed mass; with an impact law, or with mass at the contact nodes
     asked for, the Zienkiewicz-Wood-Taylor step at phi = ½, which never gains energy. Without a mass: the scheme's.
-    ``others``: the first that has its matrices lends them.
-    """
+    ``others``: the first that has its matrices lends them."""
     check_problem_given("march", problem)
     if scheme is None:
         massive = problem.mass is not None and isinstance(problem.mass, ConsistentMass)

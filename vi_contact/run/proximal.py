@@ -11,8 +11,7 @@ any start if there is an equilibrium. If there is none, d tends to a rigid motio
 loads drive; that is how it is recognised (K d = 0, B_n d <= 0, f·d > 0: the energy has no minimum).
 
 Rigid motions that no load drives stay where they start: along them P-weighted means of u are those of u0 (the centre of
-mass of a block free to slide on level ground does not move). On a conservative problem all else is unique.
-"""
+mass of a block free to slide on level ground does not move). On a conservative problem all else is unique."""
 
 from dataclasses import dataclass, replace
 

@@ -1,8 +1,7 @@
 """Listen to the loop: each recorder names its columns once and fills a row after every step.
 
 Rows hold numbers (one column of ``history.csv`` each), equal on every rank, or arrays (HDF5 only), those of rank 0.
-Displacements and velocities are those of the equations: relative to the ground when an excitation shakes the body.
-"""
+Displacements and velocities are those of the equations: relative to the ground when an excitation shakes the body."""
 
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -74,8 +73,7 @@ class Energy:
     initial strains do work too. E has no energy that moved supports store by themselves: their pull -K U is a load.
     D_impact = ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ with its sign. W_input is the work of loads, inertia loads -M r a_g and prescribed
     motions. The defect is the summed work of the residual of the equation of motion; ``summary.json`` has its size over
-    the largest energy or work. Each step costs three products, and damping and impacts cost one more each.
-    """
+    the largest energy or work. Each step costs three products, and damping and impacts cost one more each."""
 
     _COLUMNS: ClassVar[Columns] = {name: ("J", meaning) for name, meaning in WORDS["columns"].items()}
     _SUMS = tuple(_COLUMNS)[2:]
@@ -214,8 +212,7 @@ class Probe:
     motion, without velocity jumps of the impact law, plus the mean ground acceleration of the step; row 0 has the
     ground's own. u and v are relative to the ground when an excitation shakes the body.
 
-    InputError if a label has other characters than letters, digits and underscores, or a point is outside the body.
-    """
+    InputError if a label has other characters than letters, digits and underscores, or a point is outside the body."""
 
     points: Mapping[Any, Sequence[float]]
     velocity: bool = False

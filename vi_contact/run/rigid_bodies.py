@@ -1,8 +1,7 @@
 """Treat the bodies of a system as rigid: what of their motion contact alone holds, and whether forces balance it.
 
 Every body is asked by itself, in its own unknowns (``problem.turned``): with w a rigid motion of it and K w = 0, a
-static stage asks for w·(f - B_nᵀ r_n - B_tᵀ r_t) = 0, the sums of forces and moments. No stiffness enters it.
-"""
+static stage asks for w·(f - B_nᵀ r_n - B_tᵀ r_t) = 0, the sums of forces and moments. No stiffness enters it."""
 
 import numpy as np
 
@@ -50,8 +49,7 @@ def body_springs(problem: ContactProblem) -> Matrix:
     the body's own largest K_ii if it has a stiffness; in the unknowns of ``problem.static_load``. Collective.
 
     It does not grow as meshes are refined, as it would with the largest K_ii / M_ii. Weaker springs take fewer steps to
-    push a stiff body into a soft one, and cost digits: round-off of the first step is 1e-16 / WEAK² at worst.
-    """
+    push a stiff body into a soft one, and cost digits: round-off of the first step is 1e-16 / WEAK² at worst."""
     system, surface = problem.turned, problem.surface
     algebra, numbers = system.algebra, np.asarray(system.space.bodies)
     count, d = bodies_in(algebra.comm, numbers), system.influence.shape[1]

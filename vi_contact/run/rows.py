@@ -1,8 +1,7 @@
 """Hold what several runs have in one step as rows, and make that of one run when somebody asks for it.
 
 A step of a small system costs as much as the objects that tell of it: those that nobody reads are not made. What was
-made stays as it is, whatever the runs do later: every step has arrays of its own, and nobody writes to them.
-"""
+made stays as it is, whatever the runs do later: every step has arrays of its own, and nobody writes to them."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -65,8 +65,7 @@ def simulate(problem: ContactProblem, *, scheme: Scheme | None = None, solver: S
         Interrupted: after the step in which some rank got SIGINT (Ctrl-C), SIGTERM or SIGHUP, with a checkpoint.
         OutOfTime: before the wall time is over, with a checkpoint.
         StepFailure: no solver could certify a step. ViContactError: the disk refused to read or write. All that was
-            computed is then in the folder, and summary.json says why the run ended.
-    """
+            computed is then in the folder, and summary.json says why the run ended."""
     with opened(**locals()) as (session, writer):
         return session.go(writer)
 

@@ -31,8 +31,7 @@ def simulate_many(runs: Sequence[Mapping[str, Any]], *,
     that is done, after every step. Collective.
 
     Raises InputError for arguments that ``simulate`` does not know; Interrupted and OutOfTime as ``simulate`` does,
-    when all runs that have begun have written their checkpoints: ``restart=True`` continues them.
-    """
+    when all runs that have begun have written their checkpoints: ``restart=True`` continues them."""
     every = [_arguments(run) for run in several("simulate_many", "runs", runs, "give a list of arguments of simulate")]
     folders = [str(Path(run["out"]).resolve()) for run in every if isinstance(run["out"], str | Path)]
     books = [id(one) for run in every if isinstance(run["record"], Sequence) for one in run["record"]]

@@ -34,8 +34,7 @@ class Solution:
         columns: column -> (unit, meaning).
         state: the final state in the basis of the nodal frames (``problem.cartesian`` turns it back).
         facts: the contents of summary.json; the times of a step are medians in seconds, nan without steps.
-        problem: the solved problem, with the mass matrix that the scheme chose. folder: the run folder, or None.
-    """
+        problem: the solved problem, with the mass matrix that the scheme chose. folder: the run folder, or None."""
 
     history: Mapping[str, Array]
     columns: Columns
@@ -48,8 +47,7 @@ class Solution:
         """Return "u", "v", "stress" or "contact_pressure" as a DOLFINx Function, ``fem.as_function`` of the end state.
 
         With ``t`` [s] or ``frame`` that of a frame in the run folder, ``fem.read_function``. Collective.
-        InputError for a system without a mesh, and without such a frame.
-        """
+        InputError for a system without a mesh, and without such a frame."""
         if not hasattr(self.problem.system.space, "V"):
             raise InputError("function: the system has no mesh and so no Functions; use history and state")
         from ..fem.output.functions import as_function, read_function  # late: runs need no finite elements

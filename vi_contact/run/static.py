@@ -7,8 +7,7 @@ the static problem with slips counted from the stage before (slip rate times tim
 
 so that t only orders the loads: histories of ``Traction`` and ``BodyForce``, ``Prescribed`` displacements, and
 obstacles that move. Without friction every stage is the equilibrium of its own loads. Slip between stages has no rate,
-so a law that asks for one is refused: its value at rest would be wrong for points in motion wherever it jumps there.
-"""
+so a law that asks for one is refused: its value at rest would be wrong for points in motion wherever it jumps there."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
@@ -40,8 +39,7 @@ def static_equilibrium(problem: ContactProblem, *, solver: Solver | None = None,
 
     Raises:
         InputError: the loads drive a rigid motion that nothing stops, so that there is no equilibrium.
-        StepFailure: no answer has a certificate below the tolerance.
-    """
+        StepFailure: no answer has a certificate below the tolerance."""
     owner = "static_equilibrium"
     check_problem_given(owner, problem)
     check_methods(owner, solver, (), tolerance)
@@ -90,8 +88,7 @@ def quasi_static(problem: ContactProblem, times: Iterable[float], *, solver: Sol
     Raises:
         InputError: times that do not increase; friction that depends on the slip rate; loads that drive a rigid motion
             which nothing stops.
-        StepFailure: no answer below the certificate tolerance.
-    """
+        StepFailure: no answer below the certificate tolerance."""
     check_problem_given("quasi_static", problem)
     check_methods("quasi_static", solver, (), tolerance)
     if problem.friction.at(np.zeros(problem.surface.count)) is not problem.friction:

@@ -1,8 +1,7 @@
 """Note signals that ask a run to end when they come; act on them between two steps, on all ranks together.
 
 Ctrl-C (SIGINT), a scheduler's or container's end of time (SIGTERM), a closed terminal (SIGHUP). PETSc has handlers of
-its own for some of them, which print pages and stop; those of the run come after them and win.
-"""
+its own for some of them, which print pages and stop; those of the run come after them and win."""
 
 import os
 import signal
@@ -22,8 +21,7 @@ class StopSignals:
 
     A signal that was ignored stays so (nohup, jobs in the background), and so do handlers that the caller wrote. A
     second Ctrl-C ends the process at once. What nobody has acted on in the end is sent again, to the old handlers.
-    ``lasting``: for several runs, all of which are told once one has been.
-    """
+    ``lasting``: for several runs, all of which are told once one has been."""
 
     def __init__(self, *, lasting: bool = False) -> None:
         self._found, self._lasting, self._late = 0, lasting, False

@@ -1,8 +1,7 @@
 """Plan how long the steps of a run are: a constant dt [s], a ``Schedule``, or steps halved where contact closes.
 
 Changing dt changes neither u nor v, and so no energy. A scheme that carries its past restarts it from them (``start``).
-``steps``, ``t_end``, ``checkpoint_every`` and progress count *base steps*: of the plan, halved or not.
-"""
+``steps``, ``t_end``, ``checkpoint_every`` and progress count *base steps*: of the plan, halved or not."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,8 +24,7 @@ class Schedule:
     """Plan pieces (dt [s], until [s]) with steps of dt until that time; the last piece is usually (dt, math.inf).
 
     A piece ends with the first step that reaches its time, even if the piece is not a whole number of steps long.
-    InputError if there are no pieces, if a dt is not positive, or if the times do not increase.
-    """
+    InputError if there are no pieces, if a dt is not positive, or if the times do not increase."""
 
     pieces: tuple[tuple[float, float], ...]
 
@@ -51,8 +49,7 @@ class HalvedAtImpact:
 
     The halves may be halved again, down to dt/2**halvings, which resolves the time of an impact. Every accepted part is
     a certified step like any other. At most one matrix is factorised for each of the halvings + 1 lengths of a piece.
-    InputError if dt is not positive, or if halvings is not a whole number from 0 to 20.
-    """
+    InputError if dt is not positive, or if halvings is not a whole number from 0 to 20."""
 
     dt: float | Schedule
     halvings: int = 3
@@ -109,8 +106,7 @@ def step_plan(plan: TimeSteps, steps: int | None, t_end: float | None, t0: float
 
     Counted from the times of the plan, not from those of the run, whose round-off accumulates: a restart, which
     builds it from the same t0, has the same steps. A step shorter than a millionth of dt would be round-off of these
-    times, at the end of a piece and of the run alike, and is not made. InputError for more than 1e9 steps.
-    """
+    times, at the end of a piece and of the run alike, and is not made. InputError for more than 1e9 steps."""
     halvings = plan.halvings if isinstance(plan, HalvedAtImpact) else 0
     pieces = pieces_of(plan)
     left = _wanted(steps, t_end, t0)

@@ -2,8 +2,7 @@
 
 The scheme steps the rows as it steps one state, and the solver answers them together (``solve_many``); certificates,
 impacts and reports are a run's own. A step that is not answered at once with a certificate far below the tolerance is
-solved alone; who then has to escalate, or fails, goes on alone.
-"""
+solved alone; who then has to escalate, or fails, goes on alone."""
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence

@@ -15,8 +15,7 @@ Contact unknowns without inertia are in equilibrium with the body at every time:
 
 Initial data rarely know that. Kept as they are, what is missing in this equation would swing on at the contact nodes
 from step to step for ever, so schemes put it right once, at the start; the energy this takes is of the order of the
-mesh size, and the history starts after it.
-"""
+mesh size, and the history starts after it."""
 
 from dataclasses import replace
 
@@ -91,8 +90,7 @@ def rigid_part(surface: ContactSurface) -> ContactSurface:
 def equilibrated(problem: ContactProblem, state: State) -> State:
     """Return the state with its massless unknowns, if any, in equilibrium, and with the reactions that belong to it.
 
-    Only their own block of K is factorised, however large the body is; not even that when it is large itself.
-    """
+    Only their own block of K is factorised, however large the body is; not even that when it is large itself."""
     system, layer = problem.equations, problem.equations.massless
     if layer is None:
         return state

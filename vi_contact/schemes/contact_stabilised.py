@@ -18,8 +18,7 @@ as algorithmic loss. With C ½(v0 + v1) in the place of C Δu/dt the damping wor
 ``projected=False``: u_p = u0 + dt v0, Kane's contact-implicit form. It is ZienkiewiczWoodTaylor(½) and SS22(½, ½).
 
 Sources: Deuflhard, Krause and Ertel, Int. J. Numer. Meth. Engng 73 (2008) 1274-1290; Kane, Repetto, Ortiz and Marsden,
-Comput. Methods Appl. Mech. Engng 180 (1999) 1-26.
-"""
+Comput. Methods Appl. Mech. Engng 180 (1999) 1-26."""
 
 from dataclasses import dataclass, replace
 
@@ -79,8 +78,7 @@ def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tu
 
     The same small problem as a step with A = M, solved in the increment w, so that nothing is rounded where nothing is
     in the way. Springs give way: their points are not projected. Normal directions only; friction has no part in it.
-    StepFailure when the projection cannot be certified.
-    """
+    StepFailure when the projection cannot be certified."""
     surface, system, rigid = problem.surface, problem.equations, problem.surface.rigid
     gap = np.where(rigid, surface.gap(state.t + dt) - surface.normal_values(u), np.inf)
     closed = (gap < 0.0) | (surface.bilateral & rigid)

@@ -21,8 +21,7 @@ damping does not make up for it where a wave crosses many elements in a step, no
 the highest frequency of the mesh: docs/guide/schemes.md has numbers.
 Impulses: sum of dt r_n,f over a contact with free flight before and after is the change of momentum; in single steps it
 is not, unless the member is Newmark.
-Source: Chung and Hulbert, J. Appl. Mech. 60 (1993) 371-375.
-"""
+Source: Chung and Hulbert, J. Appl. Mech. 60 (1993) 371-375."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace

@@ -15,8 +15,7 @@ act for another step, and throw off what the impact law has just stopped. A chan
 Unknowns without mass (mass.Redistributed) have no acceleration and the mean velocity of the step.
 Energy: the ledger closes with the means of both ends. Unlike the midpoint form, contact in the acceleration
 balance at t_p can *gain* energy on consistent mass, booked as algorithmic or contact loss of negative sign.
-Impulses: those over a contact with free flight before and after are the change of momentum.
-"""
+Impulses: those over a contact with free flight before and after are the change of momentum."""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -40,8 +39,7 @@ DAMPING = (0.0, 0.1, 1.0)  # damping ratios, for the stability check
 class LinearMultistep(BalanceStep):
     """Step with the coefficients of a linear multistep method, newest level first, all of one length q + 1 >= 2.
 
-    InputError for unequal lengths, b[0] = 0, or inconsistent operators (they must be exact for u = 1, t and t²).
-    """
+    InputError for unequal lengths, b[0] = 0, or inconsistent operators (they must be exact for u = 1, t and t²)."""
 
     by_rows: ClassVar[bool] = True
 

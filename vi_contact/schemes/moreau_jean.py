@@ -21,8 +21,7 @@ Penetration: the condition is on velocities, so a gap closes late, by less than 
 it has passed by then stays while contact lasts (e = 0): a negative ``contact_min_gap`` that shrinks with dt.
 
 Sources: Moreau in Nonsmooth Mechanics and Applications (Springer 1988), 1-82; Jean, Comput. Methods Appl. Mech. Engng
-177 (1999) 235-257; the range of theta: Acary, ZAMM 96 (2016) 585-603. The bound of separating points is ours.
-"""
+177 (1999) 235-257; the range of theta: Acary, ZAMM 96 (2016) 585-603. The bound of separating points is ours."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -47,8 +46,7 @@ class MoreauJean(SingleStep):
         e: restitution coefficient of the contact nodes, from 0 to 1.
         allow_energy_gain: accept any theta from ½ to 1, and use Newton's law for points that separate too.
 
-    InputError for numbers outside these ranges.
-    """
+    InputError for numbers outside these ranges."""
 
     penetrates: ClassVar[bool] = True
     theta: float = 0.5

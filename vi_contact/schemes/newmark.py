@@ -17,8 +17,7 @@ At (¼, ½) without contact E is constant. With rigid contact its work is ½ (r_
 whenever a contact opens; on redistributed mass of order dt, and then Newmark(¼, ½) is Trapezoidal().
 Impulses: dt times the reactions (…)_gamma are the change of momentum in every step; the ledger uses these means.
 Source: Newmark, J. Eng. Mech. Div. ASCE 85 (1959) 67-94; Krenk, Comput. Methods Appl. Mech. Eng. 195
-(2006) 6110-6124.
-"""
+(2006) 6110-6124."""
 
 from dataclasses import dataclass
 from functools import cached_property

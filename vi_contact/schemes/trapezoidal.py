@@ -10,8 +10,7 @@ reaction at the end. M has no inertia at contact nodes (mass.Redistributed): the
 Order 2 while nothing opens or closes; unconditionally stable. Energy: changes by work of loads and damping and
 by the contact work ½ (r1 g0 - r0 g1), of either sign and of order dt per event: quasi-conservative, contact forces do
 not ring. On consistent mass this is Newmark(¼, ½), which gains energy in every impact; it runs there with a
-warning. Source: Khenous, Laborde and Renard, Eur. J. Mech. A 27 (2008) 918-932.
-"""
+warning. Source: Khenous, Laborde and Renard, Eur. J. Mech. A 27 (2008) 918-932."""
 
 from dataclasses import dataclass, field, replace
 from typing import ClassVar

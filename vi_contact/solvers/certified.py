@@ -1,8 +1,7 @@
 """Certify or refuse steps: a solver, the methods to escalate to, and the certificate of every answer.
 
 An answer whose certificate comes near the tolerance, as round-off makes it where a factor meets bodies of very unlike
-stiffness, is corrected by what it leaves over (``correction``) before it is judged.
-"""
+stiffness, is corrected by what it leaves over (``correction``) before it is judged."""
 
 from collections.abc import Sequence
 from math import isfinite

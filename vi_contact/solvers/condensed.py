@@ -43,8 +43,7 @@ class SmallMethod(Protocol):
     def prepare(self, G: Array, bilateral: Mask) -> Any:
         """Check G (m, m) and factor or scale it, once for many right-hand sides; ``bilateral`` (m,).
 
-        What it returns has ``solve(q, guess) -> LCPResult``, q (m,) the gaps without reactions and ``guess`` (m,).
-        """
+        What it returns has ``solve(q, guess) -> LCPResult``, q (m,) the gaps without reactions and ``guess`` (m,)."""
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,7 @@ q = r - (1 - s) r0 is the contract again, because reactions that obey the laws f
 
 Its solution is that of the step, exactly, whatever s is, as long as no reaction falls by more than its share: q_n >= 0
 leaves r_n >= (1 - s) r0_n. But a solver passes through numbers as large as A⁻¹Bᵀq, and their round-off is now s times
-what it was. Where a stiff body rests on a soft one, or on nothing but contact, A⁻¹Bᵀr is millions of times x.
-"""
+what it was. Where a stiff body rests on a soft one, or on nothing but contact, A⁻¹Bᵀr is millions of times x."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -24,8 +24,7 @@ def refine(folder: str | Path, comm: Any, *, allow: Sequence[str] = (), progress
     """Run the case of a finished run folder with h/2 and with dt/2, into refined/h and refined/dt. Return name -> why
     it failed. A finished run is kept, and an interrupted run is continued. Collective.
 
-    InputError for a folder without case file or whose run has not finished. ``allow``: as of ``read_case``.
-    """
+    InputError for a folder without case file or whose run has not finished. ``allow``: as of ``read_case``."""
     from .cases.case import read_case  # late: finite elements
 
     run, failed = read_run(folder), {}

@@ -34,8 +34,7 @@ def report(folder: str | Path, *, out: str | Path | None = None, title: str | No
     ``out``: an .html or .pdf file; None: report.pdf in the folder and, with jinja2 and plotly, report.html.
     ``columns``: groups of columns of one unit, a chart each, in place of those that move; ``failed``: what ``refine``
     returned. What has no data is left out. InputError as of ``read_run``, for a run of one row, columns that do not
-    exist, another kind of file, .html without jinja2 and plotly, and a damaged model.json.
-    """
+    exist, another kind of file, .html without jinja2 and plotly, and a damaged model.json."""
     refuse_retired(case := read_copy(folder := Path(folder)))
     run = read_run(folder)
     heading = str(title or case.get("title") or f"Run {folder.resolve().name}")

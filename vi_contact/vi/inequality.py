@@ -2,8 +2,7 @@
 
 Newton's method (N. H. Josephy, 1979) solves F(u_k) + J(u_k) (u - u_k) in the place of F (``solve_linear``) and goes
 towards the answer as far as makes the natural residual u - mid(lower, u - F/J_ii, upper) smaller by a part of what the
-slope promises. A linear problem takes one step.
-"""
+slope promises. A linear problem takes one step."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -112,8 +111,7 @@ def solve(form: Any, u: Any, *, lower: Any = None, upper: Any = None, bcs: Seque
 
     The unknowns must be values at points (Lagrange of any degree, DG0, …): bounds hold there, which for degrees above
     one is not everywhere. InputError for forms, bounds and bcs that do not fit; StepFailure when the certificate stays
-    above ``tolerance`` after ``iterations`` Newton steps, with the best u so far kept. Collective.
-    """
+    above ``tolerance`` after ``iterations`` Newton steps, with the best u so far kept. Collective."""
     start, limit = time.process_time(), whole("vi.solve", "iterations", iterations, least=1)
     refuse_complex("vi.solve")
     instance("vi.solve", "u", u, compat.fem.Function, "give the DOLFINx Function to solve for")

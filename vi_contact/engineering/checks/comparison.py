@@ -23,8 +23,7 @@ class Comparison:
 
     name, formula, source: of the check; inputs: name -> (value, unit) of what went into the formula; applies: empty, or
     the sentence that says why the formula does not apply: then ``expected`` is nan. found: nan without its columns.
-    range: where it applies, in words.
-    """
+    range: where it applies, in words."""
 
     name: str
     formula: str
@@ -46,8 +45,7 @@ class Comparison:
 class Check(ABC):
     """Compare a run with a formula: base of all checks, frozen dataclasses with fields in SI units, angles in radians.
 
-    checks.toml tells what each says of itself. InputError for numbers that are not above zero, or beyond its limits.
-    """
+    checks.toml tells what each says of itself. InputError for numbers that are not above zero, or beyond its limits."""
 
     of: str = ""
 

@@ -2,8 +2,7 @@
 
 N is the force along the normal of a metre of wall. phi: friction angle of the soil; delta: between soil and wall;
 slope: of the ground, rising from the wall; batter: of its back from the vertical, positive where soil rests on it.
-An elastic soil does not yield: its pressure is that at rest, and active and passive ones are bounds beside it.
-"""
+An elastic soil does not yield: its pressure is that at rest, and active and passive ones are bounds beside it."""
 
 import math
 from dataclasses import dataclass
@@ -19,8 +18,7 @@ def wedge(phi: float, delta: float, slope: float, batter: float, *, psi: float =
 
     K = cos²(phi -+ batter - psi) / (cos psi cos² batter cos(delta +- batter + psi) (1 +- root)²),
     root² = sin(phi + delta) sin(phi -+ slope - psi) / (cos(delta +- batter + psi) cos(slope - batter));
-    upper signs active, lower ones passive. Coulomb 1776; psi: Okabe 1924, Mononobe and Matsuo 1929. Angles [rad].
-    """
+    upper signs active, lower ones passive. Coulomb 1776; psi: Okabe 1924, Mononobe and Matsuo 1929. Angles [rad]."""
     sign = -1.0 if passive else 1.0
     lean, open_ = math.cos(delta + sign * batter + psi), phi - sign * slope - psi
     if open_ < 0.0 or lean <= 0.0 or math.cos(slope - batter) <= 0.0:
@@ -68,8 +66,7 @@ class EarthPressure(Check):
 class AtRest(EarthPressure):
     """Give the thrust of an elastic layer that cannot give way sideways, with which an elastic soil is compared.
 
-    nu: Poisson's ratio. The wall is smooth and does not move; for sand, nu of K0 = 1 - sin(phi) is K0/(1 + K0).
-    """
+    nu: Poisson's ratio. The wall is smooth and does not move; for sand, nu of K0 = 1 - sin(phi) is K0/(1 + K0)."""
 
     nu: float
 
@@ -81,8 +78,7 @@ class AtRest(EarthPressure):
 class Rankine(EarthPressure):
     """Expect the thrust of soil in active, or passive, failure throughout, on a vertical wall, parallel to the ground.
 
-    phi, slope [rad]. It applies up to slope = phi: steeper ground does not stand.
-    """
+    phi, slope [rad]. It applies up to slope = phi: steeper ground does not stand."""
 
     phi: float
     slope: float = 0.0
@@ -99,8 +95,7 @@ class Coulomb(EarthPressure):
     """Expect the thrust of a plane wedge of soil that slides on the wall and on the ground below it.
 
     phi, delta, slope, batter [rad]; N = P cos(delta). It applies for delta <= phi, passive: delta <= phi/2 (beyond it
-    surfaces that are curved slide at less), ground up to phi, and phi -+ slope - psi >= 0.
-    """
+    surfaces that are curved slide at less), ground up to phi, and phi -+ slope - psi >= 0."""
 
     phi: float
     delta: float = 0.0

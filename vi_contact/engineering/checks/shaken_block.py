@@ -18,8 +18,7 @@ FINE = 2e-4  # CHOSEN: longest step of the rigid block, over 1/p: its angles are
 def sliding(t: Array, drive: Array, resist: Array, *, one_sided: bool = False) -> Array:
     """Return the displacement [m] at times t (n,) of u'' = w - r sgn(u') from rest, sticking while |w| <= r.
 
-    drive w, resist r >= 0 [m/s²], (n,), linear between the times; one_sided: it never slides back, u' >= 0.
-    """
+    drive w, resist r >= 0 [m/s²], (n,), linear between the times; one_sided: it never slides back, u' >= 0."""
     u, slip, speed, share = np.zeros(len(t)), 0.0, 0.0, (np.arange(PARTS) + 0.5) / PARTS
     for row, length in enumerate(np.diff(t) / PARTS):
         push, hold = (length * (x[row] + share * (x[row + 1] - x[row])) for x in (drive, resist))
@@ -38,8 +37,7 @@ class NewmarkBlock(Check):
     mu: friction, or in its place the yield acceleration over g of a level plane; one_sided: it slides to one side only,
     as a wall before its fill does: to that of the sign of ``towards`` along x; 0: down the plane, +x if it is level;
     slip, acceleration, vertical: columns of the displacement on the plane, signed, and of the ground's accelerations.
-    It applies while the block stays on the plane, and where it stands without motion.
-    """
+    It applies while the block stays on the plane, and where it stands without motion."""
 
     mu: float
     slope: float = 0.0
@@ -69,8 +67,7 @@ class Housner(Check):
 
     of: "angle" [rad] or "impact" [s] after the first row; theta: column of the angle, anticlockwise positive, whose
     first row is the start, at rest; acceleration, vertical: of the ground. It applies to blocks that rock and do not
-    overturn, slide or bounce. One history in a long motion is chaotic: compare many, or the first impacts.
-    """
+    overturn, slide or bounce. One history in a long motion is chaotic: compare many, or the first impacts."""
 
     width: float
     height: float

@@ -3,8 +3,7 @@
 Variants met in the wild and all read here: `NPTS=  1559, DT= .02000 SEC` with or without filter data
 after it, `3930 0.00500 NPTS, DT`, NPTS and DT on lines of their own, and files without NPTS whose data start after a
 line `*** Begin data ***`, the time step standing only in a sentence. Any number of values per row; the last row may be
-short and lack its line end.
-"""
+short and lack its line end."""
 
 import re
 from itertools import pairwise

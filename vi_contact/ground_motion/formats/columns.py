@@ -3,8 +3,7 @@
 The latter are the path series of OpenSees (.th, .g3, .acc): no header, values in one column or row by row.
 
 Lines starting with "#" and empty lines are skipped; columns are separated by blanks, commas or semicolons. A header
-that ends in `*** Begin data ***` is skipped too. The units are never guessed.
-"""
+that ends in `*** Begin data ***` is skipped too. The units are never guessed."""
 
 import math
 

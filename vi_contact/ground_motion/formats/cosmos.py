@@ -4,8 +4,7 @@ A block begins with a line that states its number of points, quantity, units and
 "7500 points of accel data equally spaced at .010 sec, in cm/sec2. (8f10.6)" (CSMIP) or
 "12091 acceleration pts, approx 120 secs, units=cm/sec2(04),Format=(8F10.5)" (COSMOS), the time step of the latter being
 real number 34 of its header. Without a stated format it is (8F10.3). Samples are cut by column, for they may touch.
-Velocities and displacements are skipped.
-"""
+Velocities and displacements are skipped."""
 
 import re
 from collections.abc import Iterable, Iterator

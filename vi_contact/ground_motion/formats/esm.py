@@ -1,7 +1,6 @@
 """Read files of the Engineering Strong-Motion database (ESM, ITACA; AFAD alike): 64 lines "KEY: value", then samples.
 
-One value a line. Read DATA_LICENSE and DATA_CITATION, kept in the notes, before passing a record on.
-"""
+One value a line. Read DATA_LICENSE and DATA_CITATION, kept in the notes, before passing a record on."""
 
 import re
 from itertools import takewhile

@@ -1,8 +1,7 @@
 """Read NIED K-NET and KiK-net files: 17 header lines, then integer counts, eight a row, one component a file.
 
 Acceleration = count x "Scale Factor", written as 3920(gal)/6182761. The counts carry the sensor's offset, so their mean
-is removed, as the agency does before it prints "Max. Acc.". NIED forbids passing these files on.
-"""
+is removed, as the agency does before it prints "Max. Acc.". NIED forbids passing these files on."""
 
 import re
 

@@ -28,8 +28,7 @@ def read_record(path: str | os.PathLike[str], units: str | None = None, *, dt: f
     where the motion is that strong.
     Raises InputError with one sentence that names the file and, where there is one, the line: for a velocity or
     displacement, no or another number of samples than announced, entries of the header or samples that are missing,
-    unknown or no numbers, units or a step that nobody states or that contradict each other.
-    """
+    unknown or no numbers, units or a step that nobody states or that contradict each other."""
     text = load_text(path, units=units, dt=dt, resample_dt=resample_dt, channel=channel)
     reader = next((one for one in (*SEVERAL, smc, knet, esm, at2) if one.recognises(text)), columns)
     if channel is not None and reader not in SEVERAL:

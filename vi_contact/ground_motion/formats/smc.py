@@ -2,8 +2,7 @@
 
 Layout: 11 lines of text; 6 lines of 8 integers in columns of 10; 10 lines of 5 reals in columns of 15; comment lines
 starting with "|"; the samples, 8 a line in columns of 10 that touch, so they are cut by column and not by blanks. The
-first integer and the first real are the marks of an undefined value (-32768 and 1.7E38).
-"""
+first integer and the first real are the marks of an undefined value (-32768 and 1.7E38)."""
 
 import re
 

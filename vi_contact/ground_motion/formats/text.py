@@ -2,8 +2,7 @@
 
 What do commas mean? "0,12" is one number or two. With a decimal point anywhere in the data, with a blank beside a
 comma, or with two commas in one word, commas separate. With semicolons between the columns, as spreadsheets of half of
-Europe write them, they are decimal. Nobody can tell in any other case.
-"""
+Europe write them, they are decimal. Nobody can tell in any other case."""
 
 import hashlib
 import math
@@ -63,8 +62,7 @@ class TextFile:
         """Return the record of ``scale`` times samples, with the units and time step [s] that the file states.
 
         None: it does not state them. line: index of the one with the units. told: title, notes, format, station,
-        component. Raises InputError for what the file and its caller leave open, or state differently.
-        """
+        component. Raises InputError for what the file and its caller leave open, or state differently."""
         place = self.path if line is None else self.at(line)
         names = [canonical_units(place, one) for one in (units, self.units) if one is not None]
         step = self.dt if dt is None else dt
@@ -115,8 +113,7 @@ class TextFile:
         """Return the values on lines[index], divided by blanks, commas or semicolons, or by the sign of the next.
 
         Raises InputError naming file, line and word for anything else, "1.234.567" included: where two unsigned
-        numbers touch nobody can tell where the first one ends.
-        """
+        numbers touch nobody can tell where the first one ends."""
         values = []
         for word in (_BETWEEN_DECIMALS if decimal_commas else _BETWEEN).split(self.lines[index].strip()):
             written = word.replace(",", ".") if decimal_commas else word
@@ -168,8 +165,7 @@ class TextFile:
 def load_text(path: str | os.PathLike[str], **said: Any) -> TextFile:
     """Read `path` as UTF-8 or, failing that, Latin-1, with any line ends; said: what the caller says about it.
 
-    Raises InputError when the file is missing, unreadable, empty, too large or not text.
-    """
+    Raises InputError when the file is missing, unreadable, empty, too large or not text."""
     name = os.fspath(path)
     if "\0" in name:
         raise InputError(f"{shown(name)}: a path cannot contain the character NUL; correct it")

@@ -3,8 +3,7 @@
 ``checkpoint.npz`` holds t, k, u, v, the reactions, active and the scheme's memory, vectors in the order of
 ``space.ids`` (the rotated basis has the same numbers as the system's own), the base steps done, what problem it is of
 (``identity``), checksums of the histories and of itself, and the number of its format. It is of the end of a base step,
-never inside a halved one, so that a restart takes the steps of the straight run, and always replaced as a whole.
-"""
+never inside a halved one, so that a restart takes the steps of the straight run, and always replaced as a whole."""
 
 import hashlib
 import io
@@ -40,8 +39,7 @@ class RestartPoint:
     """Hold the end of a base step, where a run can be left and continued.
 
     t_start, k_start: of the state the whole run began with; ``steps`` and ``t_end`` of a restart count from there.
-    base: base steps done since then; halved: attempts thrown away since then.
-    """
+    base: base steps done since then; halved: attempts thrown away since then."""
 
     state: State
     t_start: float

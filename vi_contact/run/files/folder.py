@@ -1,8 +1,7 @@
 """Make and lock the folder a run writes into, so that no data are lost and no rank waits for another for ever.
 
 Only rank 0 touches the disk. Whatever it does there goes through ``on_root``: a failure is told to all ranks, which
-then raise the same sentence together. Files that must be whole are written beside their name and renamed.
-"""
+then raise the same sentence together. Files that must be whole are written beside their name and renamed."""
 
 import fcntl
 import json
@@ -96,8 +95,7 @@ def locked(comm: Comm, folder: Path | None, name: str = LOCK) -> Iterator[None]:
     """Refuse other runs that want the folder, or this part of it, while it lasts, on all their ranks. Collective.
 
     Rank 0 holds a lock (flock) on a file in the folder. What a killed run leaves of it holds nobody up. Within the same
-    thread it may be taken again. On a file system that knows no locks there is none, which is logged.
-    """
+    thread it may be taken again. On a file system that knows no locks there is none, which is logged."""
     mine = None if folder is None else on_root(comm, lambda: _take(folder, name))
     try:
         yield

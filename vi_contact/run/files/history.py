@@ -4,8 +4,7 @@
                      a killed run loses no more.
 ``history.h5``       numbers and arrays with units as attributes, and the contact geometry; replaced as a whole
                      at checkpoints, every ten seconds if it has grown by a quarter, and at the end.
-``history.journal``  the array columns of the steps since then (float64: k, then the arrays of the row).
-"""
+``history.journal``  the array columns of the steps since then (float64: k, then the arrays of the row)."""
 
 import hashlib
 import os

@@ -3,8 +3,7 @@
 Matrices and loads are seen through vectors w made of the numbers of the unknowns: wᵀMw, wᵀKw, wᵀCw, w·f(t), and vᵀCw
 of two where a matrix may be skew. Such numbers depend neither on the ranks nor on their order, and round-off changes
 them in the last digits only; they are kept with their sizes and compared relative to these. Laws and schemes are texts,
-with numbers compared likewise.
-"""
+with numbers compared likewise."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence

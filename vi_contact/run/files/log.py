@@ -32,8 +32,7 @@ class RunLog:
     """Send everything logged under ``vi_contact`` to a file while it is open, and warnings to the terminal: on rank 0.
 
     While runs take turns (``turn_of``) a line goes to the logs that were opened in this turn. The root logger is left
-    out: form compilers make it print every line.
-    """
+    out: form compilers make it print every line."""
 
     turn: ClassVar[object] = None
     _open: ClassVar[int] = 0

@@ -46,8 +46,7 @@ class RunFolder:
     Attributes:
         folder: where it is. history: column -> values, (rows,) or (rows, …) for arrays per contact point.
         columns: column -> (unit, meaning). facts: summary.json; empty while a run goes on or after it was killed.
-        contact: None when history.h5 is missing, as early in a run, or the problem has no contact points.
-    """
+        contact: None when history.h5 is missing, as early in a run, or the problem has no contact points."""
 
     folder: Path
     history: Mapping[str, Array]
@@ -60,8 +59,7 @@ def read_run(folder: str | Path) -> RunFolder:
     """Read a run folder of ``simulate``. For a run that is still going on or was killed, return what is there.
 
     Numbers come from history.csv, which has every step. Arrays come from history.h5, when it has all steps too (it does
-    once the run has ended). InputError when there is no history, or a file is damaged.
-    """
+    once the run has ended). InputError when there is no history, or a file is damaged."""
     folder = Path(folder)
     if not (folder / HISTORY_CSV).is_file():
         raise InputError(f"'{folder}' has no {HISTORY_CSV}: give the output folder of a run")

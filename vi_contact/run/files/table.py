@@ -33,8 +33,7 @@ class Table:
         columns: column -> (unit, meaning). first: the row it was made with. count: rows so far.
         numbers: columns of history.csv, in order; arrays: on rank 0 the others, which only HDF5 holds, with a sample.
         file: the history.h5 of a run with a folder, which has the rows too: beyond KEPT bytes the memory lets them go.
-        block: how many rows are turned into columns, read or written together.
-    """
+        block: how many rows are turned into columns, read or written together."""
 
     def __init__(self, columns: Columns, first: Row, file: Path | None = None, comm: Comm | None = None) -> None:
         self.columns, self.first, self.file, self.count, self._comm = columns, first, file, 0, comm or SerialComm()
@@ -121,8 +120,7 @@ class Table:
 class StoredHistory(Mapping[str, Array]):
     """Hold histories that are read column by column from history.h5 when somebody asks, but for those that are kept.
 
-    ViContactError when there is no file, or not any more, or it no longer holds these rows.
-    """
+    ViContactError when there is no file, or not any more, or it no longer holds these rows."""
 
     def __init__(self, file: Path | None, kept: Block, names: list[str]) -> None:
         self._file, self._kept, self._names = file, kept, names

@@ -8,8 +8,7 @@ With the unit vectors E of the normal and F of the tangential unknowns, x_free =
 
 A law that depends on the slip rate makes this a sequence of such problems: ``slip_rate``.
 
-Tangential unknowns that are prescribed carry no reaction: their rows are replaced by those of a free spring.
-"""
+Tangential unknowns that are prescribed carry no reaction: their rows are replaced by those of a free spring."""
 
 from collections.abc import Callable
 

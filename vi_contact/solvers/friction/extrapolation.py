@@ -7,8 +7,7 @@ Both need one image a step and nothing else. Anderson combines the last ``depth`
 and Ni, SIAM J. Numer. Anal. 49, 2011), is the secant method for one unknown, and on linear problems is equivalent to
 GMRES.
 Where a plain step lets f grow along itself, f·f_old >= |f_old|², g expands and both would turn back: the next step is
-plain again, and what was tried before is forgotten.
-"""
+plain again, and what was tried before is forgotten."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -2,8 +2,7 @@
 
 Every problem with the threshold s given is convex and has one solution; the map is a contraction for small friction
 (Nečas, Jarušek and Haslinger, Boll. Unione Mat. Ital. 17-B, 1980; Haslinger, Hlaváček and Nečas, Handbook of Numerical
-Analysis IV, 1996). ``extrapolation`` may shorten the sequence.
-"""
+Analysis IV, 1996). ``extrapolation`` may shorten the sequence."""
 
 from dataclasses import dataclass, field
 

@@ -8,8 +8,7 @@ found by turns (Panagiotopoulos, Ing.-Arch. 44, 1975), with the parts G_nn, G_nt
     tangential    minimum of ½ r_tᵀ G_tt r_t + r_t·(q_t + G_tn r_n) over |r_t| <= limit(r_n)     r_n given
 
 Block Gauss-Seidel: under Tresca's law the exact minimum over one block after the other, which converges for every G;
-under Coulomb's when coupling and friction are moderate, linearly. ``extrapolation`` acts on r_t.
-"""
+under Coulomb's when coupling and friction are moderate, linearly. ``extrapolation`` acts on r_t."""
 
 from dataclasses import dataclass, field
 from functools import partial
@@ -28,8 +27,7 @@ from .problem import FrictionMethod, Iterated, PreparedFriction, ScaledDelassus,
 class GivenForces(Settings):
     """Hold the settings. ``tolerance``: change of r_t over the largest; ``tangential``: method of tangential problems.
 
-    In the result ``iterations`` counts pairs of problems and ``history`` the relative change in each.
-    """
+    In the result ``iterations`` counts pairs of problems and ``history`` the relative change in each."""
 
     tolerance: float = 1e-11
     tangential: FrictionMethod = field(default_factory=FrictionNewton)

@@ -29,8 +29,7 @@ class States:
 
     Masks (m,) ``closed``, ``stick`` and, in 3D, ``turns``, slip along an unknown direction. Slip reactions are
     fixed + growth r_n direction, (m, d - 1) with ``growth`` (m,); ``fixed`` (m, d). ``turning``: (|y_t| - limit)/limit
-    of nodes that turn. ``exact``: none does, and the linear problem depends on ``key`` only.
-    """
+    of nodes that turn. ``exact``: none does, and the linear problem depends on ``key`` only."""
 
     def __init__(self, step: ScaledProblem, y: Array, before: "States | None") -> None:
         m, d = y.shape
@@ -75,8 +74,7 @@ class LinearProblems:
 class Reduced:
     """Hold R, P and the turns, by places in r.
 
-    z: normals of closed nodes, each with the slip reaction that grows with it, tangents of sticking nodes, turns.
-    """
+    z: normals of closed nodes, each with the slip reaction that grows with it, tangents of sticking nodes, turns."""
 
     def __init__(self, states: States) -> None:
         m, d = self.shape = states.fixed.shape

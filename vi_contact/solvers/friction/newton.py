@@ -16,8 +16,7 @@ waves of r, and its inverse H, whose sweeps damp the short ones: some fifteen fi
 those with G alone find the answer, w made anew in double precision between them. Without a compiler Newton does all.
 
 Slip that turned back within one iteration overshot: such a node sticks in the next, which ends the usual cycles of
-slip to and fro. Where Newton cycles all the same, Gauss-Seidel sweeps (nsgs.py) lead to a better start.
-"""
+slip to and fro. Where Newton cycles all the same, Gauss-Seidel sweeps (nsgs.py) lead to a better start."""
 
 from ctypes import c_double
 from dataclasses import dataclass
@@ -46,8 +45,7 @@ class FrictionNewton(Settings):
     """Hold the settings. ``tolerance``: residual above which it refuses; ``max_iterations`` of Newton in a row.
 
     In the result ``iterations`` counts linear solves, fallback sweeps and, as one, the sweeps before (0: no contact),
-    ``history`` the residual after those and after each linear solve.
-    """
+    ``history`` the residual after those and after each linear solve."""
 
     unsymmetric: ClassVar[bool] = True  # matrices are welcome
     tolerance: float = 1e-11

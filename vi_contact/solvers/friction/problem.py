@@ -14,8 +14,7 @@ bounded sets of s into themselves continuously, Brouwer), and is unique for smal
     F_n = r_n - max(y_n, 0)   (bilateral: w_n),      F_t = r_t - projection of y_t on the disk |r_t| <= limit(r_n)   (2)
 
 Scaling. Normal rows are multiplied by G_nn^(-1/2), tangential ones by one number for each node (disks stay disks),
-the mean of G_tt to the same power: reactions and displacements are then both in sqrt(J), as in ``normal.lcp``.
-"""
+the mean of G_tt to the same power: reactions and displacements are then both in sqrt(J), as in ``normal.lcp``."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -40,8 +39,7 @@ class FrictionResult:
 
     ``r`` (m, d): r_n >= 0 exactly in unilateral rows, |r_t| <= limit(r_n) but for the last digit; ``active`` (m,):
     r_n > 0 or bilateral; ``stick`` (m,): w_t = 0 but for the residual reached, under a limit that is not zero;
-    ``residual``: largest |F| of (2) over that of r = 0. Each method tells what ``iterations`` and ``history`` count.
-    """
+    ``residual``: largest |F| of (2) over that of r = 0. Each method tells what ``iterations`` and ``history`` count."""
 
     r: Array
     active: Mask
@@ -222,8 +220,7 @@ class ScaledDelassus:
 class PreparedFriction:
     """Solve (1) for one G and many right-hand sides.
 
-    ``loop``: (problem, where to start) -> r, refused when its residual is above ``tolerance``.
-    """
+    ``loop``: (problem, where to start) -> r, refused when its residual is above ``tolerance``."""
 
     method: object
     tolerance: float

@@ -3,8 +3,7 @@
 PETSc sees the whole operator and a preconditioner that masks: directions have no part in held rows, so that iterates
 and inner products are those of the reduced system, and the residual that PETSc carries along is, in held rows, the
 reaction there. To look at the signs costs no product, and to go on from a known residual costs none either: PETSc
-solves for the correction.
-"""
+solves for the correction."""
 
 import tomllib
 from collections.abc import Callable, Sequence

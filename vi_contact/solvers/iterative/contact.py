@@ -2,8 +2,7 @@
 
 A closed rigid condition holds its unknown on the bound; the residual there is the reaction. A closed spring, of
 stiffness k = scale / compliance, leaves its unknown free and adds k to the diagonal and k bound to the load; its
-reaction is k (x - bound). An infinite bound is never closed. Arrays have one entry for each condition of this rank.
-"""
+reaction is k (x - bound). An infinite bound is never closed. Arrays have one entry for each condition of this rank."""
 
 import zlib
 
@@ -65,8 +64,7 @@ class Contact:
         """Return the mask of the free unknowns: 1, 0 where held or missing, and less than 1 at closed springs.
 
         w M⁻¹ w is the preconditioner: sqrt(A_ii / (A_ii + k)) at a spring gives M the diagonal of A + k there, and
-        tends to the mask as the spring becomes rigid.
-        """
+        tends to the mask as the spring becomes rigid."""
         w = np.ones(self._size)
         w[self._missing] = 0.0
         w[self.held] = 0.0
@@ -94,8 +92,7 @@ class Contact:
         """Return the conditions whose signs are wrong by more than ``error``, the largest residual.
 
         A closed one pulls: r below -error and -least_force; an open one has penetrated by more than the error
-        moves its unknown, error / A_ii, and by more than round-off.
-        """
+        moves its unknown, error / A_ii, and by more than round-off."""
         stiff = np.where(self.soft, self.k / (self.diagonal + self.k), 1.0)
         pulls = self.closed & ~self.bilateral & (r < -np.maximum(least_force, error * stiff))
         inside = x[self.rows] - self.bound > np.maximum(CLOSING * x_ref, error / self.diagonal)

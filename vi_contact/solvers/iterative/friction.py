@@ -3,8 +3,7 @@
 Every Newton step solves the linear problem of the present states (``friction_states``) by GMRES (``friction_krylov``),
 to a hundredth of its residual. The first states are those of the reactions of the last step, with the slip
 that the step predicts: A x - b at a predicted x is no contact force. In the end every residual is formed afresh;
-reactions are put on their cone, and tangents that stick where they were.
-"""
+reactions are put on their cone, and tangents that stick where they were."""
 
 import numpy as np
 

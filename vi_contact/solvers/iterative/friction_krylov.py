@@ -7,8 +7,7 @@ sticking tangents, and in the tangent plane of a point that slips
     W = n nᵀ + sqrt(g / (g + kappa)) (1 - n nᵀ),    g = c / 2,
 
 which gives M⁻¹ the diagonal of (A + kappa)⁻¹ across the slip, where 1/g is that of A⁻¹, and tends to the mask of a
-point that cannot turn. About half of the diagonal of A is what its neighbours leave a node of stiffness.
-"""
+point that cannot turn. About half of the diagonal of A is what its neighbours leave a node of stiffness."""
 
 from typing import Any
 

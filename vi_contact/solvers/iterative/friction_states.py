@@ -11,8 +11,7 @@ linear problem of the states (Hüeber, Stadler and Wohlmuth, SIAM J. Sci. Comput
     stick  s = 0        slip  r_t = (cohesion + slope r_n) n + kappa (s - n n·s),  kappa = limit c / (|y| - limit)
 
 in which kappa, the friction limit over the slip, is the curvature of the disk; it turns n along the slip. Coefficients
-that depend on the slip rate add their derivative times n n·s. Arrays have one row for each condition of this rank.
-"""
+that depend on the slip rate add their derivative times n n·s. Arrays have one row for each condition of this rank."""
 
 from dataclasses import dataclass
 
@@ -76,8 +75,7 @@ def dot(a: Array, b: Array) -> Array:
 class States:
     """Take the states at y_n (m,), y_t (m, d - 1), and with them the linear problem. ``slip``: s where y was taken.
 
-    Slip that turned back since ``before`` overshot, and sticks first. ``stuck``: points that stick, whatever y says.
-    """
+    Slip that turned back since ``before`` overshot, and sticks first. ``stuck``: points that stick, whatever y says."""
 
     def __init__(self, tangents: Tangents, limits: Limits, y: tuple[Array, Array], slip: Array, *,
                  before: "States | None" = None, stuck: Mask | None = None) -> None:
@@ -136,8 +134,7 @@ class LawOfStep:
     Where Newton's steps go in circles, which large coefficients may bring about, limits are given for some rounds,
     those of the r_n found last: Tresca problems, which are convex (Nečas, Jarušek and Haslinger, Boll. Unione Mat.
     Ital. 17-B, 1980). A law that weakens steeply goes back to the coefficients of rest, and climbs for more rounds than
-    before.
-    """
+    before."""
 
     def __init__(self, step: StepProblem) -> None:
         self._step = step

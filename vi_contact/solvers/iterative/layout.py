@@ -2,8 +2,7 @@
 
 A product with blocks of 3 x 3 reads one column number where AIJ reads nine, and half of a symmetric matrix serves for
 all of it (SBAIJ): it takes a third of the time. Prescribed components are no unknowns, and a node that keeps
-others would break the blocks: it gets them back here as unknowns that are always held at zero.
-"""
+others would break the blocks: it gets them back here as unknowns that are always held at zero."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,8 +20,7 @@ from ..volume.bounded_system import assembled
 class Layout:
     """Say where this rank's unknowns stand among those of whole nodes: ``places`` (n,) of ``size``, ``width`` a node.
 
-    ``complete``: on no rank is there a component of a node that is no unknown.
-    """
+    ``complete``: on no rank is there a component of a node that is no unknown."""
 
     width: int
     places: Indices
@@ -94,8 +92,7 @@ class Nodewise:
     def entries(self, result: Any = None) -> Any:
         """Return A as an AIJ matrix of whole nodes, each block stored in full; ``result``: an earlier one to refill.
 
-        Rows of missing components hold the largest diagonal entry of A.
-        """
+        Rows of missing components hold the largest diagonal entry of A."""
         mat = self.source.PtAP(self._selected, result=result)
         mat.setBlockSize(self.layout.width)
         mat.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)

@@ -16,8 +16,7 @@ class Work:
 
     ``linear_iterations`` of conjugate gradients, those of the fallback too, or of GMRES; ``newton_steps`` with
     friction; ``products`` with A; ``renewals`` of the preconditioner after the first; ``fallbacks``: steps that ended
-    by projected gradients, or with limits of friction given for some rounds.
-    """
+    by projected gradients, or with limits of friction given for some rounds."""
 
     linear_iterations: int = 0
     newton_steps: int = 0
@@ -30,8 +29,7 @@ class Operator:
     """Multiply by A + the stiffness of closed springs: the context of a PETSc shell matrix.
 
     Held rows are multiplied too. Conjugate gradients whose preconditioner leaves these rows alone never move them, and
-    the residual that they carry along is the reaction there.
-    """
+    the residual that they carry along is the reaction there."""
 
     def __init__(self, blocks: Any, work: Work) -> None:
         self.blocks, self.work = blocks, work

@@ -10,8 +10,7 @@ soft one, are enough. Factors are then made of A with a larger diagonal (Manteuf
 since PETSc's own shifts know nothing of blocks.
 
 GAMG is made of A with the held rows and columns replaced by their diagonal, or its coarse grids would believe the
-contact open; the interpolation is kept, Galerkin products are renewed when over a tenth of the set has moved since.
-"""
+contact open; the interpolation is kept, Galerkin products are renewed when over a tenth of the set has moved since."""
 
 from typing import Any
 
@@ -142,8 +141,7 @@ class Inverse:
 class Multigrid(Inverse):
     """Hold GAMG, or what else the options say, of an AIJ matrix that is renewed for the contact set.
 
-    The interpolation is that of the whole A with its rigid modes, in which no set has left a trace.
-    """
+    The interpolation is that of the whole A with its rigid modes, in which no set has left a trace."""
 
     def __init__(self, nodewise: Nodewise, surface: ContactSurface, layers: OptionLayers, work: Work) -> None:
         self._nodewise, self._work, self._comm = nodewise, work, surface.comm

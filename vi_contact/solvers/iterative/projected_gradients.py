@@ -9,8 +9,7 @@ rows along -beta (proportioning). The energy falls in every step, so that it can
 Here r = -D^½ x with D the diagonal of A and of the closed springs, so that x <= bound is a lower bound and lengths and
 forces compare; on a face the preconditioner of the route is used. The springs that are closed are given while the
 bounds are searched; then they are taken from the answer, and a search along the line to it, which makes the energy as
-small as can be, keeps this Newton iteration from cycling.
-"""
+small as can be, keeps this Newton iteration from cycling."""
 
 import numpy as np
 

@@ -4,8 +4,7 @@
 
 The contact set is a mask on the full-size vectors (``search``); a set that comes twice, or does not end, goes to
 projected gradients, which decrease the energy in every step and so cannot cycle (``projected_gradients``). Steps with
-friction take semismooth Newton and GMRES instead (``friction``).
-"""
+friction take semismooth Newton and GMRES instead (``friction``)."""
 
 import logging
 from collections.abc import Mapping
@@ -53,8 +52,7 @@ class Iterative:
         tolerance: it stops when the residual, measured as the certificate, and the estimated error are below this.
         changes: number of changes of the contact set in a step without friction; after more, or when a set comes
             twice, projected gradients continue.
-        patience: number of linear iterations within which the residual has to fall tenfold.
-    """
+        patience: number of linear iterations within which the residual has to fall tenfold."""
 
     preconditioner: str = AUTO
     petsc_options: Mapping[str, object | None] = field(default_factory=dict)

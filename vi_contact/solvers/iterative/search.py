@@ -7,8 +7,7 @@ semismooth Newton method, SIAM J. Optim. 13, 2003, 865-888) with inexact solves.
 
 Whenever the residual off S has fallen tenfold the signs are looked at; one that is wrong by more than the residual will
 not come right, and the set changes there and then. In the end F is formed afresh, and the signs have to hold to the
-last digit that the certificate sees.
-"""
+last digit that the certificate sees."""
 
 from collections.abc import Callable
 

@@ -10,8 +10,7 @@ Program. 134, 2012), or wander when G is ill-conditioned. When a set comes back,
 fallen below its minimum for PATIENCE changes, the method of Lawson and Hanson (Solving Least Squares Problems, 1974,
 ch. 23, there for least squares) takes over: it admits one row at a time and keeps r >= 0, so that ½ rᵀG r + qᵀr falls
 at every set it completes. No such set can return: it ends, in practice after about as many changes as there are rows.
-(Murty's single exchanges, the other finite fallback, took up to 1000 changes where this one took 150.)
-"""
+(Murty's single exchanges, the other finite fallback, took up to 1000 changes where this one took 150.)"""
 
 from ctypes import c_double
 from dataclasses import dataclass
@@ -49,8 +48,7 @@ class ActiveSet:
     def prepare(self, G: Array, bilateral: Mask) -> PreparedLCP:
         """Check and factor G (m, m) once for many right-hand sides. InputError when it is not SPD.
 
-        The factors of the last sets are remembered: a step on the same set costs triangular solves only.
-        """
+        The factors of the last sets are remembered: a step on the same set costs triangular solves only."""
         scaled = scaled_dense(G, bilateral)
         cholesky(scaled.matrix)  # if the whole is positive definite, so is every part
         return PreparedSets(self, scaled, _Sets(self, scaled).search)
@@ -214,8 +212,7 @@ class _Factor:
         """r (m,) with r = 0 off the set, and w = gap + G r.
 
         No iterative refinement: the residual of Cholesky is at rounding level already (measured gain below a factor 2
-        for conditions up to 1e10).
-        """
+        for conditions up to 1e10)."""
         r = np.zeros(gap.size)
         if self._lower is None:
             return r, gap.copy()

@@ -6,8 +6,7 @@ Dual (eq. 42 there; Hildreth 1957):    r_i <- max(0, r_i - (q + G r)_i / G_ii)
 Both are projected Gauss–Seidel: every sweep lowers the objective. They converge for every SPD matrix, linearly, and
 slowly when contacts are strongly coupled. The primal is written in s = x_free - v = G r, the displacement that the
 reactions take back, because s carries no digits of the gap: min ½ sᵀD s over s >= -q, which
-is (49) up to the constant ½ x_freeᵀ D x_free.
-"""
+is (49) up to the constant ½ x_freeᵀ D x_free."""
 
 from dataclasses import dataclass
 
@@ -25,8 +24,7 @@ class Hildreth:
 
     Ends when the largest change of a sweep, relative to the largest unknown, and the residual are below ``tolerance``
     (or at rounding level). In the result ``iterations`` counts sweeps; with ``record``, ``history`` holds the objective
-    [J] after each: ½ sᵀD s or ½ rᵀG r + qᵀr, whose minima differ in sign only.
-    """
+    [J] after each: ½ sᵀD s or ½ rᵀG r + qᵀr, whose minima differ in sign only."""
 
     primal: bool = True
     tolerance: float = 1e-13
@@ -111,8 +109,7 @@ class _Sweeps:
 def sweep(rows: list[tuple[int, Array]], x: list[float], lower: list[float], gradient: Array) -> float:
     """Sweep once over ``rows`` (index, row of H with unit diagonal), in place; return the largest |change|.
 
-    Keeps gradient = H x + c up to date by columns, so that rows at rest cost a comparison.
-    """
+    Keeps gradient = H x + c up to date by columns, so that rows at rest cost a comparison."""
     largest_change = 0.0
     for i, row in rows:
         old = x[i]

@@ -10,8 +10,7 @@ min ½ rᵀGr + qᵀr over r >= 0, and, with D = G⁻¹ and v = x_free - G r, of
 Scaling. With d_i = G_ii^(-1/2) the numbers r_i/d_i and w_i d_i are both in sqrt(J), and (1) keeps its form with
 d G d in the place of G. There forces and gaps, translations and rotations compare, so that every tolerance is a pure
 number. The unit is the violation of r = 0: the largest -q_i d_i (|q_i| d_i in bilateral rows), the contact there is to
-resolve. Gaps that are far from closing do not enter it: a wide gap does not blunt the certificate of a narrow one.
-"""
+resolve. Gaps that are far from closing do not enter it: a wide gap does not blunt the certificate of a narrow one."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -35,8 +34,7 @@ class LCPResult:
     ``r`` (m,) with r >= 0 exactly in unilateral rows; ``active`` (m,) boolean: r > 0, or bilateral, where a grazing row
     (r = w = 0 but for rounding) may be either; ``residual``: max |min(r_i/d_i, w_i d_i)| over unilateral and
     max |w_i d_i| over bilateral rows, over the unit: 1 is what r = 0 scores, 0 is exact, in all units of G and q;
-    ``method`` the settings that made it. Each method tells what ``iterations`` and ``history`` count.
-    """
+    ``method`` the settings that made it. Each method tells what ``iterations`` and ``history`` count."""
 
     r: Array
     active: Mask
@@ -95,8 +93,7 @@ class PreparedLCP:
         """Solve the problem of q (m,) [m]. ``guess``: reactions of a similar problem, or their active set.
 
         Raises StepFailure where the method does not reach its tolerance; InputError for NaN, -inf, or +inf in a
-        bilateral row, and for a guess that has not one entry a row.
-        """
+        bilateral row, and for a guess that has not one entry a row."""
         scaled = self.scaled
         check_gap(q, scaled.bilateral)
         if guess is not None and guess.shape != q.shape:

@@ -11,8 +11,7 @@ Problem, 1992, section 4.4.
 It ends in the one solution of a P-matrix (``p_matrix``); of a copositive-plus G, which one with positive definite
 symmetric part is, in a solution or, where there is none, on a ray: a basis that nothing has to leave. For other G a ray
 proves nothing, and of several solutions it finds one. About m pivots are usual, 2^m possible (Murty, Math. Program.
-Study 7, 1978); each costs 4 m² products on m rows. Bilateral rows are eliminated before.
-"""
+Study 7, 1978); each costs 4 m² products on m rows. Bilateral rows are eliminated before."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -34,8 +33,7 @@ class Lemke:
     """Hold the settings. ``tolerance``: residual above which it refuses; ``max_iterations``: pivots allowed.
 
     In the result ``iterations`` counts pivots (0: the guessed set was right), ``history`` is z after each, over the
-    violation of r = 0. Where (1) has several solutions the guess may choose among them.
-    """
+    violation of r = 0. Where (1) has several solutions the guess may choose among them."""
 
     unsymmetric: ClassVar[bool] = True  # matrices are welcome
     tolerance: float = 1e-9

@@ -2,8 +2,7 @@
 
 All principal minors of a P-matrix are positive. Exactly then  w = q + G r, 0 <= r ⊥ w >= 0  has one solution for every
 q (Samelson, Thrall and Wesler, Proc. Amer. Math. Soc. 9, 1958), and so has the box l <= r <= u, friction of given
-limits in the plane (Cottle, Pang and Stone, The Linear Complementarity Problem, 1992, sections 3.3 and 3.4).
-"""
+limits in the plane (Cottle, Pang and Stone, The Linear Complementarity Problem, 1992, sections 3.3 and 3.4)."""
 
 from dataclasses import dataclass
 
@@ -30,8 +29,7 @@ def p_matrix(G: Array) -> PMatrix:
 
     One with positive definite symmetric part is. Where that is not, up to 18 rows are tested by the recursion of
     Tsatsomeros and Li (BIT 40, 2000): G is one if G_11 > 0, and G without row and column 1 and the Schur complement of
-    G_11 are. Bounds of the rounding errors go along: a minor within them of zero decides nothing.
-    """
+    G_11 are. Bounds of the rounding errors go along: a minor within them of zero decides nothing."""
     G = array("p_matrix", "G", G, (None, None))
     check_operator(G, np.zeros(len(G), dtype=bool))
     if not (G.diagonal() > 0.0).all():

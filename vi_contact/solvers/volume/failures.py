@@ -1,7 +1,6 @@
 """Put PETSc's reasons for stopping into words, and make StepFailures of them.
 
-PETSc 3.25 has other names for some reasons and other words for some errors; both are settled here.
-"""
+PETSc 3.25 has other names for some reasons and other words for some errors; both are settled here."""
 
 import re
 import tomllib

@@ -2,8 +2,7 @@
 
 Layers, the later wins: the method's defaults, ``petsc_options`` of the settings, PETSc's own database (command line,
 PETSC_OPTIONS). SNES VI reads its options again whenever the active set changes, so they stay in the database for
-as long as a solve runs and are taken out afterwards: two solvers with one prefix do not meet.
-"""
+as long as a solve runs and are taken out afterwards: two solvers with one prefix do not meet."""
 
 import tomllib
 from collections.abc import Callable, Iterator, Mapping

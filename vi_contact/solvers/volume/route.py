@@ -4,8 +4,7 @@
 
 In the rotated basis every condition is a bound on one unknown, which is all that SNES-VI and TAO know of contact. With
 friction the tangential reactions become bounded unknowns too (``friction``); then there is nothing to minimise,
-and only SNES can do it. Reference: PETSc manual, chapters SNES (variational inequalities) and TAO.
-"""
+and only SNES can do it. Reference: PETSc manual, chapters SNES (variational inequalities) and TAO."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -51,8 +50,7 @@ class Volume:
         method: ReducedNewton (the reference), SemismoothNewton or TaoTron.
         petsc_options: PETSc options without prefix, e.g. {"snes_monitor": None}; the command line overrides them.
         prefix: the prefix of these options on the command line and in PETSC_OPTIONS.
-        tolerance: the largest relative error that is accepted when a solver stops improving above round-off.
-    """
+        tolerance: the largest relative error that is accepted when a solver stops improving above round-off."""
 
     method: Method = field(default_factory=ReducedNewton)
     petsc_options: Mapping[str, object | None] = field(default_factory=dict)
@@ -83,8 +81,7 @@ class Volume:
 class PreparedVolume:
     """Run a PETSc solver bound to A; ``snes`` or ``tao`` is the PETSc object. ``close`` frees it.
 
-    Without ``close`` it is freed at the first ``prepare`` after its last reference: to free it is collective.
-    """
+    Without ``close`` it is freed at the first ``prepare`` after its last reference: to free it is collective."""
 
     def __init__(self, settings: Volume, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
         self._system = BoundedSystem(A, surface, scale)

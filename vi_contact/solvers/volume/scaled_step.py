@@ -2,8 +2,7 @@
 
 PETSc's VI and bound-constrained solvers carry absolute tolerances in unknown units. They are
 handed z / x_ref and (A z - b) / r_ref instead, with powers of two for x_ref and r_ref, so that both are near one in
-any system of units and scaling loses no digit: a bound stays exactly a bound.
-"""
+any system of units and scaling loses no digit: a bound stays exactly a bound."""
 
 from typing import Any
 
@@ -61,8 +60,7 @@ class ScaledStep:
     def objective(self, _solver: Any, y: Any, G: Any) -> float:
         """Return f(y) - f(origin) and the gradient F(y), for TAO; f(y) = ½ y·Hy - y·b/r_ref, H = A x_ref / r_ref.
 
-        A line search compares values, which agree in all their digits where the gradient still has eight to lose.
-        """
+        A line search compares values, which agree in all their digits where the gradient still has eight to lose."""
         values = y.array_r
         F = self.residual(values)
         G.array[:] = F
@@ -99,8 +97,7 @@ class ScaledStep:
     def verdict(self, y: Array, F: Array) -> int:
         """Return SNES's reason: 0 to go on, 2 solved to round-off, 4 below the tolerance and no longer improving.
 
-        PETSc's own tests are relative to the first residual, which a good prediction makes unreachable.
-        """
+        PETSc's own tests are relative to the first residual, which a good prediction makes unreachable."""
         force, gap, backward = self.errors(y, F)
         if np.isnan(force):
             return NOT_A_NUMBER
@@ -115,8 +112,7 @@ class ScaledStep:
     def answer(self, driver: Any, name: str) -> tuple[Array, Mask, Array, int]:
         """Run a PETSc solver of this step; return (y, active (m,), r_n (m,), iterations). StepFailure with its reason.
 
-        Off the active set r_n is zero, so that what is left of F shows in the certificate.
-        """
+        Off the active set r_n is zero, so that what is left of F shows in the certificate."""
         y, F, reason, iterations = driver.run()
         if reason <= 0 and not self.accepts(y, F):
             raise stopped(name, driver.reasons, reason, iterations, self.worst)

@@ -2,8 +2,7 @@
 
 ``ReducedNewton`` is VINEWTONRSLS, which without a line search is the primal-dual active set method: solve with the
 active points held, project, read the next active set off the signs of the residual. ``SemismoothNewton`` is
-VINEWTONSSLS on the Fischer-Burmeister function. Both factorise in every iteration; of ``Condensed`` they share A, b.
-"""
+VINEWTONSSLS on the Fischer-Burmeister function. Both factorise in every iteration; of ``Condensed`` they share A, b."""
 
 import weakref
 from collections.abc import Callable
@@ -78,8 +77,7 @@ def weakly(method: Callable[..., Any]) -> Callable[..., Any]:
     """Return the bound method without keeping its object alive: what PETSc may hold.
 
     petsc4py frees a solver late and all at once; whatever PETSc object only its callbacks kept alive would then be lost
-    to the clean-up and never be freed.
-    """
+    to the clean-up and never be freed."""
     reference = weakref.WeakMethod(method)
 
     def call(*arguments: Any) -> Any:
@@ -154,8 +152,7 @@ class ReducedNewton:
     """Solve by an active set method of PETSc, SNES VINEWTONRSLS, with a factor by MUMPS in every iteration.
 
     Other linear solvers by ``petsc_options``, e.g. {"ksp_type": "cg", "pc_type": "hypre"}; gamg, mg and fieldsplit are
-    refused, they do not survive the reduction. With friction, and where A is not symmetric, LU in place of Cholesky.
-    """
+    refused, they do not survive the reduction. With friction, and where A is not symmetric, LU in place of Cholesky."""
 
     carries_friction: ClassVar[bool] = True
 
@@ -182,8 +179,7 @@ class ReducedNewton:
 class SemismoothNewton:
     """Solve by a semismooth Newton method of PETSc, SNES VINEWTONSSLS, with LU by MUMPS: a diagnostic.
 
-    Iterates may penetrate by 1e-13. With springs 1e6 times stiffer or softer than the body its line search may fail.
-    """
+    Iterates may penetrate by 1e-13. With springs 1e6 times stiffer or softer than the body its line search may fail."""
 
     carries_friction: ClassVar[bool] = False
 

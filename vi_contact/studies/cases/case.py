@@ -5,8 +5,7 @@
     [system]          fem.assemble                         [run]      the other arguments of simulate
     [[contact]]       fem.contact_surface, .contact_pair   [gravity]  with_weight, then static_equilibrium
     [friction] [impact] [mass] [[excitation]]              [[check]]  formulas to compare with (engineering.checks)
-    [[stage]]  what replaces these tables in stages that follow one another
-"""
+    [[stage]]  what replaces these tables in stages that follow one another"""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -78,8 +77,7 @@ class Case:
 
     path: of the file; tables: its content, with the settings; settings: the KEY=VALUE made after reading; nodes: the
     calls that its tables are; allowed: the packages whose classes it may name; ready: mesh and groups, when they are;
-    stages: of [[stage]]; nodes, and what all but ``run`` and ``check`` do, are those of the last one then.
-    """
+    stages: of [[stage]]; nodes, and what all but ``run`` and ``check`` do, are those of the last one then."""
 
     path: Path
     tables: Mapping[str, Any]
@@ -155,8 +153,7 @@ class Case:
 
         Without ``steps`` and ``t_end`` it lasts as long as the excitation. A problem with weight starts from its static
         equilibrium. The folder gets a copy of the case, ``case.toml``. Stages run one after the other, but for those
-        that are ``reached`` already. Raises as ``simulate``.
-        """
+        that are ``reached`` already. Raises as ``simulate``."""
         self.check()
         folder = self.out if out is None else Path(out)
         if "strain_compatible" in self.nodes:
@@ -180,8 +177,7 @@ class Case:
     def call(self, parts: Parts, folder: Path | None, state: State | None = None) -> Iterator[dict[str, Any]]:
         """Hold the run folder, with a copy of the case, and what the run gives to ``simulate``; collective.
 
-        parts: as of ``parts``, of this case or of one with the same body; state: at rest, when it is known.
-        """
+        parts: as of ``parts``, of this case or of one with the same body; state: at rest, when it is known."""
         if "strain_compatible" in self.nodes:
             raise InputError(f"{self.path}: [strain_compatible] is for single runs: leave it out of stages and studies")
         problem = self._problem(parts)
@@ -256,8 +252,7 @@ def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence
     that you trust: the case may name their classes as "package.module:Name", which runs code of these packages.
 
     Raises InputError, one sentence with file, table, key and remedy: no TOML (with the line), a table, type or key that
-    nobody knows (with the nearest known), a missing key, a value of the wrong kind. Groups are looked up by ``run``.
-    """
+    nobody knows (with the nearest known), a missing key, a value of the wrong kind. Groups are looked up by ``run``."""
     path = Path(path)
     tables = with_settings(read_toml(path), settings)
     allowed = packages(allow)

@@ -45,8 +45,7 @@ def describe(case: Any, comm: Any, parts: Parts | None = None, *, most: int = 50
     defects and warnings: sentences.
 
     parts: those of the case, when they are known; most: unknowns beyond which periods are left out. The same on any
-    number of ranks. InputError as of a run. Collective.
-    """
+    number of ranks. InputError as of a run. Collective."""
     parts = parts or case.parts(comm)
     problem, plan, tags = case.problem(comm, parts), case.plan(parts), parts.tags or {}
     space = space_of("describe", problem.system)

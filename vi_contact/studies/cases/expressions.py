@@ -2,8 +2,7 @@
 
 There are numbers, pi, brackets, + - * / ^, sqrt sin cos tan exp log abs step min max. A text is cut into these words;
 Python's parser, which runs nothing, then tells which belongs to which. Texts have at most 500 characters, brackets in
-each other 20 deep and exponents that are numbers up to 100, so that an evaluation is at most 500 products of arrays.
-"""
+each other 20 deep and exponents that are numbers up to 100, so that an evaluation is at most 500 products of arrays."""
 
 import ast
 import re
@@ -31,8 +30,7 @@ class Expression:
     """Hold arithmetic of these variables; step(a) is 1 from a = 0 on and 0 before. InputError says what is wrong.
 
     Called with the time and values of the other variables, which may be arrays, it returns its own; NaN where there is
-    none, as of the root of a negative number.
-    """
+    none, as of the root of a negative number."""
 
     text: str
     variables: str = ""

@@ -5,8 +5,7 @@ names the packages (``--allow PACKAGE``, ``read_case(path, allow=("package",))``
 an entry point of the group ``vi_contact``. The module is such a package or lies below one, by whole names: "pack"
 allows "pack.sub", not "packet". The class is defined in one, too: "pack.tools:Popen" would start programs wherever
 pack.tools uses ``subprocess``. And it has all methods of the protocol that the table asks for. Python searches its own
-path without the folder of the case file, whose author could have put a module of a trusted name there.
-"""
+path without the folder of the case file, whose author could have put a module of a trusted name there."""
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence

@@ -23,8 +23,7 @@ class Words:
 
     choices: of every type that tables can make, by the word after ``type``; default: where it may be left out;
     groups: types that are named groups of the mesh; short: the one key that a plain text stands for; allowed: the
-    packages whose classes may be named; named: nodes by type and name; by "contact" the groups of contact tables.
-    """
+    packages whose classes may be named; named: nodes by type and name; by "contact" the groups of contact tables."""
 
     folder: Path
     choices: Mapping[Any, Mapping[str, Callee]]

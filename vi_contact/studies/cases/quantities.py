@@ -1,8 +1,7 @@
 """Read texts where numbers or functions are asked for: "30 MPa", "2*9.81", "9810*max(0, 35 - y)".
 
 A unit is a product of powers, as "kN/m3", "kg/m^3", "Pa*s", "1/s"; its dimension must be that of the key, whose unit
-one table here tells.
-"""
+one table here tells."""
 
 import math
 import re
@@ -39,8 +38,7 @@ def unit_of(name: str, key: str) -> str | None:
 def text_node(text: str, members: Sequence[Any], spot: Spot) -> Any:
     """Return the number or function that a text stands for; None where a key of these types takes neither.
 
-    InputError: no arithmetic, a unit of another dimension than that of the key, a value that is not finite or whole.
-    """
+    InputError: no arithmetic, a unit of another dimension than that of the key, a value that is not finite or whole."""
     one_value = float in members or not any(get_origin(member) in (tuple, list, Sequence) for member in members)
     kinds = ((FIELD, "xyzt"), (Expression, "xyz"), (HISTORY, "t"))
     kind, letters = next((one for one in kinds if one[0] in members and one_value), (None, ""))

@@ -36,8 +36,7 @@ class ShortOptions:
     def settings(self, tables: Mapping[str, Any], given: Sequence[str] = ()) -> list[str]:
         """Return all settings of a case: those that replace, then those ``given``, then those that change the result.
 
-        InputError for an option that the case has no use for.
-        """
+        InputError for an option that the case has no use for."""
         first = [*self._motion(tables), *self._step(), *self._methods(tables)]
         after = with_settings(dict(tables), [*first, *given])
         last = [*self._scale(after), *self._cross_check(after)]

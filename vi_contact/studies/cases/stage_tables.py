@@ -24,8 +24,7 @@ _NAME = re.compile(r"\w{1,40}", re.ASCII)
 class Stage:
     """Hold what a stage is: its tables, with those of the case, and the ``Case`` that is made of them.
 
-    label: how sentences name it; release: reactions of supports that it does without go on as forces.
-    """
+    label: how sentences name it; release: reactions of supports that it does without go on as forces."""
 
     label: str
     name: str

@@ -4,8 +4,7 @@ A static stage finds the equilibrium under its loads with contact, a dynamic one
 and with them stresses, velocities after a dynamic stage, contact forces and the points where friction has brought the
 body, and the reactions of released supports as forces. Every stage begins at t = 0 with its own excitations. Each has a
 run folder, DIR/stages/1_NAME, the last one DIR itself; a static stage a folder of one row. FOLLOWS in it has the
-checksums of what the stages before it left, so that a restart finds out which stages still follow from one another.
-"""
+checksums of what the stages before it left, so that a restart finds out which stages still follow from one another."""
 
 import shutil
 from dataclasses import dataclass, replace

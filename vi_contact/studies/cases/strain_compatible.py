@@ -4,8 +4,7 @@
     curves = [["sand", {type = "SoilCurves.vucetic_dobry", plasticity = 15}]]
 
 Every run is a whole one, in DIR, all stages with the same soil; those before the last one, or all where none ends it,
-are in DIR/iterations/1, 2, …, and DIR/strain_compatible.json has the largest relative change of G or xi after each.
-"""
+are in DIR/iterations/1, 2, …, and DIR/strain_compatible.json has the largest relative change of G or xi after each."""
 
 import shutil
 from dataclasses import replace

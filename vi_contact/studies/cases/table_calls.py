@@ -7,8 +7,7 @@
 ``read`` turns a value of the file into a node by the type hint of the parameter it is for, and refuses what does not
 fit in one sentence with file, table and key. ``build(node, context)`` makes the calls; the context supplies what no
 file holds: communicator, mesh, its groups, system; excitations for what must know them. Nothing of the file is ever
-evaluated as code.
-"""
+evaluated as code."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass, replace

@@ -47,8 +47,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
 def checked(tables: dict[str, Any], source: str) -> dict[str, Any]:
     """Return the tables; InputError naming the key for what no table of a case can hold.
 
-    These are NaN, whole numbers beyond 64 bits, the character NUL, and tables in tables in tables without end.
-    """
+    These are NaN, whole numbers beyond 64 bits, the character NUL, and tables in tables in tables without end."""
     left: list[tuple[str, Any, int]] = [("", tables, 0)]
     while left:
         key, value, depth = left.pop()

@@ -2,8 +2,7 @@
 
 Rooms list their public classes once, in their ``__init__``; a class is a word wherever it is of the kind that is asked
 for, and so are its named constructors ("GeneralisedAlpha.spectral_radius"). What takes functions has no word, or one
-of a function here that takes none.
-"""
+of a function here that takes none."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -147,8 +146,7 @@ class Parts:
     """Hold what a problem is made of.
 
     tags: groups of the mesh; weighted: it carries its weight, and starts from its equilibrium; moved: the excitations
-    come up through its base, and are no inertia load.
-    """
+    come up through its base, and are no inertia load."""
 
     system: SemiDiscreteSystem
     surface: ContactSurface

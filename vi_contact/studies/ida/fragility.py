@@ -9,8 +9,7 @@ records as independent:
 
 theta and beta make L largest; ln L is concave in 1/beta and ln(theta)/beta (Burridge, J. R. Stat. Soc. B 43, 1981), so
 there is one such place. Intervals come from the second derivatives of ln L there: 95 % for many records, too narrow for
-fewer than ten.
-"""
+fewer than ten."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -33,8 +32,7 @@ LEAST = 0.01  # of 1/beta, over that of the levels: below it the records do not 
 def limit(text: str) -> tuple[Demand, float]:
     """Return demand and limit of a text "COLUMN:WAY=VALUE", the value in the unit of the column. InputError for others.
 
-    It is passed by a demand at the value or above, for the way "min" at it or below.
-    """
+    It is passed by a demand at the value or above, for the way "min" at it or below."""
     name, _, value = text.partition("=")
     try:
         found = float(value)
@@ -49,8 +47,7 @@ def limit(text: str) -> tuple[Demand, float]:
 def passing(rows: Sequence[Mapping[str, Any]], text: str, level: str) -> Array:
     """Return (records, 2) values of the column ``level`` between which each record first passes a limit.
 
-    Of a record count the runs below its first failed one; one without any is left out.
-    """
+    Of a record count the runs below its first failed one; one without any is left out."""
     (one, most), found, ended = limit(text), dict[str, tuple[float, float]](), set()
     for row in sorted((row for row in rows if row[level] is not None), key=lambda row: float(row[level])):
         record, value = row["record"], row[one.name]

@@ -3,8 +3,7 @@
 Vamvatsikos and Cornell, Earthquake Engng Struct. Dyn. 31 (2002). In the folder of a study, beside ``ida.csv``,
 ``columns.json`` and ``ida.png``: ``fragility.csv`` and ``fragility.png``, where there are limits; ``ida.json``, the
 case and the records, so that no other study is mixed in, and ``runs/NAME_xSCALE``, the folder of every run, with its
-row.
-"""
+row."""
 
 import hashlib
 import math
@@ -52,8 +51,7 @@ class IDA:
     it; or levels: values of the intensity, in its unit. intensity: "pga", "pgv", "pgd", "sa:T", "sa:T1" (T1 as
     ``vi-contact run --check`` tells it), "arias", "cav", "housner", of the first motion. demands: "COLUMN" or
     "COLUMN:max", ":min", ":absmax", ":last" of history.csv. limits: "COLUMN:WAY=VALUE", each gets a fragility curve.
-    Raises InputError for other words, no motions, two of one name, not exactly one of scales and levels.
-    """
+    Raises InputError for other words, no motions, two of one name, not exactly one of scales and levels."""
 
     case: Case
     motions: Sequence[str | Path | Sequence[str | Path]]
@@ -125,8 +123,7 @@ def run_ida(study: IDA, out: str | Path, *, jobs: int = 1, part: tuple[int, int]
     Raises:
         InputError: a folder of another study, or in which the same part runs, a part or number of jobs that makes no
             sense, inside mpirun.
-        KeyboardInterrupt: after the runs have been told to stop; OutOfTime: likewise. Call again to go on.
-    """
+        KeyboardInterrupt: after the runs have been told to stop; OutOfTime: likewise. Call again to go on."""
     refuse_mpirun()
     if jobs < 1 or not 1 <= part[0] <= part[1]:
         raise InputError(f"jobs = {jobs}, part = {part[0]}/{part[1]}: give one job or more, and 1 <= i <= n for i/n")

@@ -104,8 +104,7 @@ def fractiles(curves: Mapping[str, tuple[Array, Array]], shares: tuple[float, ..
 
     curves: record -> (intensities, demands), straight lines between them; the levels are those of all records in the
     range that every record covers (Vamvatsikos and Cornell, Earthquake Engng Struct. Dyn. 31, 2002, section 5). Empty
-    for fewer than two records and where ranges do not overlap.
-    """
+    for fewer than two records and where ranges do not overlap."""
     full = [(im[np.argsort(im)], edp[np.argsort(im)]) for im, edp in curves.values() if len(im)]
     if len(full) < 2:
         return np.zeros(0), np.zeros((0, len(shares)))
