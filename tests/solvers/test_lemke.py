@@ -69,6 +69,18 @@ def test_a_guess_costs_no_pivot_and_a_wrong_one_no_digit():
     assert other.iterations == cold.iterations and (other.r == cold.r).all()
 
 
+def test_lists_are_told_of_or_read():
+    """A matrix or a mask that is a list is refused with the remedy; q and a guess may be lists."""
+    G, nothing = np.array([[2.0, 1.0], [0.0, 2.0]]), np.zeros(2, dtype=bool)
+    with pytest.raises(InputError, match="needs the Delassus operator as an array"):
+        Lemke().prepare(G.tolist(), nothing)
+    with pytest.raises(InputError, match="'bilateral' is no mask: give booleans"):
+        Lemke().prepare(G, nothing.tolist())
+    prepared = Lemke().prepare(G, nothing)
+    result = prepared.solve([-2.0, -1.0])
+    assert (G @ result.r == [2.0, 1.0]).all() and prepared.solve([-2.0, -1.0], [True, True]).iterations == 0
+
+
 @pytest.mark.parametrize(("G", "q", "count"), [
     ([[1.0, 2.0], [2.0, 1.0]], [-1.0, -1.0], 3),  # several: Cottle, Pang and Stone, positive but not a P-matrix
     ([[0.0, 1.0], [1.0, 0.0]], [-1.0, -1.0], 1),  # no diagonal: a game

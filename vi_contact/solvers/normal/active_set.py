@@ -18,6 +18,7 @@ from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.linalg import lapack
 
 from ...core.algebra import Array, Indices, Mask, SerialComm, lowest
@@ -62,8 +63,9 @@ class PreparedSets(PreparedLCP):
         functions = library(SerialComm()) if self.scaled.bilateral.size <= FEW else None
         return None if functions is None else Exchanges(functions, self)
 
-    def solve(self, q: Array, guess: Array | Mask | None = None) -> LCPResult:
+    def solve(self, q: ArrayLike, guess: ArrayLike | None = None) -> LCPResult:
         """Solve the problem of q (m,), as ``PreparedLCP`` says."""
+        q, guess = np.asarray(q, float), guess if guess is None else np.asarray(guess)
         known = q.shape == self.scaled.bilateral.shape and (guess is None or guess.shape == q.shape)
         if known and self._compiled is not None:
             r, active, residual, changes, moved = self._compiled(q, q < 0.0 if guess is None else guess > 0)

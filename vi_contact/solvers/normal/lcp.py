@@ -18,6 +18,7 @@ from functools import cached_property
 from math import isfinite
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.linalg import lapack
 
 from ...core.algebra import Array, Mask, lowest, max_abs
@@ -89,12 +90,12 @@ class PreparedLCP:
     scaled: ScaledLCP
     search: Callable[[Array, Array | Mask | None, float], Found]
 
-    def solve(self, q: Array, guess: Array | Mask | None = None) -> LCPResult:
+    def solve(self, q: ArrayLike, guess: ArrayLike | None = None) -> LCPResult:
         """Solve the problem of q (m,) [m]. ``guess``: reactions of a similar problem, or their active set.
 
         Raises StepFailure where the method does not reach its tolerance; InputError for NaN, -inf, or +inf in a
         bilateral row, and for a guess that has not one entry a row."""
-        scaled = self.scaled
+        scaled, q, guess = self.scaled, np.asarray(q, float), guess if guess is None else np.asarray(guess)
         check_gap(q, scaled.bilateral)
         if guess is not None and guess.shape != q.shape:
             raise InputError(f"the guess has shape {guess.shape} for {q.size} rows: give a mask or all reactions")
@@ -108,9 +109,9 @@ class PreparedLCP:
 def scaled_dense(G: Array, bilateral: Mask, *, unsymmetric: bool = False) -> ScaledLCP:
     """Check and scale a dense G. InputError when it is not finite or, unless ``unsymmetric`` allows it, not symmetric
     (to 1e-8) of positive diagonal."""
-    check_operator(G, bilateral)
     if not isinstance(G, np.ndarray):
         raise InputError("this method needs the Delassus operator as an array: form it")
+    check_operator(G, bilateral)
     d = energy_scale(G, signed=unsymmetric)
     return ScaledLCP(d, *scaled_matrix(G, d, unsymmetric=unsymmetric), bilateral.copy())
 
@@ -155,7 +156,7 @@ def check_operator(G: Array, bilateral: Mask) -> None:
     """Raise InputError unless G is square and ``bilateral`` a boolean mask of its rows."""
     if len(G.shape) != 2 or G.shape[0] != G.shape[1]:
         raise InputError(f"the Delassus operator has shape {tuple(G.shape)}: give a square matrix")
-    if bilateral.shape != (G.shape[0],) or bilateral.dtype != bool:
+    if getattr(bilateral, "shape", None) != (G.shape[0],) or bilateral.dtype != bool:
         raise InputError(f"'bilateral' is no mask: give booleans for the {G.shape[0]} rows of the Delassus operator")
 
 
