@@ -220,7 +220,7 @@ def test_units_of_columns_are_never_guessed(tmp_path):
 
 
 def test_an_unknown_format_is_refused_at_its_first_line(tmp_path):
-    with pytest.raises(InputError, match="line 1: 'RECORD' is not a number"):
+    with pytest.raises(InputError, match="line 1: 'RECORD of X' is no row of numbers"):
         read_record(write(tmp_path, "RECORD of X\nUNITS cm/s^2\n1.0\n2.0\n"), "g")
 
 
@@ -273,7 +273,9 @@ def test_even_records_are_resampled_on_request(tmp_path):
 
 @pytest.mark.parametrize("text, options, words", [
     ("0.0 1.0\n0.1 2.0\n0.2 x\n", {}, ["line 3", "'x' is not a number"]),
-    ("time acc\n0.0 1.0\n0.1 2.0\n", {}, ["line 1", "'time' is not a number"]),
+    ("time acc\n0.0 1.0\n0.1 2.0\n", {}, ["line 1", "'time acc' is no row of numbers; begin a heading with #"]),
+    ('"t [s]";"a [cm/s/s]"\n0.0;1.0\n0.1;2.0\n', {}, ["line 1", "is no row of numbers; begin a heading with #"]),
+    ("nan 0.0\n0.1 2.0\n", {}, ["line 1", "'nan' is not a number"]),
     ("0.0 1.0\n0.1 2.0\n0.2\n", {}, ["line 3", "1 columns instead of 2"]),
     ("0.0 1.0 5.0\n0.1 2.0 5.0\n", {}, ["line 1", "3 columns instead of 2"]),
     ("0.0 1.0\n0.1 2.0\n0.1 2.0\n", {}, ["line 3", "does not come after"]),

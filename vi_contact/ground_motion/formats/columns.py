@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.checks import counted, number
+from ...core.checks import counted, number, shown
 from ...core.errors import InputError
 from ..record import Record
 from .at2 import begin_data
@@ -44,6 +44,11 @@ def _table(text: TextFile, *, series: bool) -> tuple[list[int], Array]:
     """Return the line index of every row and the rows, shape (n, 1) or (n, 2), n >= 2; series:
     rows of more than two values, the last perhaps shorter, are one column written in rows."""
     lines = [index for index in text.filled(begin_data(text) or 0) if not text.lines[index].lstrip().startswith("#")]
+    heading = text.lines[lines[0]].strip() if lines else ""
+    start = heading.lstrip("\"'")[:3].lower()
+    if start[:1].isalpha() and start not in ("nan", "inf"):
+        raise InputError(f"{text.at(lines[0])}: {shown(heading)} is no row of numbers; begin a heading with #, or get "
+                         "another file")
     rows = list(text.rows(lines))
     if series and rows and len(rows[0]) > 2:
         return lines, np.array([value for row in rows for value in row])[:, None]
