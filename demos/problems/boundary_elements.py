@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from demos.problems.joined_bodies import TwoBodies
 from vi_contact.bem.boundary_mesh import BoundaryMesh, circle, polygon
 from vi_contact.bem.contact import BoundaryContact, conditions_on
 from vi_contact.bem.energetic import energetic_blocks
+from vi_contact.bem.joined_bodies import TwoBodies
 from vi_contact.bem.loads import traction_forces
 from vi_contact.bem.poincare_steklov import BoundaryProblem, PoincareSteklov
 from vi_contact.core.algebra import Array, Mask

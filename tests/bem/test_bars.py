@@ -10,11 +10,11 @@ from plane_waves import MATERIAL, SQUARE
 
 import vi_contact as vc
 from demos.problems.boundary_elements import pressed, steklov, unloaded
-from demos.problems.joined_bodies import TwoBodies
 from vi_contact.bem import polygon
 from vi_contact.bem.contact import BoundaryContact
 from vi_contact.bem.contact_run import march_contact
 from vi_contact.bem.energetic import energetic_blocks
+from vi_contact.bem.joined_bodies import TwoBodies
 from vi_contact.laws.friction import project
 
 pytestmark = pytest.mark.serial

@@ -12,12 +12,12 @@ from convolution_operator import convolution_operator
 import vi_contact as vc
 from demos.problems.boundary_elements import pressed, square_problem, steklov, unloaded
 from demos.problems.contact_ledger import ledger
-from demos.problems.joined_bodies import TwoBodies
 from demos.problems.whole_runs import Reference, compare_runs
 from vi_contact import solvers
 from vi_contact.bem import (
     BoundaryProblem,
     PoincareSteklov,
+    TwoBodies,
     polygon,
 )
 from vi_contact.bem.contact import BoundaryContact, Conditions, conditions_on

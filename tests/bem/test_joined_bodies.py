@@ -14,11 +14,11 @@ import pytest
 
 import vi_contact as vc
 from demos.problems.boundary_elements import pressed, steklov, unloaded
-from demos.problems.joined_bodies import TwoBodies
 from vi_contact.bem import (
     BoundaryContact,
     BoundaryProblem,
     PoincareSteklov,
+    TwoBodies,
     march_contact,
     polygon,
     traction_forces,

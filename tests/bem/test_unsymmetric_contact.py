@@ -14,7 +14,6 @@ from test_thin_bodies import slab
 
 import vi_contact as vc
 from demos.problems.boundary_elements import pressed, square_problem, steklov
-from demos.problems.joined_bodies import TwoBodies
 from demos.problems.square import concrete as square_of_concrete
 from vi_contact import solvers
 from vi_contact.bem import (
@@ -23,6 +22,7 @@ from vi_contact.bem import (
     ContactRun,
     PoincareSteklov,
     SpaceTimeUzawa,
+    TwoBodies,
     conditions_on,
     march_contact,
     polygon,

@@ -26,7 +26,6 @@ from demos.boundary_layer.trajectory import layer_motion
 from demos.problems.boundary_elements import disk_contact, disk_problem, embedded_problem, square_problem
 from demos.problems.disk import Disk, Push
 from demos.problems.embedded import Embedded
-from demos.problems.joined_bodies import TwoBodies
 from demos.problems.loose_segments import from_segments
 from demos.problems.published_beam import readings
 from demos.problems.square import Square
@@ -129,7 +128,7 @@ def contacts() -> Table:
         (bem.SpaceTimeUzawa, {}, {"tolerance": POSITIVE, "rho": but(POSITIVE, "none"), "max_iterations": COUNT,
                                   "window": COUNT}),
         (bem.SpaceTimeUzawa().solve, {"contact": contact}, {"contact": OTHER}),
-        (TwoBodies, {"one": problem, "two": problem}, {
+        (bem.TwoBodies, {"one": problem, "two": problem}, {
             "one": NEEDED, "two": NEEDED, "welded": MASK, "jump": JUMP, "traction": JUMP}),
         (bem.MultiplierMesh, {"mesh": mesh, "elements": mesh.labels == 0, "compliance": compliance}, {
             "mesh": OTHER, "elements": MASK | {"another side": mesh.labels == 1},

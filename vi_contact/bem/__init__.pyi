@@ -14,6 +14,7 @@ from .contact_run import march_contact as march_contact
 from .energetic import EnergeticBlocks as EnergeticBlocks
 from .energetic import energetic_blocks as energetic_blocks
 from .fundamental_solution import TimeKernels as TimeKernels
+from .joined_bodies import TwoBodies as TwoBodies
 from .loads import traction_forces as traction_forces
 from .multiplier_mesh import MultiplierMesh as MultiplierMesh
 from .poincare_steklov import BoundaryMotion as BoundaryMotion
@@ -23,4 +24,4 @@ from .poincare_steklov import PoincareSteklov as PoincareSteklov
 from .quadrature import Orders as Orders
 from .uzawa_space_time import SpaceTimeUzawa as SpaceTimeUzawa
 
-__all__: list[str] = ['BoundaryContact', 'BoundaryMesh', 'BoundaryMotion', 'BoundaryProblem', 'CompressedBlocks', 'CondensedCompliance', 'Conditions', 'ContactRun', 'EnergeticBlocks', 'Galerkin', 'MultiplierMesh', 'OperatorMatrices', 'Orders', 'PoincareSteklov', 'SpaceTimeUzawa', 'TimeKernels', 'circle', 'conditions_on', 'energetic_blocks', 'march_contact', 'polygon', 'traction_forces']
+__all__: list[str] = ['BoundaryContact', 'BoundaryMesh', 'BoundaryMotion', 'BoundaryProblem', 'CompressedBlocks', 'CondensedCompliance', 'Conditions', 'ContactRun', 'EnergeticBlocks', 'Galerkin', 'MultiplierMesh', 'OperatorMatrices', 'Orders', 'PoincareSteklov', 'SpaceTimeUzawa', 'TimeKernels', 'TwoBodies', 'circle', 'conditions_on', 'energetic_blocks', 'march_contact', 'polygon', 'traction_forces']

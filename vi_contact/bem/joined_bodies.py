@@ -20,15 +20,15 @@ from functools import cached_property, partial
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, lu_factor, lu_solve
 
-from vi_contact.bem.contact import ASYMMETRIC, SUPPORTED, BoundaryContact, Conditions
-from vi_contact.bem.energetic import summed
-from vi_contact.bem.loads import traction_forces
-from vi_contact.bem.poincare_steklov import BoundaryMotion, BoundaryProblem, CondensedCompliance
-from vi_contact.core.algebra import Array, Indices, Mask, max_abs
-from vi_contact.core.checks import array, at, mask, optional, provides
-from vi_contact.core.errors import InputError
-from vi_contact.core.protocols import FrictionLaw, Frictionless
-from vi_contact.core.surfaces import nodal_frames
+from ..core.algebra import Array, Indices, Mask, max_abs
+from ..core.checks import array, at, mask, optional, provides
+from ..core.errors import InputError
+from ..core.protocols import FrictionLaw, Frictionless
+from ..core.surfaces import nodal_frames
+from .contact import ASYMMETRIC, SUPPORTED, BoundaryContact, Conditions
+from .energetic import summed
+from .loads import traction_forces
+from .poincare_steklov import BoundaryMotion, BoundaryProblem, CondensedCompliance
 
 MATCH = 1e-9  # of the extent of the interface: distance of matching nodes
 OfPlace = Callable[[Array, float], Array]
