@@ -55,19 +55,19 @@ BAD = {
 @pytest.mark.parametrize("what", BAD)
 def test_what_is_no_arithmetic_is_refused_at_once(what: str) -> None:
     text, said = BAD[what]
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(InputError, match=said) as caught:
         Expression(text, "xyzt")
-    assert time.perf_counter() - start < 0.5 and "\n" not in str(caught.value)
+    assert time.process_time() - start < 0.5 and "\n" not in str(caught.value)
 
 
 def test_the_longest_expressions_are_quick() -> None:
     """Of 500 characters, on ten thousand points: they can be long, not slow."""
     text = "+".join(["sin(x)"] * 71)
     points = np.random.default_rng(1).uniform(size=(10_000, 2))
-    start = time.perf_counter()
+    start = time.process_time()
     found = Places(Expression(text, "xyzt"))(points)
-    assert time.perf_counter() - start < 2.0
+    assert time.process_time() - start < 2.0
     assert np.allclose(found, 71.0 * np.sin(points[:, 0]), rtol=1e-13)
 
 
