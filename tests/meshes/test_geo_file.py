@@ -234,10 +234,10 @@ def test_divided_cells_of_second_order_stay_curved(tmp_path: Path) -> None:
 def test_what_is_no_script_is_refused_at_once(tmp_path: Path) -> None:
     """Comments that nothing closes, however many, and what is no file: a pipe would be waited for."""
     path = written(tmp_path, "/* " * 100_000)
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(InputError, match="line 1 has '/"):
         allowed(path)
-    assert time.perf_counter() - start < 1.0
+    assert time.process_time() - start < 1.0
     os.mkfifo(tmp_path / "pipe.geo")
     with pytest.raises(InputError, match="cannot be read .it is no file"):
         allowed(tmp_path / "pipe.geo")
@@ -245,7 +245,8 @@ def test_what_is_no_script_is_refused_at_once(tmp_path: Path) -> None:
 
 def test_gmsh_ends_with_the_process_that_began_it(tmp_path: Path) -> None:
     path = written(tmp_path, "For i In {1:1000000000}\nFor j In {1:1000000000}\nx = j;\nEndFor\nEndFor\n")
-    code = f"from vi_contact.meshes import GeoFile; GeoFile(path={str(path)!r}, time_limit=60.0).build(None)"
+    script = f"GeoFile(path={str(path)!r}, time_limit={3.0 * PATIENCE})"
+    code = f"from vi_contact.meshes import GeoFile; {script}.build(None)"
     parent = subprocess.Popen([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": ":".join(sys.path)})
     try:
         children = Path(f"/proc/{parent.pid}/task/{parent.pid}/children")
@@ -255,15 +256,26 @@ def test_gmsh_ends_with_the_process_that_began_it(tmp_path: Path) -> None:
     finally:
         parent.terminate()
         parent.wait()
-    waited(lambda: not child.exists() or ") Z " in (child / "stat").read_text())
+    waited(lambda: ended(child))
+
+
+PATIENCE = 120.0  # s, of which an idle machine needs two
 
 
 def waited(true: Callable[[], bool]) -> None:
-    """Wait until it is true, for at most 20 s."""
-    end = time.monotonic() + 20.0
+    """Wait until it is true."""
+    end = time.monotonic() + PATIENCE
     while not true():
         assert time.monotonic() < end
         time.sleep(0.05)
+
+
+def ended(process: Path) -> bool:
+    """Whether a process of /proc is over; it may be collected while this looks."""
+    try:
+        return ") Z " in (process / "stat").read_text()
+    except OSError:
+        return True
 
 
 LOOPS = {  # the points that they make
