@@ -6,6 +6,8 @@ import json
 import math
 import shutil
 import warnings
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -26,7 +28,7 @@ from vi_contact.run.files.reading import read_run
 
 pytestmark = pytest.mark.serial
 pytest.importorskip("matplotlib")
-COUNT = 50
+COUNT, SEED = 50, 2000
 NO_NUMBERS = ["nan", "1e999", "1_0", "", "x", "1" * 5000, "\0", '"', "-1"]
 ODD: list[Any] = [None, [], {}, "", "x", -1, 0, 1e308, 10**400, True, [[1]], {"mean": "x"}, "\ud800", "$\\frac$", "\0"]
 
@@ -40,6 +42,10 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     record = [vc.Energy(), vc.Contact(), vc.Probe({"end": (3.0,)}, acceleration=True)]
     scheme = vc.ZienkiewiczWoodTaylor()
     vc.simulate(problem, scheme=scheme, dt=5e-3, steps=40, record=record, out=folder, progress=False)
+    facts = json.loads((folder / "summary.json").read_text("utf-8"))
+    facts |= {name: 0.125 for name in facts if name.startswith("seconds")}  # whose digits are others in every run: the
+    facts["memory"]["peak_bytes"] = [2**28]  # dice would fall on other places of the file
+    (folder / "summary.json").write_text(json.dumps(facts, indent=1), "utf-8")
     return folder
 
 
@@ -106,16 +112,24 @@ def in_file(path: Path) -> dict[str, list[float]]:
     return {name: [float(row.split(",")[i]) for row in rows] for i, name in enumerate(head.split(","))}
 
 
+def refused(call: Callable[[], Any]) -> Any:
+    """What it returns, or None where it refuses in one sentence."""
+    try:
+        return call()
+    except InputError as error:
+        assert "\n" not in str(error) and len(str(error)) < 600, error
+        return None
+
+
 def test_what_is_read_is_in_the_files(run: Path, tmp_path: Path) -> None:
-    random, read = Random(20), 0
+    """A report on it may still be refused: on one row, or on a motion that is infinite."""
+    read = reported = 0
     for number in range(COUNT):
         folder = tmp_path / str(number)
         shutil.copytree(run, folder)
-        mutate(folder, random)
-        try:
-            found = read_run(folder)
-        except InputError as error:
-            assert "\n" not in str(error) and len(str(error)) < 600, error
+        mutate(folder, Random(SEED + number))
+        found = refused(partial(read_run, folder))
+        if found is None:
             continue
         read += 1
         for name, values in in_file(folder / "history.csv").items():
@@ -123,8 +137,9 @@ def test_what_is_read_is_in_the_files(run: Path, tmp_path: Path) -> None:
         assert all(len(values) == len(found.history["t"]) for values in found.history.values())
         assert np.all(np.diff(found.history["t"]) > 0.0)
         assert all(isinstance(text, str) for pair in [*found.columns.values(), *header_facts(found)] for text in pair)
-        assert peaks(found.history, found.columns) and sections_of(found, {})
-    assert 5 < read < 45
+        assert peaks(found.history, found.columns)
+        reported += bool(refused(partial(sections_of, found, {})))
+    assert read // 2 < reported and 2 < read < 45  # 8 to 19 with other seeds: the files of other machines differ
 
 
 @pytest.mark.parametrize("number", range(4))
