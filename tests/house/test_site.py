@@ -159,6 +159,9 @@ def test_names_in_texts_lead_to_their_pages(site: Path) -> None:
 # the server what it finds there. A page that leads on is followed.
 PROBE = """<!doctype html><link rel="icon" href="data:,"><script>
 const list = LIST, wait = (ms) => new Promise((done) => setTimeout(done, ms));
+async function until(holds) {  // for half a minute, of which an idle machine needs a fraction of a second
+  for (let k = 0; k < 1500 && !holds(); k++) await wait(20);
+}
 const open = (url, width) => new Promise((done) => {
   const frame = document.createElement("iframe");
   frame.style = `width: ${width}px; height: 800px; border: 0`;
@@ -189,14 +192,15 @@ function tooWide(page, width) {
 }
 async function probe([url, widths]) {
   const frame = await open(url, widths[0]), here = frame.contentWindow;
-  for (let k = 0; k < 500 && !here.document.querySelector("body > *"); k++) await wait(20);  // led on, not there yet
+  const there = () => here.document.readyState === "complete" && here.document.querySelector("body > *");
+  await until(there);  // it may have led on
   const page = here.document;
   const found = {url, at: here.location.pathname + here.location.hash, math: page.querySelectorAll(".math").length};
   found.there = !here.location.hash || page.getElementById(here.location.hash.slice(1)) !== null;
-  for (let k = 0; k < 300 && page.querySelectorAll("mjx-container").length < found.math; k++) await wait(20);
+  await until(() => page.querySelectorAll("mjx-container").length >= found.math);
   if (url.includes("?q=")) {
     const hits = () => [...page.querySelectorAll("#search-results li a")].map((one) => one.textContent);
-    for (let k = 0; k < 500 && !hits().length; k++) await wait(20);
+    await until(() => hits().length);
     found.hits = hits();
   }
   page.querySelectorAll("img").forEach((one) => one.loading = "eager");
@@ -213,9 +217,11 @@ async function probe([url, widths]) {
   page.body.dataset.theme = "dark";
   found.ground = here.getComputedStyle(page.body).backgroundColor;
   found.text = here.getComputedStyle(page.querySelector("article p, article h1, body > *")).color;
-  const loaded = here.performance.getEntriesByType("resource").map((one) => one.name);
-  found.loaded = loaded.length;
-  found.outside = loaded.filter((one) => !one.startsWith(location.origin + "/") && !/^(data|blob):/.test(one));
+  const loaded = () => here.performance.getEntriesByType("resource").map((one) => one.name);
+  const outside = () => loaded().filter((one) => !one.startsWith(location.origin + "/") && !/^(data|blob):/.test(one));
+  await until(() => !url.includes("spoiled") || outside().length >= 4);  // what is refused is listed when it is
+  found.loaded = loaded().length;
+  found.outside = outside();
   frame.remove();
   return found;
 }
@@ -309,7 +315,7 @@ def opened(site: Path, pages: dict[Path, Page], tmp_path_factory: pytest.TempPat
         )
         server.told.wait(500)
         chromium.terminate()
-        chromium.wait(30)
+        chromium.wait(300)
         server.shutdown()
     (site / "probe.html").unlink()
     (site / "spoiled.html").unlink()
