@@ -35,7 +35,10 @@ import json, sys
 import jupytext
 from nbclient import NotebookClient
 book = jupytext.read(sys.argv[1])
-NotebookClient(book, timeout=300, kernel_name="python3", resources={"metadata": {"path": sys.argv[2]}}).execute()
+NotebookClient(
+    book, timeout=600, startup_timeout=600, iopub_timeout=600,  # a busy kernel is late, and late lines are left out
+    kernel_name="python3", resources={"metadata": {"path": sys.argv[2]}},
+).execute()
 print(json.dumps([[{"text": one.get("text", ""), "kinds": list(one.get("data", {}))} for one in cell.outputs]
                   for cell in book.cells if cell.cell_type == "code"]))
 """
