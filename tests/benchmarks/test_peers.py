@@ -226,7 +226,7 @@ def test_a_peer_that_is_not_there_becomes_rows_that_say_so(tmp_path: Path, pip: 
     python.write_text(f'#!/bin/bash\n[ "$1" != -m ] || {{ {pip}; }}\nexec {sys.executable} "$@"\n', encoding="utf-8")
     python.chmod(0o755)
     done = subprocess.run(["bash", str(folder / "run.sh"), "--json", "rows.json", "absent"], cwd=tmp_path,
-                          capture_output=True, encoding="utf-8", env=dict(os.environ), timeout=300, check=False)
+                          capture_output=True, encoding="utf-8", env=dict(os.environ), timeout=600, check=False)
     assert done.returncode == 0, done.stderr
     rows = json.loads((tmp_path / "rows.json").read_text(encoding="utf-8"))["rows"]
     assert [(row["problem"], row["failed"]) for row in rows] == [(one, why) for one in ("signorini", "thrown", "bar")]

@@ -183,7 +183,7 @@ def test_pip_installs_the_command(tmp_path: Path) -> None:
         "venv/bin/vi-contact run wall --steps 2 --quiet",
     ):
         done = subprocess.run(command.split(), cwd=tmp_path, capture_output=True, encoding="utf-8", check=False,
-                              env=environment | {"PIP_DISABLE_PIP_VERSION_CHECK": "1"}, timeout=300)
+                              env=environment | {"PIP_DISABLE_PIP_VERSION_CHECK": "1"}, timeout=600)
         assert done.returncode == 0, f"{command}\n{done.stderr}"
     assert done.stdout.startswith("A concrete wall") and (tmp_path / "results" / "wall" / "history.csv").is_file()
     (installed,) = (tmp_path / "venv" / "lib").glob("python3.*/site-packages/vi_contact")

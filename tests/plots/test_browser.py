@@ -32,7 +32,7 @@ def opened(page: Path) -> str:
         [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
          "--virtual-time-budget=20000", f"--user-data-dir={page.parent / 'profile'}",
          "--dump-dom", page.as_uri()],
-        capture_output=True, encoding="utf-8", timeout=120, check=False,
+        capture_output=True, encoding="utf-8", timeout=600, check=False,
     )
     assert done.returncode == 0, done.stderr[-2000:]
     return done.stdout

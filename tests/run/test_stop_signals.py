@@ -112,7 +112,7 @@ def test_second_ctrl_c() -> None:
     """It ends the process at once, whatever it does."""
     code = ("import os, signal, time\nfrom vi_contact.run.stop_signals import StopSignals\nwith StopSignals():\n"
             "    os.kill(os.getpid(), signal.SIGINT)\n    os.kill(os.getpid(), signal.SIGINT)\n    time.sleep(600)")
-    done = subprocess.run([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": PACKAGE}, timeout=300)
+    done = subprocess.run([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": PACKAGE}, timeout=600)
     assert done.returncode == -signal.SIGINT
 
 

@@ -27,7 +27,7 @@ folder = Path({folder!r})
 run_wall(MPI.COMM_WORLD, folder, {steps}, checkpoint_every=5, restart=(folder / "checkpoint.npz").is_file())
 """
 ROUND_OFF = ("certificate", "energy_defect", "loss_algorithmic")  # columns that are nothing else
-PATIENCE = 120.0  # s
+PATIENCE = 500.0  # s: Python, DOLFINx and the forms are loaded, or compiled, beside other programs
 
 
 def started(folder: Path, steps: int, ranks: int) -> subprocess.Popen[bytes]:
