@@ -193,15 +193,18 @@ def test_parts_levels_and_runs_that_die(study: Path) -> None:
 def test_stopping_stops_the_runs(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C between two rows: processes that go on are stopped, also where SIGINT is ignored, and leave no row."""
     monkeypatch.setattr("vi_contact.studies.ida.processes.PATIENCE", 1.0)
-    case, shaking = read_case("wall.toml"), Shaking("motion_1", (Path("motion_1.at2"),))
-    wrong = OneRun(case, shaking, 1.0, study / "runs" / "wrong", "it cannot")
-    long = OneRun(case, shaking, 1.0, study / "runs" / "long")
+    case, shaking, going = read_case("wall.toml"), Shaking("motion_1", (Path("motion_1.at2"),)), study / "going"
+    long, short = (OneRun(case, shaking, 1.0, study / "runs" / name) for name in ("long", "short"))
+    words = (f"case \"$*\" in */short*) until [ -s '{going}' ]; do sleep 0.1; done; exit 1;; esac; "
+             f"trap '' INT; echo $$ > '{going}'; sleep 3600")
     start = time.monotonic()
-    rows = executed([long, wrong], 2, ("sh", "-c", "sleep 3600"), WallTime())
-    assert next(rows)["reason"] == "it cannot"
+    rows = executed([long, short], 2, ("sh", "-c", words), WallTime())
+    assert next(rows)["reason"] == "ended with status 1"
     with pytest.raises(KeyboardInterrupt):
         rows.throw(KeyboardInterrupt())
     assert time.monotonic() - start < 600.0 and not (long.folder / "row.json").exists()
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(going.read_text()), 0)
 
 
 def test_runs_of_a_body_keep_their_own_books(study: Path, tmp_path: Path) -> None:
