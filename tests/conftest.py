@@ -29,6 +29,9 @@ from typing import Any, TextIO
 
 import pytest
 
+# What programs print is compared with texts: it must not depend on the terminal or the language of who runs the tests.
+os.environ |= {"COLUMNS": "100", "PYTHON_COLORS": "0", "LANGUAGE": "C"}  # Gmsh sets a locale that obeys LANGUAGE
+
 RANK = int(os.environ.get("OMPI_COMM_WORLD_RANK", os.environ.get("PMI_RANK", "0")))
 SIZE = int(os.environ.get("OMPI_COMM_WORLD_SIZE", os.environ.get("PMI_SIZE", "1")))
 LEFT_OUT = ("serial", "slow", "two_ranks") if SIZE > 2 else ("serial",) if SIZE > 1 else ()
