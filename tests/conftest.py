@@ -84,7 +84,10 @@ def pytest_configure(config: pytest.Config) -> None:
     if RANK:  # rank 0 speaks for all
         config.pluginmanager.unregister(name="terminalreporter")
     if _second_half(config) and config.args == ["tests"]:
-        config.args[:] = sorted({str(path.parent) for path in Path("tests").rglob("test_*.py")}, reverse=True)
+        ignored = [Path(one).resolve() for one in config.getoption("ignore") or ()]  # pytest obeys a name all the same
+        folders = {path.parent for path in Path("tests").resolve().rglob("test_*.py")}
+        named = [str(one) for one in folders if not any(one.is_relative_to(other) for other in ignored)]
+        config.args[:] = sorted(named, reverse=True)
 
 
 def _second_half(config: pytest.Config) -> bool:
