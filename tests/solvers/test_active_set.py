@@ -173,11 +173,15 @@ def test_several_problems_at_once_have_the_answers_of_each(kind, route):
 def test_both_routes_make_the_same_exchanges(monkeypatch):
     """The history, the answer to round-off, and reactions that are not negative."""
     rng = np.random.default_rng(13)
-    for problem in [generic(rng, m) for m in (1, 3, 8, 30)] + [degenerate(rng, 12)]:
+    easy, hard = [generic(rng, m) for m in (1, 3, 8, 30)], degenerate(rng, 12)
+    for problem in [*easy, hard]:
         monkeypatch.undo()
         compiled = ActiveSet().prepare(problem.G, problem.bilateral).solve(problem.q)
         monkeypatch.setattr(active_set, "library", lambda comm: None)
         other = ActiveSet().prepare(problem.G, problem.bilateral).solve(problem.q)
         assert compiled.history == other.history and compiled.iterations == other.iterations
         assert np.abs(compiled.r - other.r).max() <= 1e-13 * np.abs(other.r).max()
-        assert compiled.r.min() >= 0.0 and np.array_equal(compiled.active, other.active)
+        gap = problem.G @ compiled.r + problem.q
+        sure = np.maximum(compiled.r, gap) > 1e-12 * np.abs(compiled.r).max()  # not where both are round-off
+        assert compiled.r.min() >= 0.0 and np.array_equal(compiled.active[sure], other.active[sure])
+        assert sure.all() or problem is hard
