@@ -173,11 +173,13 @@ def test_frame_invariance(friction, excitation):
 
 @pytest.mark.parametrize("friction", [None, FRICTION], ids=["sliding", "rubbing"])
 def test_one_quiet_second_after_gravity(friction):
-    """Nothing moves by more than 1e-12 of the largest static displacement."""
+    """Nothing moves by more than rounding moves the static solution: 2.2e-16 times the condition number of the
+    stiffness, 1.0e4 scaled by its diagonal and without rigid motions, is 2.3e-12 of the largest displacement, and the
+    bound is twice that. Found: 0.3e-12 to 1.1e-12, by processor and release."""
     one = model()
     history = follow(one, one.problem(friction=friction, excitation=()), 80).history
     for name in displacements(history):
-        assert np.abs(history[name] - history[name][0]).max() < EXACT * largest(history), name
+        assert np.abs(history[name] - history[name][0]).max() < 4.6e-12 * largest(history), name
 
 
 def test_restart_is_the_straight_run(tmp_path):
