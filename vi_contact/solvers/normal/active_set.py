@@ -18,7 +18,6 @@ from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.linalg import lapack
 
 from ...core.algebra import Array, Indices, Mask, SerialComm, lowest
@@ -63,16 +62,14 @@ class PreparedSets(PreparedLCP):
         functions = library(SerialComm()) if self.scaled.bilateral.size <= FEW else None
         return None if functions is None else Exchanges(functions, self)
 
-    def solve(self, q: ArrayLike, guess: ArrayLike | None = None) -> LCPResult:
-        """Solve the problem of q (m,), as ``PreparedLCP`` says."""
-        q, guess = np.asarray(q, float), guess if guess is None else np.asarray(guess)
+    def _solved(self, q: Array, guess: Array | Mask | None) -> LCPResult:
         known = q.shape == self.scaled.bilateral.shape and (guess is None or guess.shape == q.shape)
         if known and self._compiled is not None:
             r, active, residual, changes, moved = self._compiled(q, q < 0.0 if guess is None else guess > 0)
             if (count := int(changes[0])) >= 0:
                 history = tuple(moved[0, :count].tolist())
                 return LCPResult(r[0], active[0], count, float(residual[0]), self.method, history)
-        return super().solve(q, guess)
+        return super()._solved(q, guess)
 
     def solve_many(self, q: Array, guess: Mask) -> tuple[Array, Mask, list[int], dict[int, ViContactError]]:
         """Return r and active of several q, all (k, m), the iterations, and what those raise that have no answer."""
@@ -81,7 +78,7 @@ class PreparedSets(PreparedLCP):
         counts, failed = changes.tolist(), dict[int, ViContactError]()
         for row in np.flatnonzero(changes < 0).tolist():
             try:
-                found = super().solve(q[row], guess[row])
+                found = super()._solved(q[row], guess[row])
                 r[row], active[row], counts[row] = found.r, found.active, found.iterations
             except ViContactError as error:
                 failed[row] = error

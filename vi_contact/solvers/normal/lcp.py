@@ -95,7 +95,10 @@ class PreparedLCP:
 
         Raises StepFailure where the method does not reach its tolerance; InputError for NaN, -inf, or +inf in a
         bilateral row, and for a guess that has not one entry a row."""
-        scaled, q, guess = self.scaled, np.asarray(q, float), guess if guess is None else np.asarray(guess)
+        return self._solved(np.asarray(q, float), guess if guess is None else np.asarray(guess))
+
+    def _solved(self, q: Array, guess: Array | Mask | None) -> LCPResult:
+        scaled = self.scaled
         check_gap(q, scaled.bilateral)
         if guess is not None and guess.shape != q.shape:
             raise InputError(f"the guess has shape {guess.shape} for {q.size} rows: give a mask or all reactions")
