@@ -18,7 +18,7 @@ from ..core.errors import InputError, StepFailure
 from .compressed import CompressedBlocks
 
 BALANCE = 1e-18  # R^(L + N)
-BATCH = 12  # frequencies whose matrices are held at once
+BATCH = 12  # frequencies whose sums over all steps are one product
 DRIFT = 1e-2  # of the momentum of a free body: what rounding may add
 SHARE = 1e-6  # of displacements and of forces: what may wrap around, what the equations of the march may miss
 
