@@ -387,23 +387,7 @@ def ledger(path: Path) -> list[str]:
 
 def condensation(path: Path) -> list[str]:
     """The Delassus operator of a block's face: the matrix, and how it decays, step by step longer."""
-    from mpi4py import MPI
-
-    from vi_contact import fem
-    from vi_contact.meshes import BlockMesh
-
-    mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 0.5), divisions=(60, 30)), MPI.COMM_WORLD)
-    system = fem.assemble(
-        mesh,
-        vc.LinearElastic(E=1000.0, nu=0.3, rho=1.0),
-        section=vc.PlaneStrain(),
-        clamped=tags["top"],
-        loads=fem.BodyForce((0.0, -300.0)),
-    )
-    ground = vc.HalfSpace(point=(0.0, -0.001), normal=(0.0, 1.0))
-    problem = vc.ContactProblem(
-        system, fem.contact_surface(system, tags["bottom"], obstacle=ground), mass=vc.ConsistentMass()
-    )
+    problem = hanging_block((1.0, 0.5), (60, 30), (0.0, -300.0), gap=0.001, mass=vc.ConsistentMass())
     surface, c = problem.surface, np.sqrt(1000.0 * 0.7 / (1.3 * 0.4))
     order = np.argsort(surface.points[:, 0])
     position, flexibility = surface.points[order, 0], {}
@@ -437,7 +421,7 @@ def condensation(path: Path) -> list[str]:
     save(figure, path)
     checked = vc.cross_check(problem, scheme=vc.Midpoint(), solvers=(vc.Condensed(), vc.Volume()), dt=1e-3, steps=40)
     assert checked.worst < 1e-9, checked.worst
-    return [f"{system.rows} unknowns", f"{surface.total} contact points", *phrases]
+    return [f"{problem.system.rows} unknowns", f"{surface.total} contact points", *phrases]
 
 
 def friction(path: Path) -> list[str]:
@@ -500,23 +484,27 @@ def friction(path: Path) -> list[str]:
 
 
 def rubbing_block(mu: float) -> tuple[vc.ContactProblem, float]:
-    """A block that hangs from its clamped top and is pressed down and aside by body forces; a long time step."""
+    """A block that is pressed down and aside; a long time step."""
+    return hanging_block((1.0, 1.0), (24, 24), (110.0, -200.0), friction=vc.Coulomb(mu)), 1.0
+
+
+def hanging_block(lengths: Any, divisions: Any, force: Any, gap: float = 0.0, **more: Any) -> vc.ContactProblem:
+    """A block that hangs from its clamped top over the ground and is moved by body forces."""
     from mpi4py import MPI
 
     from vi_contact import fem
     from vi_contact.meshes import BlockMesh
 
-    mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 1.0), divisions=(24, 24)), MPI.COMM_WORLD)
+    mesh, tags = fem.build_mesh(BlockMesh(lengths=lengths, divisions=divisions), MPI.COMM_WORLD)
     system = fem.assemble(
         mesh,
         vc.LinearElastic(E=1000.0, nu=0.3, rho=1.0),
         section=vc.PlaneStrain(),
         clamped=tags["top"],
-        loads=fem.BodyForce((110.0, -200.0)),
+        loads=fem.BodyForce(force),
     )
-    ground = vc.HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
-    surface = fem.contact_surface(system, tags["bottom"], obstacle=ground)
-    return vc.ContactProblem(system, surface, friction=vc.Coulomb(mu)), 1.0
+    ground = vc.HalfSpace(point=(0.0, -gap), normal=(0.0, 1.0))
+    return vc.ContactProblem(system, fem.contact_surface(system, tags["bottom"], obstacle=ground), **more)
 
 
 def pair(rows: int = 2, height: float = 3.7, **more: Any) -> tuple[Any, Any]:
