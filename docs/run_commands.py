@@ -37,7 +37,6 @@ NOTE = ROOT / "docs" / "commands_run.txt"
 LIMIT = 900  # s
 ABOVE = ("README", "CONTRIBUTING", "CHANGELOG", "SUPPORT", "SECURITY")  # pages of the site that stand above docs/
 NAME, BEGINNING = "the name of a command", "the beginning of a command"
-OLD = "a command of version 0.1; tests/house/test_upgrade.py compares what it answers"
 PROGRAM = (r"(?:[A-Z_]+=\S+ )*(?:(?:bash|vi-contact|python3|mpirun|srun|sbatch|git|pip|sudo|apt|apt-get|docker|podman|"
            r"apptainer|export|cd|\.venv/\S+|venv/\S+|\. venv/\S+)(?= )|/usr/bin/python3 )")
 JOINED = re.compile(r"\s*\\\n\s*")  # lines that end with a backslash
@@ -74,7 +73,6 @@ ELSEWHERE = {  # what fits the whole command: what runs it, or why nothing here 
         "needs what install/report.sh brings; "
         "tests/plots/test_web_page.py::test_every_text_is_escaped_and_nothing_is_loaded",
     r"bash demos/run\.sh|python3 -m|pip install|mpirun -n|mpirun --mca \S+ \S+": BEGINNING,
-    r"vi-contact (wall|channel|beam|layer)": OLD,
     # too long or too large
     r"bash benchmarks/peers/run\.sh.*": "installs other programs; tests/benchmarks/test_peers.py::"
         "test_our_rows_are_measured, tests/benchmarks/test_peers.py::"

@@ -194,7 +194,7 @@ ROOMS = ["core", "fem", "solvers", "schemes", "soil", "engineering", "ground_mot
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_names_are_public(document: Path) -> None:
     """Every ``vc.name`` and ``room.name`` that a document writes; the files that it names are there."""
-    if document.name in ("CHANGELOG.md", "upgrade.md", "extend.md"):  # old names; its reader's: test_extend
+    if document.name in ("CHANGELOG.md", "extend.md"):  # old names; its reader's: test_extend
         return
     text = re.sub(r"--set \S+", "", document.read_text(encoding="utf-8"))  # keys of a case: others check them
     unknown = set(re.findall(r"\bvc\.(\w+)", text)) - set(vi_contact.__all__)

@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 
 from ..core.errors import InputError, Interrupted, OutOfTime, ViContactError
 from ..core.version import __version__
-from ..studies.cases import library
 from .case import add_case_commands
 from .errors import Parser, check_words, fail_together, printable, told, world
 from .ida import add_ida_commands
@@ -47,13 +46,6 @@ def split_petsc(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
     return own, petsc
 
 
-def refuse_retired(arguments: Sequence[str]) -> None:
-    """Raise InputError for a command of before, with the command or the demo in its place."""
-    library.refuse_retired(first := list(arguments[:1]))
-    if first in (["wall"], ["channel"]):
-        raise InputError(f"'{first[0]}' is now a case: give vi-contact run {first[0]} (see docs/reference/upgrade.md)")
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and print its text; return 0, 1 (one sentence on stderr), 128 + n (signal n) or 75 (wall time)."""
     if arguments is None:  # a process of our own: with DOLFINx 0.5 the compiler of forms tells the root its calls
@@ -61,7 +53,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     own, petsc = split_petsc(sys.argv[1:] if arguments is None else arguments)
 
     def command() -> None:
-        refuse_retired(own)
         options = parser(own[0] if own else "").parse_args(own)
         if petsc:
             import petsc4py

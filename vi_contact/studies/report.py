@@ -17,7 +17,7 @@ from ..plots.sketch import sketch
 from ..plots.web_page import MISSING, can_write, write_web_page
 from ..run.files.folder import MODEL
 from ..run.files.reading import read_object, read_run
-from .cases.library import COPY, read_copy, refuse_retired
+from .cases.library import COPY, read_copy
 from .cases.parsing import Words, read
 from .cases.table_calls import Spot, build, callee
 from .refinement import refinement
@@ -35,7 +35,8 @@ def report(folder: str | Path, *, out: str | Path | None = None, title: str | No
     ``columns``: groups of columns of one unit, a chart each, in place of those that move; ``failed``: what ``refine``
     returned. What has no data is left out. InputError as of ``read_run``, for a run of one row, columns that do not
     exist, another kind of file, .html without jinja2 and plotly, and a damaged model.json."""
-    refuse_retired(case := read_copy(folder := Path(folder)))
+    folder = Path(folder)
+    case = read_copy(folder)
     run = read_run(folder)
     heading = str(title or case.get("title") or f"Run {folder.resolve().name}")
     pages = [Path(out)] if out is not None else [folder / f"report.{end}" for end in ("pdf", "html")[: 1 + can_write()]]

@@ -38,7 +38,7 @@ from ...run.recorders import Contact, Energy, Steps
 from ...run.simulate import Solution, simulate
 from ...run.time_steps import StepPlan, step_plan
 from .expressions import check_axes
-from .library import base_folder, check_format, keep_copy, refuse_retired, refuse_retired_model
+from .library import base_folder, check_format, keep_copy
 from .own_classes import packages
 from .parsing import Words, arguments, nearest, read
 from .stage_tables import Stage, split
@@ -258,8 +258,6 @@ def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence
     allowed = packages(allow)
     known = words(base_folder(path), allowed)
     check_format(path, tables)
-    refuse_retired(tables)
-    refuse_retired_model(path, tables.get("model"))
     for name in tables:
         if name not in ("format", *_TABLES, "stage"):
             raise InputError(f"{path}: the table [{name}] is unknown: {nearest(name, ('format', *_TABLES, 'stage'))}")

@@ -1,8 +1,7 @@
 """Find the case files that ship with the package, and keep in a run folder the copy of the case that made it."""
 
 import re
-import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,6 @@ COPY = "case.toml"
 FORMAT = 1  # of case files
 _SET = "# set "  # before a setting, in the copy
 _FROM = "# its paths are relative to "  # before a folder, in the copy
-_RETIRED = tomllib.loads(Path(__file__).with_name("retired.toml").read_text(encoding="utf-8"))
 
 
 def builtin_cases() -> dict[str, str]:
@@ -54,29 +52,10 @@ def located(case: str) -> Path:
     """Return the file of a case: what ends in ".toml" is a file, all else the name of one that ships."""
     if case.endswith(".toml"):
         return Path(case)
-    refuse_retired([case])
     if case not in builtin_cases():
         raise InputError(f"there is no built-in case {shown(case)}: {nearest(case, builtin_cases())}; a file ends in "
                          ".toml")
     return FOLDER / f"{case}.toml"
-
-
-def refuse_retired(names: Iterable[str]) -> None:
-    """Raise InputError, which names the demo in its place, for a name of a case or table that is retired."""
-    for name in names:
-        if demo := _RETIRED["demos"].get(name):
-            raise InputError(f"the case '{name}' is retired: bash demos/run.sh {demo} computes and draws the same, "
-                             f"with its parameters on top of demos/{demo}.py")
-
-
-def refuse_retired_model(path: Path, model: Any) -> None:
-    """Raise InputError, which names what is in its place, for a table [model] and its settings; None: no such table."""
-    given = model if isinstance(model, dict) else {"type": model}
-    name = "channel" if given.get("type") == "Channel" or path == FOLDER / "channel.toml" else "wall"
-    places = _RETIRED["model"][name]
-    for key in () if model is None else sorted(given, key=lambda one: one == "type") or ["type"]:  # which says least
-        raise InputError(f"{path}: [model] {key} was of the model {name.capitalize()}, which is retired: give "
-                         f"{places.get(key, f'mesh.{key}')} of the case '{name}', {FOLDER / name}.toml")
 
 
 def check_format(path: Path, tables: Mapping[str, Any]) -> None:
