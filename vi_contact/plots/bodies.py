@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from textwrap import wrap
 from typing import Any
 
@@ -12,11 +13,11 @@ import numpy as np
 from ..core.algebra import Array, Indices
 from ..core.checks import number, optional
 from ..core.errors import InputError
-from ..core.files import frames_of
+from ..core.files import frames_of, write_output
 from ..run.files.reading import ContactGeometry, RunFolder
 from .deformed import contact_states, nearest, plane_normals, read_frames
 from .faces import Painter, add_polygons, faces_of, leading, limit, moments, name_states, plot_faces, sheet
-from .histories import STYLE, plain, save, scale, scaled, shaken
+from .histories import STYLE, plain, require_matplotlib, save, scale, scaled, shaken
 
 DRAWN = 0.1  # of the size of the bodies: how large their largest displacement is drawn, if it is not larger
 FILM_FRAMES = 48  # at most: a film of two megabytes
@@ -157,6 +158,7 @@ def film(run: RunFolder, path: str | Path, *, times: Sequence[float] | None = No
     the bodies. Below them is a ``column`` of the history with the moment marked, and dashed the motion of the ground.
     InputError for another kind of file, .mp4 without ffmpeg, a column that the run does not have, and as
     ``plot_deformed``."""
+    require_matplotlib()
     import matplotlib
     from matplotlib.animation import FFMpegWriter, PillowWriter
     from matplotlib.figure import Figure
@@ -179,20 +181,23 @@ def film(run: RunFolder, path: str | Path, *, times: Sequence[float] | None = No
         scene.stresses.bar(figure, axes[0], extend="max", shrink=0.85)
         if contact is not None:
             scene.pressures.bar(figure, axes[-1], shrink=0.85)
-        with writer.saving(figure, str(path), dpi=95):
-            for k, t in enumerate(scene.times):
-                for axis in axes:
-                    axis.clear()
-                scene.draw(axes[0], k)
-                for axis, face in zip(axes[1:], faces, strict=True):
-                    scene.pressures.draw(axis, face, scene.pressure[k])
-                    axis.set_title(face.name, fontsize=9)
-                marker.set_xdata([t, t])
-                figure.suptitle(_headed(f"{title}, t = {t:.4g} s".removeprefix(", "), scene), fontsize=10)
-                if k == 0:
-                    figure.draw_without_rendering()
-                    figure.set_layout_engine("none")  # the same places in every frame, laid out once
-                writer.grab_frame()
+        with TemporaryDirectory() as place:
+            draft = Path(place) / Path(path).name
+            with writer.saving(figure, str(draft), dpi=95):
+                for k, t in enumerate(scene.times):
+                    for axis in axes:
+                        axis.clear()
+                    scene.draw(axes[0], k)
+                    for axis, face in zip(axes[1:], faces, strict=True):
+                        scene.pressures.draw(axis, face, scene.pressure[k])
+                        axis.set_title(face.name, fontsize=9)
+                    marker.set_xdata([t, t])
+                    figure.suptitle(_headed(f"{title}, t = {t:.4g} s".removeprefix(", "), scene), fontsize=10)
+                    if k == 0:
+                        figure.draw_without_rendering()
+                        figure.set_layout_engine("none")  # the same places in every frame, laid out once
+                    writer.grab_frame()
+            write_output(path, draft.read_bytes())
     return Path(path)
 
 

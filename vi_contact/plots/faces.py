@@ -17,7 +17,7 @@ from ..engineering.resultants import Geometry, tangent_vectors
 from ..meshes.rows import connected
 from ..run.files.reading import RunFolder
 from .deformed import OPEN, SAME, SLIP, STICK, contact_states, nearest, read_frames, stored_tangents
-from .histories import STYLE, History, length_unit, plain, save, scale
+from .histories import STYLE, History, length_unit, plain, require_matplotlib, save, scale
 
 ARROW = 0.15  # of the size of the face: how long the longest arrow is
 NEIGHBOURS = 24  # nearest points that make one face if they point the same way
@@ -219,6 +219,7 @@ def plot_faces(run: RunFolder, path: str | Path, *, times: Sequence[float] | Non
 
 def sheet(flat: Sequence[bool], columns: int, size: tuple[float, float]) -> tuple[Any, Array]:
     """Make (figure, axes (rows, columns)), each of a size [inches]; rows that are not flat are in projection."""
+    require_matplotlib()
     import matplotlib
     from matplotlib.figure import Figure
 

@@ -3,6 +3,7 @@
 import os
 
 from ...core.errors import InputError
+from ...core.files import write_output
 from ..record import UNITS, Record, canonical_units
 
 DIGITS = 9  # significant digits of a written sample; what is read back differs by half a unit in the last of them
@@ -39,7 +40,6 @@ def _samples(record: Record, units: str) -> tuple[list[str], str]:
 
 def _write(path: str | os.PathLike[str], lines: list[str]) -> None:
     try:
-        with open(path, "w", encoding="utf-8", newline="\n") as file:
-            file.write("\n".join(lines) + "\n")
+        write_output(path, ("\n".join(lines) + "\n").encode("utf-8"))
     except OSError as error:
         raise InputError(f"{os.fspath(path)}: cannot be written ({error.strerror}); check the folder") from None

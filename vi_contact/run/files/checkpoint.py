@@ -9,6 +9,7 @@ import hashlib
 import io
 import json
 import logging
+import os
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -21,6 +22,7 @@ from ...core.algebra import largest
 from ...core.checks import array, number, shown, whole
 from ...core.errors import InputError
 from ...core.files import on_root, write_atomically
+from ...core.own_files import is_own, open_to_read
 from ...core.problem import ContactProblem
 from ...core.step import Scheme, State
 from ..time_steps import TimeSteps
@@ -159,7 +161,7 @@ def _damaged(file: Path, why: Any) -> InputError:
 
 def _read(file: Path, problem: ContactProblem) -> tuple[dict[str, Any], Arrays]:
     """Description and whole arrays of a checkpoint that fits the problem in its sizes."""
-    if not file.is_file():
+    if not is_own(file):
         raise InputError(f"there is no checkpoint '{file}' to restart from: give the folder of a run")
     try:
         about, arrays = _unpacked(file)
@@ -175,13 +177,15 @@ def _read(file: Path, problem: ContactProblem) -> tuple[dict[str, Any], Arrays]:
 
 def _unpacked(file: Path) -> tuple[dict[str, Any], Arrays]:
     """ValueError and others when it is not what was written."""
-    size = file.stat().st_size
-    with zipfile.ZipFile(file) as archive:
-        for one in archive.infolist():
-            if one.compress_type != zipfile.ZIP_STORED or one.file_size > size:
-                raise ValueError(f"{one.filename} is compressed, or larger than the file")
-    with np.load(file, allow_pickle=False) as stored:
-        arrays = {name: stored[name] for name in stored.files}
+    with open_to_read(file) as opened:
+        size = os.fstat(opened.fileno()).st_size
+        with zipfile.ZipFile(opened) as archive:
+            for one in archive.infolist():
+                if one.compress_type != zipfile.ZIP_STORED or one.file_size > size:
+                    raise ValueError(f"{one.filename} is compressed, or larger than the file")
+        opened.seek(0)
+        with np.load(opened, allow_pickle=False) as stored:
+            arrays = {name: stored[name] for name in stored.files}
     wanted = arrays.pop("checksum", None)
     about = json.loads(str(arrays["about"]))
     if not isinstance(about, dict) or not isinstance(about.get("run"), dict):

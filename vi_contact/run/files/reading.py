@@ -1,24 +1,23 @@
 """Read what a run left in its folder: histories, units, facts and the geometry of the contact points."""
 
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from textwrap import shorten
 from typing import Any
 
-import h5py
 import numpy as np
 
 from ...core.algebra import Array, Mask
 from ...core.checks import SHOWN, shown
 from ...core.errors import InputError
+from ...core.files import open_hdf5
+from ...core.own_files import is_own, open_to_read, read_bytes
 from .folder import COLUMNS, HISTORY_CSV, HISTORY_H5, SUMMARY, check_folder_format
 from .stored_rows import numbers_of
 
 BYTES = 100_000_000  # of a JSON file
-DENSEST = 1100  # bytes in memory for one on disk: zeros that are packed
 _NEEDED = ("t", "k", "iterations", "certificate", "escalated")  # columns of every run
 _NUMBER = (int, float)
 _KINDS: dict[str, type | tuple[type, ...]] = {  # of the entries of summary.json that are used
@@ -61,14 +60,16 @@ def read_run(folder: str | Path) -> RunFolder:
     Numbers come from history.csv, which has every step. Arrays come from history.h5, when it has all steps too (it does
     once the run has ended). InputError when there is no history, or a file is damaged."""
     folder = Path(folder)
-    if not (folder / HISTORY_CSV).is_file():
+    if not is_own(folder / HISTORY_CSV):
         raise InputError(f"'{folder}' has no {HISTORY_CSV}: give the output folder of a run")
     check_folder_format(folder)
     history = _numbers(folder / HISTORY_CSV)
     try:
         columns = _columns(read_object(folder / COLUMNS), history)
-        facts = _facts(read_object(folder / SUMMARY)) if (folder / SUMMARY).is_file() else {}
+        facts = _facts(read_object(folder / SUMMARY)) if is_own(folder / SUMMARY) else {}
         arrays, contact = _arrays(folder / HISTORY_H5, len(history["t"]))
+    except InputError:
+        raise
     except (OSError, ValueError, KeyError, TypeError, RuntimeError, AttributeError) as error:
         reason = _short(error)
         raise InputError(f"a file of the run in '{folder}' is missing or damaged ({reason}): restore it") from error
@@ -82,10 +83,12 @@ def _short(error: Exception) -> str:
 
 def read_object(path: Path) -> dict[str, Any]:
     """Return the JSON object of a file; ValueError for anything else, NaN, and texts that cannot be printed."""
-    if path.stat().st_size > BYTES:
+    with open_to_read(path) as file:
+        data = file.read(BYTES + 1)
+    if len(data) > BYTES:
         raise ValueError(f"{path.name} is larger than {BYTES:.0e} bytes")
     try:
-        found = json.loads(path.read_text(encoding="utf-8"), parse_constant=lambda word: [])
+        found = json.loads(data.decode("utf-8"), parse_constant=lambda word: [])
     except RecursionError:
         raise ValueError(f"{path.name} is nested too deep") from None
     if not isinstance(found, dict):
@@ -127,7 +130,7 @@ def _fits(value: Any, kinds: type | tuple[type, ...]) -> bool:
 def _numbers(path: Path) -> dict[str, Array]:
     """Columns of history.csv; a last line that a crash cut short is left out."""
     try:
-        header, *lines = [line for line in path.read_bytes().splitlines(keepends=True) if line.endswith(b"\n")]
+        header, *lines = [line for line in read_bytes(path).splitlines(keepends=True) if line.endswith(b"\n")]
         names = header.decode().strip().split(",")
         history = dict(zip(names, numbers_of(str(path), lines, len(names), 0).T, strict=True))
         if not lines or len(history) != len(names):
@@ -147,29 +150,18 @@ def _numbers(path: Path) -> dict[str, Array]:
 
 def _arrays(path: Path, rows: int) -> tuple[dict[str, Array], ContactGeometry | None]:
     """(array columns when they have all rows, geometry of the contact points)."""
-    if not path.is_file():
+    if not is_own(path):
         return {}, None
-    with h5py.File(path, "r") as file:
+    with open_hdf5(path) as file:
         group = file["contact"]
-        geometry = ContactGeometry(*(_values(group, name) for name in ContactGeometry.__dataclass_fields__))
+        geometry = ContactGeometry(*(group[name][()] for name in ContactGeometry.__dataclass_fields__))
         count = len(geometry.weights)
         shapes = {np.shape(getattr(geometry, name)) for name in ("weights", "gap0", "bilateral")}
         points = np.shape(geometry.points)
         if shapes != {(count,)} or len(points) != 2 or points[0] != count or np.shape(geometry.normals) != points:
             raise ValueError(f"{HISTORY_H5}: the contact points do not fit each other")
         whole = [name for name in file if name != "contact" and file[name].ndim > 1 and file[name].shape[0] == rows]
-        arrays = {name: _values(file, name) for name in whole}
+        arrays = {name: file[name][()] for name in whole}
         if any(values.shape[1] != count for values in arrays.values()):
             raise ValueError(f"{HISTORY_H5}: arrays are not those of {count} contact points")
     return arrays, geometry if count else None
-
-
-def _values(group: Any, name: str) -> Any:
-    """Numbers of a data set that lies in this very file, in memory no more than it can hold."""
-    item = group[name]
-    link = group.get(name, getlink=True)
-    if not isinstance(link, h5py.HardLink) or item.external is not None or item.is_virtual:
-        raise ValueError(f"{HISTORY_H5}: {name} lies in another file")
-    if item.dtype.kind not in "fiub" or item.nbytes > DENSEST * os.path.getsize(item.file.filename):
-        raise ValueError(f"{HISTORY_H5}: {name} is no array of numbers of this file")
-    return item[()]
