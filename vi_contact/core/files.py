@@ -92,7 +92,7 @@ def write_output(path: str | os.PathLike[str], data: bytes) -> None:
 
     OSError names the file. A link of this name is replaced, and what it points at stays as it is."""
     if is_stream(Path(path)):
-        with open(path, "wb", buffering=0) as file:
+        with open(path, "ab", buffering=0) as file:
             write_all(file, data)
     else:
         write_atomically(Path(path), data, safe=False)

@@ -108,8 +108,9 @@ def remove(path: Path) -> None:
 
 
 def is_stream(path: Path) -> bool:
-    """Return whether a user has named a stream, such as /dev/stdout, as the place of an output."""
-    return path.parent in DEVICES and path.exists() and not path.is_file()
+    """Return whether a user has named a stream, such as /dev/stdout, as the place of an output: never replace these."""
+    path = Path(os.path.abspath(path))
+    return path.parent in DEVICES and os.path.lexists(path)
 
 
 def same_file(path: Path, file: Any) -> bool:
