@@ -13,7 +13,7 @@ from ..core.errors import InputError
 from ..studies.cases.library import FOLDER, builtin_cases, copy_starter, located, starters
 from ..studies.cases.short_settings import ShortOptions
 from ..studies.cases.toml_file import read_toml
-from .errors import printable, world
+from .errors import say, world
 from .options import add_command
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def _checked(case: "Case", comm: Any, folder: Path) -> str:
     write_model(ranks, model, run_folder(ranks, folder))
     on_root(ranks, lambda: write_picture(sketch(model), folder / "model.png", bbox_inches="tight"))
     if comm.rank == 0:
-        print(printable(f"{in_words(model)}\npicture: {folder / 'model.png'}"))
+        say(f"{in_words(model)}\npicture: {folder / 'model.png'}")
     if model["defects"]:
         raise InputError(f"{case.path}: {'; '.join(model['defects'])}")
     return f"{case.path}: {model['title']}: the file is in order" if comm.rank == 0 else ""

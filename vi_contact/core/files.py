@@ -27,6 +27,7 @@ FIELDS_INDEX = "fields.xdmf"
 
 STRIDE = 2**20  # bytes that are copied at once
 _FULL = (errno.ENOSPC, errno.EDQUOT)
+_MANY = (errno.EMFILE, errno.ENFILE)
 _REFUSED = (errno.EACCES, errno.EPERM, errno.EROFS)
 
 
@@ -72,13 +73,17 @@ def on_root(comm: Comm, action: Callable[[], T]) -> T | None:
 
 def sentence(error: OSError) -> str:
     """Return one sentence: what happened to which file, and the remedy."""
-    path = error.filename or "the output folder"
+    path = "a file" if error.filename is None else f"'{os.fsdecode(error.filename)}'"
     if error.errno in _FULL:
-        return (f"the disk is full: '{path}' could not be written; what was written before is kept, free some space "
+        return (f"the disk is full: {path} could not be written; what was written before is kept, free some space "
                 "and restart from the last checkpoint")
     if error.errno in _REFUSED:
-        return f"'{path}' cannot be written ({error.strerror}): choose another output folder or change its permissions"
-    return f"'{path}' cannot be read or written ({error.strerror or error}): choose another output folder"
+        return f"{path} cannot be opened ({error.strerror}): change its permissions, or choose another folder"
+    if error.errno in _MANY:
+        return f"{path} cannot be opened ({error.strerror}): raise the limit of open files (ulimit -n)"
+    if isinstance(error, BrokenPipeError):
+        return f"what reads {path} has ended before all was written: let it read to the end"
+    return f"{path} cannot be read or written ({error.strerror or error}): check it, or choose another output folder"
 
 
 def write_atomically(path: Path, data: bytes, *, safe: bool = True) -> None:

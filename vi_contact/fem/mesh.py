@@ -90,7 +90,7 @@ class Group:
             try:
                 if x.shape[1]:
                     return mask(owner, f"what the marker of '{name}' returned", marker(x), (x.shape[1],))
-            except Exception as error:
+            except Exception as error:  # of a user's function, which may raise anything
                 defects.append(ended(f"{owner}: the marker of '{name}'", error))
             return np.zeros(x.shape[1], dtype=bool)
 

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from ..core.algebra import Array, Indices
 from ..core.checks import array
-from ..core.errors import InputError
+from ..core.errors import InputError, of_machine
 from ..core.files import FIELDS, frames_of, open_hdf5
 from ..core.own_files import inner_folder
 from ..engineering.resultants import Geometry, tangent_vectors
@@ -155,5 +155,7 @@ def _opened(path: Path) -> Iterator[Any]:
     except FileNotFoundError as error:
         raise InputError(f"'{path}' is missing: restore it, or draw without fields") from error
     except (OSError, KeyError, ValueError, IndexError, TypeError, AttributeError, RuntimeError) as error:
+        if of_machine(error):
+            raise
         reason = " ".join(str(error).split())[:200]
         raise InputError(f"'{path}' is damaged ({reason}): restore it, or draw without fields") from error

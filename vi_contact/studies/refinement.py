@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.checks import shown
 from ..core.errors import InputError, ViContactError
 from ..core.own_files import inner_folder, is_own
 from ..engineering.peak_values import GROWS, peaks
@@ -40,7 +41,7 @@ def refine(folder: str | Path, comm: Any, *, allow: Sequence[str] = (), progress
             if not (same and _status(out) == "finished"):
                 case = read_case(run.folder / COPY, settings, allow=allow)
                 case.run(comm, out=out, restart=same and is_own(out / CHECKPOINT), progress=progress)
-        except (ViContactError, TypeError) as error:  # a number written as a text has no half
+        except ViContactError as error:
             failed[name] = str(error)
     return failed
 
@@ -68,9 +69,16 @@ def _halved(folder: RunFolder, name: str) -> Iterator[str]:
         for k, stage in enumerate([tables, *tables.get("stage", ())]):
             key, own = f"stage.{k}.run" if k else "run", stage.get("run", {})
             if k and "dt" in own:
-                yield f"{key}.dt={0.5 * own['dt']!r}"
+                yield f"{key}.dt={0.5 * _plain(own['dt'], f'{key}.dt')!r}"
             if "steps" in own:
-                yield f"{key}.steps={2 * own['steps']}"
+                yield f"{key}.steps={2 * _plain(own['steps'], f'{key}.steps')}"
+
+
+def _plain(value: Any, key: str) -> Any:
+    """A number of the case; InputError for one that is written as a text, which has no half."""
+    if isinstance(value, int | float):
+        return value
+    raise InputError(f"{key} is {shown(value)}, which has no half: write it as a number in the case, in SI units")
 
 
 def _status(folder: Path) -> str:

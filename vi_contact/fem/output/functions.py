@@ -16,7 +16,7 @@ from petsc4py import PETSc
 
 from ...core.algebra import Array, Indices
 from ...core.checks import flag, instance, number, optional, refuse, shown
-from ...core.errors import InputError
+from ...core.errors import InputError, of_machine
 from ...core.files import FIELDS, FIELDS_INDEX, frames_of, on_root, open_hdf5
 from ...core.own_files import inner_folder, is_own, read_bytes
 from ...core.problem import ContactProblem
@@ -144,6 +144,8 @@ def _stored(folder: Path, name: str, t: float | None, frame: int | None) -> tupl
     except InputError:
         raise
     except (ET.ParseError, OSError, KeyError, AttributeError, TypeError, ValueError, RuntimeError) as error:
+        if of_machine(error):
+            raise
         raise InputError(f"the fields in '{folder}' are incomplete or damaged ({error}): run again") from error
 
 

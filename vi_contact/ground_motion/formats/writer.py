@@ -42,4 +42,5 @@ def _write(path: str | os.PathLike[str], lines: list[str]) -> None:
     try:
         write_output(path, ("\n".join(lines) + "\n").encode("utf-8"))
     except OSError as error:
-        raise InputError(f"{os.fspath(path)}: cannot be written ({error.strerror}); check the folder") from None
+        raise InputError(f"{os.fspath(path)}: cannot be written ({error.strerror or error}); give another file, or "
+                         "mend what the system says") from error

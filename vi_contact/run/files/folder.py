@@ -22,7 +22,7 @@ from typing import Any
 from ...core.algebra import Comm
 from ...core.checks import shown
 from ...core.errors import InputError
-from ...core.files import FIELDS, FIELDS_INDEX, FRAME, FRAMES, on_root, to_json, write_atomically
+from ...core.files import FIELDS, FIELDS_INDEX, FRAME, FRAMES, on_root, sentence, to_json, write_atomically
 from ...core.own_files import (
     inner_folder,
     is_own,
@@ -150,7 +150,9 @@ def check_folder_format(folder: Path) -> None:
         return
     try:
         found = json.loads(read_text(folder / ABOUT))["format"]
-    except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
+    except OSError as error:
+        raise InputError(sentence(error)) from error
+    except (ValueError, TypeError, KeyError, RecursionError) as error:  # of json, and of what it has read
         raise InputError(f"'{folder / ABOUT}' is damaged ({error}): restore it or remove it") from error
     check_format(folder, found)
 

@@ -115,7 +115,7 @@ class Progress:
         self._begin = self._told = time.monotonic()
         self._next = SHARE * total
         self._bar: Any = None
-        if shown and sys.stderr.isatty():
+        if shown and sys.stderr is not None and sys.stderr.isatty():
             from tqdm import tqdm
 
             self._bar = tqdm(total=total, unit="step", dynamic_ncols=True)

@@ -11,8 +11,8 @@ import numpy as np
 
 from ...core.algebra import Array, Mask
 from ...core.checks import SHOWN, shown
-from ...core.errors import InputError
-from ...core.files import open_hdf5
+from ...core.errors import InputError, of_machine
+from ...core.files import open_hdf5, sentence
 from ...core.own_files import is_own, open_to_read, read_bytes
 from .folder import COLUMNS, HISTORY_CSV, HISTORY_H5, SUMMARY, check_folder_format
 from .stored_rows import numbers_of
@@ -70,7 +70,9 @@ def read_run(folder: str | Path) -> RunFolder:
         arrays, contact = _arrays(folder / HISTORY_H5, len(history["t"]))
     except InputError:
         raise
-    except (OSError, ValueError, KeyError, TypeError, RuntimeError, AttributeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, RuntimeError, AttributeError) as error:  # of json and h5py
+        if of_machine(error):
+            raise
         reason = _short(error)
         raise InputError(f"a file of the run in '{folder}' is missing or damaged ({reason}): restore it") from error
     return RunFolder(folder, history | arrays, columns, facts, contact)
@@ -142,7 +144,7 @@ def _numbers(path: Path) -> dict[str, Array]:
     except InputError:
         raise
     except OSError as error:
-        raise InputError(f"'{path}' cannot be read ({error.strerror}): check its permissions") from error
+        raise InputError(sentence(error)) from error
     except ValueError as error:
         raise InputError(f"'{path}' is damaged ({_short(error)}): restore it or run again") from error
     return history

@@ -6,7 +6,7 @@ Numbers are in history.csv, arrays in history.h5, of later steps in history.jour
 import hashlib
 import os
 from collections.abc import Container, Iterator, Sequence
-from contextlib import closing, suppress
+from contextlib import closing
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.errors import InputError
+from ...core.errors import InputError, of_machine
 from ...core.files import open_hdf5
 from ...core.own_files import is_own, open_to_read
 from ...core.step import Row
@@ -115,8 +115,11 @@ class StoredArrays:
         if table.arrays:
             path, width = folder / JOURNAL, 1 + sum(one.size for one in table.arrays.values())
             self._journal = _journal_rows(path, width)
-            with suppress(OSError):  # missing or damaged: the journal may still have all
+            try:
                 self._file = open_hdf5(self._path)
+            except OSError as error:  # missing or damaged: the journal may still have all
+                if of_machine(error):
+                    raise
 
     def close(self) -> None:
         """Close history.h5."""
@@ -140,14 +143,20 @@ class StoredArrays:
             fit = all(self._file[name].shape == (*held.shape, *one.shape) for name, one in self._samples.items())
             n = min(max(held.shape[0] - first, 0), len(steps))
             return n if fit and np.array_equal(held[first : first + n], steps[:n]) else 0
-        except (TypeError, KeyError, AttributeError, ValueError, OSError, RuntimeError):
+        except InputError:
+            raise
+        except (TypeError, KeyError, AttributeError, ValueError, OSError, RuntimeError) as error:  # h5py's, of damage
+            if of_machine(error):
+                raise
             return 0
 
     def _from_hdf5(self, first: int, n: int) -> Block:
         try:
             return {name: np.asarray(self._file[name][first : first + n]).astype(one.dtype)
                     for name, one in self._samples.items()}
-        except (TypeError, ValueError, OSError, RuntimeError) as error:
+        except (TypeError, ValueError, OSError, RuntimeError) as error:  # h5py's, of a file that is damaged
+            if of_machine(error):
+                raise
             raise InputError(f"'{self._path}' is damaged ({error}): restore it or start a new run") from error
 
     def _from_journal(self, steps: Array) -> Block:

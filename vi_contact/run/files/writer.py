@@ -136,7 +136,7 @@ class Writer:
 
     def rescue(self, facts: Mapping[str, Any]) -> None:
         """Do the same after a failure: not collective, as others might not come; no error hides the first."""
-        with suppress(Exception):
+        with suppress(Exception):  # of any kind: the first error is told, and this one comes of it or after it
             self._close(facts)
 
     def _close(self, facts: Mapping[str, Any]) -> None:

@@ -56,7 +56,7 @@ def started(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> sub
         return subprocess.Popen(words, env=environment, text=True, encoding="utf-8", errors="replace",
                                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                                 start_new_session=True)
-    except OSError as error:
+    except (FileNotFoundError, PermissionError) as error:  # of a program; others tell of the machine
         raise InputError(f"'{error.filename}' cannot be started ({error.strerror}): correct --launch") from None
 
 
@@ -128,7 +128,7 @@ def executed(runs: Sequence[OneRun], jobs: int, launch: Sequence[str], end: Wall
         try:
             for row in processes.rows(batch):
                 told.put(row)
-        except BaseException as error:
+        except BaseException as error:  # of any kind: it is raised again by the thread that waits for this one
             told.put(error)
 
     wrong = [run for run in runs if run.wrong]
