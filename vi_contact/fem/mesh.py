@@ -170,6 +170,7 @@ def node_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
     """Number local geometry nodes (owned, then ghosts) as the input does, from 0: the rank among the nodes in use.
 
     Collective. A part of a mesh (``create_submesh``) knows the numbers of the whole, and is numbered in their order."""
+    instance("node_numbers", "mesh", mesh, Mesh, "give a DOLFINx mesh")
     given = np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)
     if mesh.comm.allreduce(given.max(initial=-1), op=MPI.MAX) < mesh.geometry.index_map().size_global:
         return given

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import Array, Indices
+from ..core.arguments import checked
 from ..core.checks import number, optional
 from ..core.errors import InputError
 from ..core.files import frames_of, write_output
@@ -121,6 +122,7 @@ def _round_down(factor: float) -> float:
     return float(max([1.0, *(step * power for step in (1.0, 2.0, 5.0) if step * power <= factor)]))
 
 
+@checked
 def plot_deformed(run: RunFolder, path: str | Path, *, times: Sequence[float] | None = None,
                   magnified: float | None = None, title: str = "Deformed bodies") -> Path:
     """Draw the deformed bodies of a run, coloured by von Mises stress, in the frames next to ``times`` [s].
@@ -150,6 +152,7 @@ def _headed(title: str, scene: Scene) -> str:
     return "\n".join(wrap(plain(title) + told, 64))
 
 
+@checked
 def film(run: RunFolder, path: str | Path, *, times: Sequence[float] | None = None, magnified: float | None = None,
          column: str | None = None, title: str = "", fps: int = 10) -> Path:
     """Write a film of the bodies of a run, a GIF or with ffmpeg an MP4, of the frames next to ``times`` [s].
@@ -227,6 +230,7 @@ def _trace(axis: Any, run: RunFolder, column: str, times: Array) -> Any:
     return axis.axvline(times[0], color="tab:red", lw=1.2)
 
 
+@checked
 def draw_run(run: RunFolder, out: str | Path, *, title: str, times: Sequence[float] | None = None,
              magnified: float | None = None) -> list[Path]:
     """Draw the bodies of a run with fields as deformed.png and, in space with ``Contact()``, its contact faces as

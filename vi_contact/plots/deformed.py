@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..core.algebra import Array, Indices
+from ..core.arguments import checked
 from ..core.checks import array
 from ..core.errors import InputError, of_machine
 from ..core.files import FIELDS, frames_of, open_hdf5
@@ -123,6 +124,7 @@ def stored_tangents(contact: Geometry) -> Array:
     return tangent_vectors(contact.normals, np.unique(contact.points, axis=0, return_inverse=True)[1].ravel())
 
 
+@checked
 def read_frames(run: RunFolder | str | Path) -> StoredFrames:
     """Read the frames from the fields of a run in plane or space. InputError for a folder without them."""
     folder = run.folder if isinstance(run, RunFolder) else Path(run)

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..core.algebra import Array, Indices
+from ..core.arguments import checked
 from ..core.corners import FEATURE_ANGLE
 from ..core.errors import InputError
 from ..core.files import frames_of
@@ -183,6 +184,7 @@ def moments(history: History) -> list[float]:
     return history["t"][[0, leading(history)[1], -1]].tolist()
 
 
+@checked
 def plot_faces(run: RunFolder, path: str | Path, *, times: Sequence[float] | None = None,
                title: str = "Contact faces") -> Path:
     """Draw the contact faces of a run in space, a column for each of ``times`` [s].

@@ -92,6 +92,10 @@ def write_picture(figure: Any, path: str | Path, **more: Any) -> Path:
     """Write a picture as a whole, in the format that its name ends in; OSError names the file."""
     path = Path(path)
     path = path if path.suffix else path.with_suffix(".png")
+    known = sorted(figure.canvas.get_supported_filetypes())
+    if path.suffix.lower()[1:] not in known:
+        endings = ", .".join(known)
+        raise InputError(f"'{path}' is no picture that matplotlib writes: give a name that ends in .{endings}")
     write_output(path, image_of(figure, path.suffix.lower()[1:], **more))
     return path
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.checks import shown
 from ..core.errors import InputError, ViContactError
 from ..core.own_files import inner_folder, is_own
@@ -22,6 +23,7 @@ UNSIZED = ("certificate", "energy_defect", "contact_active")  # columns without 
 NOISE = 1e-6  # of the largest peak in the same unit: columns that small are not compared
 
 
+@checked
 def refine(folder: str | Path, comm: Any, *, allow: Sequence[str] = (), progress: bool = True) -> dict[str, str]:
     """Run the case of a finished run folder with h/2 and with dt/2, into refined/h and refined/dt. Return name -> why
     it failed. A finished run is kept, and an interrupted run is continued. Collective.

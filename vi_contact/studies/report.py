@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ..core.arguments import checked
 from ..core.errors import InputError, ViContactError
 from ..core.files import sentence, write_output
 from ..core.own_files import is_own
@@ -28,6 +29,7 @@ from .refinement import refinement
 WRITERS = {".html": write_web_page, ".pdf": write_pages}
 
 
+@checked
 def report(folder: str | Path, *, out: str | Path | None = None, title: str | None = None,
            columns: Sequence[Sequence[str]] | None = None,
            failed: Mapping[str, str] | None = None) -> tuple[Section, list[Path]]:
@@ -75,6 +77,7 @@ def _model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Path]]:
     return model, [picture]
 
 
+@checked
 def comparisons(folder: str | Path) -> tuple[Comparison, ...]:
     """Return the comparisons of a run folder, one for each [[check]] of the case it keeps; InputError without a run."""
     folder = Path(folder)

@@ -2,6 +2,7 @@
 
 import os
 
+from ...core.arguments import checked
 from ...core.errors import InputError
 from ...core.files import write_output
 from ..record import UNITS, Record, canonical_units
@@ -9,6 +10,7 @@ from ..record import UNITS, Record, canonical_units
 DIGITS = 9  # significant digits of a written sample; what is read back differs by half a unit in the last of them
 
 
+@checked
 def write_columns(record: Record, path: str | os.PathLike[str], units: str) -> None:
     """Write time [s] and acceleration in `units`, after comment lines "#" with title, units, time step and notes."""
     samples, name = _samples(record, units)
@@ -17,6 +19,7 @@ def write_columns(record: Record, path: str | os.PathLike[str], units: str) -> N
     _write(path, [" ".join(["#", *comment.split()]) for comment in comments if comment] + rows)
 
 
+@checked
 def write_at2(record: Record, path: str | os.PathLike[str], units: str = "g") -> None:
     """Write PEER AT2: four header lines with units, NPTS and DT, then five values a row."""
     samples, name = _samples(record, units)
@@ -27,6 +30,7 @@ def write_at2(record: Record, path: str | os.PathLike[str], units: str = "g") ->
     _write(path, header + rows)
 
 
+@checked
 def write_path_series(record: Record, path: str | os.PathLike[str], units: str) -> None:
     """Write one value a line, as `timeSeries Path -filePath` of OpenSees reads; it needs -dt and units."""
     _write(path, _samples(record, units)[0])

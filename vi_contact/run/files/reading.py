@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array, Mask
+from ...core.arguments import checked
 from ...core.checks import SHOWN, shown
 from ...core.errors import InputError, of_machine
 from ...core.files import open_hdf5, sentence
@@ -54,6 +55,7 @@ class RunFolder:
     contact: ContactGeometry | None
 
 
+@checked
 def read_run(folder: str | Path) -> RunFolder:
     """Read a run folder of ``simulate``. For a run that is still going on or was killed, return what is there.
 

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from ...core.arguments import checked
 from ...core.errors import InputError
 from ...core.files import on_root
 from ...core.problem import ContactProblem
@@ -264,6 +265,7 @@ class Case:
         return longest
 
 
+@checked
 def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence[str] = ()) -> Case:
     """Read and check a case file. ``settings`` are texts KEY=VALUE that replace values of it. ``allow`` names packages
     that you trust: the case may name their classes as "package.module:Name", which runs code of these packages.

@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core.algebra import Array, SerialComm
+from ...core.arguments import check_fields, checked
 from ...core.errors import InputError
 from ...core.files import to_json, write_atomically, write_csv
 from ...core.own_files import inner_folder
@@ -64,6 +65,7 @@ class IDA:
     limits: Sequence[str] = ()
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if bool(self.scales) == bool(self.levels):
             raise InputError("give either scales or levels of the intensity, at least one value")
         values = (*self.scales, *self.levels)
@@ -107,6 +109,7 @@ class IDA:
         return OneRun(self.case, shaking, factor, folder)
 
 
+@checked
 def run_ida(study: IDA, out: str | Path, *, jobs: int = 1, part: tuple[int, int] = (1, 1), launch: Sequence[str] = (),
             say: Callable[[str], None] = print, wall_time: str | None = None) -> list[Row]:
     """Make the runs that have not finished yet, and the table and figure of all that are in ``out``. Return its rows.

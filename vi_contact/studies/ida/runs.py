@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from ...core.arguments import checked
 from ...core.errors import InputError
 from ...core.files import to_json, write_atomically
 from ...core.own_files import inner_folder, make_inner_folder
@@ -68,6 +69,7 @@ def ground_motions(case: Case) -> list[tuple[str, Mapping[str, Any]]]:
     return found
 
 
+@checked
 def record_set(word: str) -> list[list[str]]:
     """Return the files of each record of "H", "H,V", a folder (its AT2 files, if it has any, else all) or "@LIST".
     A LIST is a file with "H" or "H,V" in each line, relative to its folder. InputError for others."""
