@@ -31,7 +31,8 @@ pytest.importorskip("dolfinx")
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[2]
 MEMORY: list[Exception] = [MemoryError(), OSError(errno.ENOMEM, "Cannot allocate memory"),
-                           RuntimeError("Unable to allocate 3.0 GiB for an array"), OSError("Can't read: out of memory")]
+                           RuntimeError("Unable to allocate 3.0 GiB for an array"),
+                           OSError("Can't read: out of memory")]
 MODEL = {"title": "x", "dimension": 2, "unknowns": 3, "supports": [], "contact": [],
          "outline": [{"group": "", "lines": [[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [1.0, 1.0]]]}]}
 NO_MEMORY = "vi-contact: out of memory: take a coarser mesh"

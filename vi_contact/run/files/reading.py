@@ -1,11 +1,11 @@
 """Read what a run left in its folder: histories, units, facts and the geometry of the contact points."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from textwrap import shorten
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,10 +14,12 @@ from ...core.arguments import checked
 from ...core.checks import SHOWN, shown
 from ...core.errors import InputError, of_machine
 from ...core.files import open_hdf5, sentence
+from ...core.hdf5 import StoredFile
 from ...core.own_files import is_own, open_to_read, read_bytes
 from .folder import COLUMNS, HISTORY_CSV, HISTORY_H5, SUMMARY, check_folder_format
 from .stored_rows import numbers_of
 
+T = TypeVar("T")
 BYTES = 100_000_000  # of a JSON file
 _NEEDED = ("t", "k", "iterations", "certificate", "escalated")  # columns of every run
 _NUMBER = (int, float)
@@ -66,18 +68,23 @@ def read_run(folder: str | Path) -> RunFolder:
         raise InputError(f"'{folder}' has no {HISTORY_CSV}: give the output folder of a run")
     check_folder_format(folder)
     history = _numbers(folder / HISTORY_CSV)
+    columns = _of(folder / COLUMNS, lambda path: _columns(read_object(path), history))
+    facts = _of(folder / SUMMARY, lambda path: _facts(read_object(path)) if is_own(path) else {})
+    _check_rows(folder, history, facts)
+    arrays, contact = _of(folder / HISTORY_H5, lambda path: _arrays(path, history))
+    return RunFolder(folder, history | arrays, columns, facts, contact)
+
+
+def _of(path: Path, read: Callable[[Path], T]) -> T:
+    """What is read from a file of a run; InputError that names the file when it is missing or damaged."""
     try:
-        columns = _columns(read_object(folder / COLUMNS), history)
-        facts = _facts(read_object(folder / SUMMARY)) if is_own(folder / SUMMARY) else {}
-        arrays, contact = _arrays(folder / HISTORY_H5, len(history["t"]))
+        return read(path)
     except InputError:
         raise
     except (OSError, ValueError, KeyError, TypeError, RuntimeError, AttributeError) as error:  # of json and h5py
         if of_machine(error):
             raise
-        reason = _short(error)
-        raise InputError(f"a file of the run in '{folder}' is missing or damaged ({reason}): restore it") from error
-    return RunFolder(folder, history | arrays, columns, facts, contact)
+        raise InputError(f"a file of the run, '{path}', is missing or damaged ({_short(error)}): restore it") from error
 
 
 def _short(error: Exception) -> str:
@@ -152,11 +159,38 @@ def _numbers(path: Path) -> dict[str, Array]:
     return history
 
 
-def _arrays(path: Path, rows: int) -> tuple[dict[str, Array], ContactGeometry | None]:
+def _check_rows(folder: Path, history: Mapping[str, Array], facts: Mapping[str, Any]) -> None:
+    """InputError when history.csv has lost rows: numbers of steps follow each other, up to the one of the summary."""
+    rows, steps = len(history["t"]), facts.get("steps")
+    gaps = np.flatnonzero(np.diff(history["k"]) != 1.0)
+    if len(gaps):
+        raise InputError(f"'{folder / HISTORY_CSV}' is damaged (the steps k after line {gaps[0] + 2} do not follow "
+                         "each other): restore it or run again")
+    if isinstance(steps, int) and rows < steps + 1:
+        raise InputError(f"'{folder / HISTORY_CSV}' is damaged ({rows} rows are there, {SUMMARY} tells of {steps} "
+                         "steps and the initial state): restore it or run again")
+
+
+def _compare(path: Path, file: StoredFile, history: Mapping[str, Array]) -> None:
+    """InputError when history.csv and history.h5, which hold the same numbers, differ in a row that both have."""
+    for name, own in history.items():
+        if name not in file or file[name].ndim != 1:
+            raise ValueError(f"{HISTORY_H5}: the column {shown(name)} is missing")
+        other = file[name][: len(own)]
+        differ = np.flatnonzero(~((other == own[: len(other)]) | (np.isnan(other) & np.isnan(own[: len(other)]))))
+        if len(differ):
+            csv = path.with_name(HISTORY_CSV)
+            raise InputError(f"'{csv}' and '{path}' differ in {name}, line {differ[0] + 2}: one of them is damaged or "
+                             f"was changed; restore it, or move {HISTORY_H5} away to read the other alone")
+
+
+def _arrays(path: Path, history: Mapping[str, Array]) -> tuple[dict[str, Array], ContactGeometry | None]:
     """(array columns when they have all rows, geometry of the contact points)."""
+    rows = len(history["t"])
     if not is_own(path):
         return {}, None
     with open_hdf5(path) as file:
+        _compare(path, file, history)
         group = file["contact"]
         geometry = ContactGeometry(*(group[name][()] for name in ContactGeometry.__dataclass_fields__))
         count = len(geometry.weights)
