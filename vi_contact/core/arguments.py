@@ -10,15 +10,16 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields
 from functools import cache, wraps
 from inspect import Parameter, isclass, signature
-from numbers import Real
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from .checks import shape_of, shown
+from .checks import real, shape_of, shown
 from .errors import InputError
 
+_MANY: dict[Any, str] = {float: "real numbers", int: "whole numbers", str: "texts"}
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -70,8 +71,10 @@ def fits(value: Any, kind: Any) -> bool:
         return value is None
     if _is_path(kind):
         return _fits_path(value)
-    if kind in (float, int):
-        return _is_number(value) and (kind is float or float(value) == np.rint(float(value)))
+    if kind is float:
+        return _is_number(value)
+    if kind is int:
+        return _is_number(value) and (isinstance(value, Integral) or real(value) == np.rint(real(value)))
     if kind is bool:
         return isinstance(value, bool | np.bool_)
     if origin is np.ndarray or kind is np.ndarray:
@@ -103,10 +106,13 @@ def words(kind: Any) -> str:
     if origin is np.ndarray:
         return "real numbers in a list or array"
     if origin is tuple:
+        alike = len({one for one in inside if one is not Ellipsis}) == 1
         several = "" if inside[-1] is Ellipsis else f"{len(inside)} "
-        return f"a tuple of {several}values ({', '.join(words(one) for one in inside if one is not Ellipsis)})"
+        if alike:
+            return f"{several}{_MANY.get(inside[0], 'values')} in a tuple"
+        return f"a tuple of {', '.join(words(one) for one in inside)}"
     if origin in (Sequence, Iterable, list):
-        return f"a list ({words(inside[0])} each)"
+        return f"{_MANY.get(inside[0], 'values')} in a list"
     if origin in (Mapping, dict):
         return "a mapping"
     if kind is Callable or origin is Callable:

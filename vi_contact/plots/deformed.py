@@ -154,10 +154,8 @@ def _opened(path: Path) -> Iterator[Any]:
             yield file
     except InputError:
         raise
-    except FileNotFoundError as error:
-        raise InputError(f"'{path}' is missing: restore it, or draw without fields") from error
     except (OSError, KeyError, ValueError, IndexError, TypeError, AttributeError, RuntimeError) as error:
         if of_machine(error):
             raise
         reason = " ".join(str(error).split())[:200]
-        raise InputError(f"'{path}' is damaged ({reason}): restore it, or draw without fields") from error
+        raise InputError(f"'{path}' is missing or damaged ({reason}): restore it, or draw without fields") from error

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.arguments import checked
+from ..core.arguments import check
 from ..core.checks import shown
 from ..core.errors import InputError, ViContactError
 from ..core.own_files import inner_folder, is_own
@@ -23,7 +23,6 @@ UNSIZED = ("certificate", "energy_defect", "contact_active")  # columns without 
 NOISE = 1e-6  # of the largest peak in the same unit: columns that small are not compared
 
 
-@checked
 def refine(folder: str | Path, comm: Any, *, allow: Sequence[str] = (), progress: bool = True) -> dict[str, str]:
     """Run the case of a finished run folder with h/2 and with dt/2, into refined/h and refined/dt. Return name -> why
     it failed. A finished run is kept, and an interrupted run is continued. Collective.
@@ -31,14 +30,15 @@ def refine(folder: str | Path, comm: Any, *, allow: Sequence[str] = (), progress
     InputError for a folder without case file or whose run has not finished. ``allow``: as of ``read_case``."""
     from .cases.case import read_case  # late: finite elements
 
+    check("refine", "folder", folder, str | Path)
     run, failed = read_run(folder), {}
     if not is_own(run.folder / COPY):
         raise InputError(f"'{folder}' holds no {COPY}, the case that is to be refined: give the folder of a case's run")
     if run.facts.get("status") != "finished":
         raise InputError(f"the run in '{folder}' has not finished: continue it with --restart, then refine it")
     for name in NAMES:
-        out = inner_folder(run.folder, FOLDER, name)
         try:
+            out = inner_folder(run.folder, FOLDER, name)
             same, settings = _same(run, name), [*copied_settings(run.folder), *_halved(run, name)]
             if not (same and _status(out) == "finished"):
                 case = read_case(run.folder / COPY, settings, allow=allow)
@@ -92,8 +92,10 @@ def refinement(run: RunFolder, failed: Mapping[str, str]) -> Section:
     ``failed``: name -> why, of ``refine``."""
     found = {}
     for name in NAMES:
+        if name in failed:
+            continue
         out = inner_folder(run.folder, FOLDER, name)
-        if name not in failed and _status(out) == "finished" and _same(run, name):
+        if _status(out) == "finished" and _same(run, name):
             other = read_run(out)
             found[name] = {one.name: one for one in peaks(other.history, other.columns)}
     said = [f"The run with {NAMES[name]} failed: {why}." for name, why in failed.items()]

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arguments import checked
+from ...core.arguments import check
 from ...core.errors import InputError
 from ...core.files import on_root
 from ...core.problem import ContactProblem
@@ -265,13 +265,13 @@ class Case:
         return longest
 
 
-@checked
 def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence[str] = ()) -> Case:
     """Read and check a case file. ``settings`` are texts KEY=VALUE that replace values of it. ``allow`` names packages
     that you trust: the case may name their classes as "package.module:Name", which runs code of these packages.
 
     Raises InputError, one sentence with file, table, key and remedy: no TOML (with the line), a table, type or key that
     nobody knows (with the nearest known), a missing key, a value of the wrong kind. Groups are looked up by ``run``."""
+    check("read_case", "path", path, str | Path)
     path = Path(path)
     tables = with_settings(read_toml(path), settings)
     allowed = packages(allow)

@@ -73,10 +73,9 @@ def _imported(module: str, name: str, spot: Spot) -> Any:
     except (Exception, SystemExit) as error:  # a module may raise anything
         why, package = f"{type(error).__name__}: {_line(error)}", module.partition(".")[0]
         remedy = f"correct {module}, or the name"
-        if isinstance(error, ModuleNotFoundError) and error.name is not None:
-            missing = error.name.partition(".")[0]
-            remedy = f"install {missing}, or set PYTHONPATH to its folder" if missing != package or (
-                error.name == package) else f"correct the name of the module, which {package} does not have"
+        if isinstance(error, ModuleNotFoundError):
+            missing = (error.name or package).partition(".")[0]
+            remedy = f"correct the name, install {missing}, or set PYTHONPATH to its folder"
         raise spot.inside(f"has the type '{module}:{name}', which Python cannot import ({why}): {remedy}") from error
 
 

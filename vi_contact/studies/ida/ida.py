@@ -23,7 +23,7 @@ from ...core.algebra import Array, SerialComm
 from ...core.arguments import check_fields, checked
 from ...core.errors import InputError
 from ...core.files import to_json, write_atomically, write_csv
-from ...core.own_files import inner_folder
+from ...core.own_files import inner_folder, is_own
 from ...fem.mesh import alone
 from ...plots.studies import DemandPanel, plot_fragility, plot_ida
 from ...run.files.folder import LOCK, locked
@@ -179,7 +179,10 @@ def _claim(study: IDA, out: Path) -> None:
     records = {one.name: [_digest(path.read_bytes()) for path in one.files if path.is_file()] for one in study.shakings}
     old = read_json(out / STUDY)
     if old is None:
-        for name in (STUDY, TABLE, COLUMNS, FIGURE, FRAGILITY):
+        if is_own(out / STUDY):
+            raise InputError(f"'{out / STUDY}' is damaged, or of no study: restore it, choose another folder, or move "
+                             "this one away")
+        for name in (TABLE, COLUMNS, FIGURE, FRAGILITY):
             if os.path.lexists(out / name):
                 raise InputError(f"'{out / name}' is not of a study of vi_contact, which would replace it (there is no "
                                  f"whole {STUDY} in '{out}'): choose another folder, or move the file")
