@@ -108,7 +108,7 @@ def image_of(figure: Any, kind: str = "png", **more: Any) -> bytes:
 
 
 def require_matplotlib() -> None:
-    """Import matplotlib; InputError when its settings keep it from being imported, though it is there."""
+    """Raise InputError when the settings of matplotlib keep it from being imported, though it is there."""
     try:
         import matplotlib  # noqa: F401
     except ValueError as error:  # of MPLBACKEND, which it checks although nothing here needs a backend

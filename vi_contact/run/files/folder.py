@@ -59,7 +59,6 @@ FILES = (ABOUT, CHECKPOINT, COLUMNS, FIELDS_INDEX, HISTORY_CSV, HISTORY_H5, JOUR
 _OF_CASES = (COPY, FOLLOWS, "strain_compatible.json", "row.json", "failure.txt")  # beside them, by cases and studies
 _OF_REPORTS = ("report.pdf", "report.html", "peaks.csv", "model.png", "deformed.png", "faces.png", "film.gif",
                "film.mp4")
-_TEMPORARY = re.compile(r"\.(.+)\.\d+\.tmp")  # of a file that was about to be replaced, and of which process
 _TRIAL = re.compile(r"\.writable-\d+")
 _held: dict[Path, int] = {}  # locks that this process has -> the thread that took them
 
@@ -219,10 +218,14 @@ def remove_litter(folder: Path) -> None:
     """Remove what killed processes left of files they were about to replace; with the folder's lock only."""
     for place in (folder, inner_folder(folder, FIELDS)):
         for name in os.listdir(place) if place.is_dir() else ():
-            match = _TEMPORARY.fullmatch(name)
-            own = match is not None and _is_name_of_runs(match[1])
-            if own or (_TRIAL.fullmatch(name) and place is folder):
+            if _is_temporary(name) or (_TRIAL.fullmatch(name) and place is folder):
                 remove(place / name)
+
+
+def _is_temporary(name: str) -> bool:
+    """Whether this is the name of a file that was to take the place of one of a run: ".NAME.PROCESS.tmp"."""
+    inside, _, process = name.removesuffix(".tmp").removeprefix(".").rpartition(".")
+    return name == f".{inside}.{process}.tmp" and process.isdecimal() and _is_name_of_runs(inside)
 
 
 def _is_name_of_runs(name: str) -> bool:
