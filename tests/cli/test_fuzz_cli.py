@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from random import Random
 
@@ -206,16 +207,16 @@ def answered(line: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, 
     return code, capsys.readouterr().err
 
 
-@pytest.mark.fuzz
-def test_wrong_command_lines(places: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                             capsys: pytest.CaptureFixture[str]) -> None:
-    """One sentence about the very fault that the line has. An exception that is no SystemExit would be a traceback, and
-    ends this test; so does a warning of numpy."""
+@pytest.fixture
+def check(places: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+          capsys: pytest.CaptureFixture[str]) -> Callable[[list[str]], None]:
+    """Try a line in an empty folder: one sentence about the very fault that it has. An exception that is no SystemExit
+    would be a traceback, and ends the test; so does a warning of numpy."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("signal.signal", lambda *_: None)  # ida makes Ctrl-C of SIGTERM for good
     warnings.simplefilter("error", RuntimeWarning)
 
-    def check(entry: list[str]) -> None:
+    def tried(entry: list[str]) -> None:
         command, option, value = entry
         line = [placed(word, places) for word in words(command, option, value)]
         code, said = answered(line, capsys)
@@ -226,7 +227,20 @@ def test_wrong_command_lines(places: dict[str, str], tmp_path: Path, monkeypatch
         about = [placed(word, places) for word in faults(command, option, value)]
         assert any(word[:50] in sentence for word in about), (line, about, sentence)
 
+    return tried
+
+
+@pytest.mark.fuzz
+def test_wrong_command_lines(check: Callable[[list[str]], None], tmp_path: Path) -> None:
     FUZZ.each(COUNT, chosen, check)
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+@pytest.mark.slow
+def test_all_wrong_command_lines(check: Callable[[list[str]], None], tmp_path: Path) -> None:
+    """Those that are written down here, one after the other."""
+    for entry in entries():
+        check(entry)
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
