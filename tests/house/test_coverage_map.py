@@ -71,6 +71,8 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "plots/test_faces.py": "plots.bodies",
     "plots/test_report.py":
         "cli.pictures cli.post plots.charts plots.pages plots.sections run.files.reading studies.report",
+    "core/test_own_files.py": "core.hdf5",
+    "house/test_wrong_types.py": "core.arguments",
     "run/test_folder.py": "core.files run.files.history run.files.stored_rows run.files.table",
     "run/test_fuzz_folders.py": "run.files.writer run.session",
     "run/test_march.py": "core.state_checks",

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from ..core.errors import InputError, Interrupted, OutOfTime, ViContactError
 from ..core.version import __version__
 from .case import add_case_commands
-from .errors import Parser, check_words, fail_together, printable, told, world
+from .errors import Parser, check_words, fail_together, keep_streams, say, told, world
 from .ida import add_ida_commands
 
 _DESCRIPTION = """vi-contact computes structures that may lift off, bounce and slide. It checks every time step.
@@ -60,13 +60,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
             petsc4py.init(["vi-contact", *petsc])
         check_words(own)
         if text := told(lambda: options.run(options), getattr(options, "spelling", {})):
-            print(printable(text))
+            say(text)
 
     return status_of(command)
 
 
 def status_of(call: Callable[[], object]) -> int:
     """Call a command, or the main function of a script, and return 0; other ends are as those of ``main``."""
+    keep_streams()
     try:
         told(call, {})
     except ViContactError as error:
@@ -77,7 +78,7 @@ def status_of(call: Callable[[], object]) -> int:
         if isinstance(error, OutOfTime):  # on all ranks: a launcher kills what is left when the first one has failed
             fail_together(str(error))
         return _stopped(stopped, stopped.status)
-    except Exception:
+    except Exception:  # a defect: its traceback is shown, and the other ranks end too
         fail_together(traceback.format_exc())
         raise
     return 0

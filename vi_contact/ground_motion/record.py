@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..core.algebra import Array
-from ..core.checks import array, number
+from ..core.arguments import checked
+from ..core.checks import array, instance, number
 from ..core.errors import InputError
 from ..core.units import STANDARD_GRAVITY
 
@@ -40,6 +41,8 @@ class Record:
     component: str = ""
 
     def __post_init__(self) -> None:
+        for name in ("title", "source", "format", "units", "sha256", "station", "component"):
+            instance("Record", name, getattr(self, name), str, "give a text")
         owner = self.source or "Record"
         samples = array(owner, "acceleration", self.acceleration, (None,), unit="m/s2")
         if samples.size < 2:
@@ -63,6 +66,7 @@ class Record:
         return (self.acceleration.size - 1) * self.dt
 
 
+@checked
 def canonical_units(source: str, units: str) -> str:
     """Return the key of UNITS that `units` spells ("CM/SEC/SEC", "(g)", "cm/s^2"); InputError if there is none."""
     text = units.lower().strip(" ()[].,;").replace("²", "2").replace("^", "").replace("**", "")

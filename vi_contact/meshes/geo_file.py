@@ -73,7 +73,8 @@ class GeoFile:
                 raise InputError(f"{self.path}: Gmsh did not end within {self.time_limit:g} s: ask for larger cells, "
                                  "or give a longer time_limit") from None
             if done.returncode:
-                said = (done.stderr.strip().splitlines() or ["it ended, perhaps without memory"])[-1]
+                how = f"signal {-done.returncode}" if done.returncode < 0 else f"status {done.returncode}"
+                said = (done.stderr.strip().splitlines() or [f"it ended without a word, with {how}"])[-1]
                 if said.strip().startswith(("terminate called", "what()")):  # for a text that Gmsh throws
                     said = "it stopped at a formula or size: check Field[…].F, and that Mesh.MeshSize… is positive"
                 raise InputError(f"{self.path}: Gmsh cannot mesh it: {said.replace('own_', '')}")

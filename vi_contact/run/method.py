@@ -65,6 +65,8 @@ def with_defaults(problem: ContactProblem, scheme: Scheme | None,
     asked for, the Zienkiewicz-Wood-Taylor step at phi = ½, which never gains energy. Without a mass: the scheme's.
     ``others``: the first that has its matrices lends them."""
     check_problem_given("march", problem)
+    for one in several("march", "others", others, "give a list of problems, or leave it out"):
+        check_problem_given("march", one)
     if scheme is None:
         massive = problem.mass is not None and isinstance(problem.mass, ConsistentMass)
         scheme = Trapezoidal() if problem.impact is None and not massive else ZienkiewiczWoodTaylor()

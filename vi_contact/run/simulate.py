@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from ..core.algebra import Comm
-from ..core.checks import flag, function, instance, optional, provides, several, whole
+from ..core.arguments import check
+from ..core.checks import flag, function, optional, provides, several, whole
 from ..core.errors import InputError
 from ..core.files import on_root
 from ..core.problem import ContactProblem
@@ -113,8 +114,8 @@ def _check_outputs(record: Any, out: Any, restart: Any, checkpoint_every: Any, f
     owner = "simulate"
     for one in () if record is None else several(owner, "record", record, "give a list of recorders, or None"):
         provides(owner, "a recorder", one, ("columns", "start", "row"), "give Energy(), Contact(), Probe(…) or another")
-    optional(instance, owner, "out", out, (str, Path), "give a path, or None")
-    instance(owner, "restart", restart, (bool, str, Path), "give True, False or the path of a run folder")
+    check(owner, "out", out, str | Path | None)
+    check(owner, "restart", restart, bool | str | Path)
     whole(owner, "checkpoint_every", checkpoint_every, least=1)
     for meaning, value in zip(("progress", "changed"), flags, strict=True):
         flag(owner, meaning, value)

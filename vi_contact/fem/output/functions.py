@@ -16,8 +16,9 @@ from petsc4py import PETSc
 
 from ...core.algebra import Array, Indices
 from ...core.checks import flag, instance, number, optional, refuse, shown
-from ...core.errors import InputError
-from ...core.files import FIELDS, FIELDS_INDEX, on_root, open_hdf5
+from ...core.errors import InputError, of_machine
+from ...core.files import FIELDS, FIELDS_INDEX, frames_of, on_root, open_hdf5
+from ...core.own_files import inner_folder, is_own, read_bytes
 from ...core.problem import ContactProblem
 from ...core.state_checks import check_problem_given, check_sizes
 from ...core.step import State
@@ -129,17 +130,22 @@ class Stress:
 
 def _stored(folder: Path, name: str, t: float | None, frame: int | None) -> tuple[Array, Array, float]:
     """Points of the mesh, a quantity of a frame at them, and its time."""
-    if not (folder / FIELDS_INDEX).is_file():
+    if not is_own(folder / FIELDS_INDEX):
         raise InputError(f"'{folder}' has no {FIELDS_INDEX}: run again with out and fields=fem.XDMF(every=10)")
     try:
-        index: Any = ET.parse(folder / FIELDS_INDEX)
+        index: Any = ET.fromstring(read_bytes(folder / FIELDS_INDEX))
         places = sorted((float(grid.find("Time").get("Value")), grid.find(f"Attribute[@Name='{name}']/DataItem").text)
                         for grid in index.findall(".//Grid[@GridType='Uniform']"))
         time, place = places[_chosen([time for time, _ in places], t, frame)]
         file, path = place.split(":")
-        with open_hdf5(folder / FIELDS / "mesh.h5") as mesh, open_hdf5(folder / file) as fields:
+        known = {str(one.relative_to(folder)): one for one, _ in frames_of(folder).values()}
+        with open_hdf5(inner_folder(folder, FIELDS) / "mesh.h5") as mesh, open_hdf5(known[file]) as fields:
             return mesh["points"][()], fields[path][()], time
-    except (ET.ParseError, OSError, KeyError, AttributeError, TypeError) as error:
+    except InputError:
+        raise
+    except (ET.ParseError, OSError, KeyError, AttributeError, TypeError, ValueError, RuntimeError) as error:
+        if of_machine(error):
+            raise
         raise InputError(f"the fields in '{folder}' are incomplete or damaged ({error}): run again") from error
 
 

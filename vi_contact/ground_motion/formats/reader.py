@@ -5,6 +5,7 @@ import os
 
 import numpy as np
 
+from ...core.arguments import checked
 from ...core.checks import number
 from ...core.errors import InputError
 from ...core.units import STANDARD_GRAVITY
@@ -17,6 +18,7 @@ SEVERAL = (cosmos, afad)  # formats whose files may hold several components
 STEPS = 1e-6, 100.0  # shortest and longest time step [s] of a file; that of seismographs is 0.001 to 0.05
 
 
+@checked
 def read_record(path: str | os.PathLike[str], units: str | None = None, *, dt: float | None = None,
                 resample_dt: float | None = None, channel: int | None = None, largest: float = LARGEST_PEAK) -> Record:
     """Read one component of ground motion from a file of any format listed in docs/guide/records.md.

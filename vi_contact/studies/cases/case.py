@@ -11,12 +11,15 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ...core.arguments import check
 from ...core.errors import InputError
+from ...core.files import on_root
 from ...core.problem import ContactProblem
 from ...core.protocols import Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
 from ...core.state_checks import initial_state
@@ -24,6 +27,7 @@ from ...core.step import Recorder, Scheme, Solver, State
 from ...core.surfaces import ContactSurface, empty_surface
 from ...engineering.checks.comparison import Check
 from ...fem.assembly import assemble
+from ...fem.communicators import MpiComm
 from ...fem.contact.joined import joined_surfaces
 from ...fem.heterogeneous import Heterogeneous
 from ...fem.mesh import Tags, build_mesh, read_mesh
@@ -31,14 +35,14 @@ from ...laws.materials import LinearElastic
 from ...laws.orthotropic import Orthotropic
 from ...meshes.gmsh_session import MeshScript
 from ...run.cross_check import CrossChecked
-from ...run.files.folder import locked, run_folder
+from ...run.files.folder import locked, refuse_files_of_others, run_folder
 from ...run.files.writer import FieldWriter
 from ...run.method import with_defaults
 from ...run.recorders import Contact, Energy, Steps
 from ...run.simulate import Solution, simulate
 from ...run.time_steps import StepPlan, step_plan
 from .expressions import check_axes
-from .library import base_folder, check_format, keep_copy
+from .library import base_folder, check_format, keep_copy, refuse_case_of_others
 from .own_classes import packages
 from .parsing import Words, arguments, nearest, read
 from .stage_tables import Stage, split
@@ -156,6 +160,8 @@ class Case:
         that are ``reached`` already. Raises as ``simulate``."""
         self.check()
         folder = self.out if out is None else Path(out)
+        if folder is not None:  # before any work; ``simulate`` looks once more, with the folder's lock
+            on_root(MpiComm(comm), partial(self._refuse_files_of_others, folder))
         if "strain_compatible" in self.nodes:
             return iterate(self, comm, folder, restart=restart, progress=progress, wall_time=wall_time)
         if self.stages:
@@ -165,6 +171,11 @@ class Case:
         with self.call(parts, folder) as call:
             self.keep_model(comm, parts, folder)
             return simulate(**call, restart=restart, progress=progress, changed=changed, wall_time=wall_time)
+
+    def _refuse_files_of_others(self, folder: Path) -> None:
+        """InputError for what the run would replace in a folder, and which no run has made."""
+        refuse_files_of_others(folder)
+        refuse_case_of_others(self.path, folder)
 
     def keep_model(self, comm: Any, parts: Parts, folder: Path | None) -> None:
         """Write into the folder of a run, if it has one, what its model is. Collective."""
@@ -253,6 +264,7 @@ def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence
 
     Raises InputError, one sentence with file, table, key and remedy: no TOML (with the line), a table, type or key that
     nobody knows (with the nearest known), a missing key, a value of the wrong kind. Groups are looked up by ``run``."""
+    check("read_case", "path", path, str | Path)
     path = Path(path)
     tables = with_settings(read_toml(path), settings)
     allowed = packages(allow)
