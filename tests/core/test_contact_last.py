@@ -91,9 +91,9 @@ def test_matrices_that_are_not_positive_definite_are_left_to_others() -> None:
 def cold(tmp_path: Path, monkeypatch: Any) -> Any:
     """An empty cache, and a process that has loaded nothing."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    compiled._library.cache_clear()
+    compiled._loops.cache_clear()
     yield tmp_path / "vi_contact"
-    compiled._library.cache_clear()
+    compiled._loops.cache_clear()
 
 
 @pytest.fixture

@@ -23,7 +23,7 @@ from .bounded_system import BoundedSystem
 from .failures import raised
 from .friction import VolumeFriction
 from .friction_system import FrictionSystem, ScaledFrictionStep
-from .options import OptionLayers, Options
+from .options import OptionLayers, Options, direct
 from .scaled_step import ScaledStep
 from .snes import ReducedNewton, SemismoothNewton, SnesDriver
 from .tao import TaoDriver, TaoTron
@@ -87,8 +87,9 @@ class PreparedVolume:
         self._system = BoundedSystem(A, surface, scale)
         PETSc.garbage_cleanup(self._system.comm)
         self._settings, self._method = settings, settings.method
-        own = settings.method.defaults(surface.comm.size)
-        self._layers = self._layered(own if self._system.symmetric else {**own, "pc_type": "lu"})
+        ranks = surface.comm.size
+        own = settings.method.defaults(ranks)
+        self._layers = self._layered(own if self._system.symmetric else {**own, **direct("lu", ranks)})
         self._scaled = ScaledStep(self._system, settings.tolerance)
         self._name = f"Volume({type(settings.method).__name__})"
         self._friction: VolumeFriction | None = None
@@ -103,7 +104,8 @@ class PreparedVolume:
             self.close()
             method, tolerance = cast(ReducedNewton, self._method), self._settings.tolerance
             scaled = ScaledFrictionStep(FrictionSystem(self._system), tolerance)
-            self._driver = method.friction_driver(scaled, self._layered(method.friction_defaults()))
+            defaults = method.friction_defaults(self._system.comm.size)
+            self._driver = method.friction_driver(scaled, self._layered(defaults))
             self._friction = VolumeFriction(scaled, self._driver, self._name)
         return self._friction
 
