@@ -1,5 +1,5 @@
-"""Compile the C files of this room when they are first needed, and keep them in the user's cache, as DOLFINx keeps forms:
-$XDG_CACHE_HOME or ~/.cache, folder vi_contact.
+"""Compile the C files of this room when they are first needed, and keep them in the user's cache, as DOLFINx keeps
+forms: $XDG_CACHE_HOME or ~/.cache, folder vi_contact.
 
 ``loops.c`` needs a C compiler only. ``contact_last.c`` needs CHOLMOD too, and takes none but the one that PETSc has
 brought into the process: another one beside it would share names with it, and with the METIS and the BLAS of PETSc, so
@@ -11,7 +11,6 @@ import os
 import platform
 import shlex
 import subprocess
-import sys
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from hashlib import sha256
@@ -20,6 +19,7 @@ from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 from typing import Any
 
+from . import packages
 from .algebra import Comm, largest
 
 log = logging.getLogger(__name__)
@@ -28,7 +28,6 @@ CONTACT_LAST = Path(__file__).with_name("contact_last.c")
 MAPS = Path("/proc/self/maps")  # of Linux: the files of all libraries of this process
 OF_LOOPS = ("forward", "backward", "forward_many", "backward_many")
 OF_CHOLMOD = ("order", "factorise", "columns", "release", "substitute")
-PETSC = "petsc4py.PETSc"
 
 
 def library(comm: Comm) -> Any:
@@ -100,10 +99,9 @@ def _without_cholmod(reason: str) -> None:
 
 def cholmod_of_petsc() -> Path:
     """Return the file of the CHOLMOD that PETSc has brought into this process; OSError, which says why, without one."""
-    petsc = sys.modules.get(PETSC)  # this room imports no PETSc
-    if petsc is None:
+    if not packages.petsc_is_here():
         raise OSError("no PETSc is in this process")
-    if not petsc.Sys.hasExternalPackage("suitesparse"):
+    if not packages.petsc_has("suitesparse"):
         raise OSError("this PETSc was built without SuiteSparse")
     lines = MAPS.read_text(encoding="utf-8", errors="surrogateescape").splitlines()
     files = {line.split(maxsplit=5)[5] for line in lines if len(line.split(maxsplit=5)) == 6}

@@ -1,7 +1,7 @@
 """Choose a direct factorisation among those that this PETSc was built with, and say why one failed.
 
 PETSc's own factorisation is always there. MUMPS, SuiteSparse and others are packages, which a PETSc may lack: whoever
-assumes one asks ``has`` first. A cause is named only where PETSc or the matrix tells it."""
+assumes one asks ``core.packages`` first. A cause is named only where PETSc or the matrix tells it."""
 
 import logging
 from typing import Any
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
+from ..core import packages
 from ..core.errors import InputError
 
 log = logging.getLogger(__name__)
@@ -22,15 +23,10 @@ MUMPS_SINGULAR = (-6, -10)  # INFOG(1): in its structure, in its numbers
 MUMPS_MEMORY = (-8, -9, -11, -13, -14, -15, -17, -18, -19, -20)
 
 
-def has(package: str) -> bool:
-    """Say whether this PETSc was built with a package, by the name that PETSc's configuration has for it."""
-    return bool(PETSc.Sys.hasExternalPackage(package))
-
-
 def ordering() -> str:
     """Return the order of elimination that PETSc's own factorisation takes: minimum degree, which is of SuiteSparse, or
     without it nested dissection, which is PETSc's."""
-    return "amd" if has("suitesparse") else "nd"
+    return "amd" if packages.petsc_has("suitesparse") else "nd"
 
 
 def own_serves(mat: Any) -> bool:
@@ -46,13 +42,13 @@ def by_mumps(mat: Any, *, symmetric: bool, own: bool) -> bool:
     """Say whether MUMPS factorises: where it is the better one, if PETSc has it. The log says what is taken instead of
     what is missing, unless options of the user choose (``own``). Collective."""
     serves = symmetric and own_serves(mat)
-    mumps = has("mumps") and not serves
-    missing = [] if has("suitesparse") else ["SuiteSparse (CHOLMOD, AMD)"]
-    missing += [] if has("mumps") or serves else ["MUMPS"]
+    mumps = packages.petsc_has("mumps") and not serves
+    missing = [] if packages.petsc_has("suitesparse") else ["SuiteSparse (CHOLMOD, AMD)"]
+    missing += [] if packages.petsc_has("mumps") or serves else ["MUMPS"]
     if missing and not own and mat.comm.rank == 0:
         kind = "Cholesky" if symmetric else "LU"
         taken = "MUMPS" if mumps else f"PETSc's own {kind}, ordered by '{ordering()}'"
-        copied = "" if mat.comm.size == 1 or mumps else ", a copy on every rank,"
+        copied = "" if mat.comm.size == 1 or mumps else ", with a copy on every rank,"
         log.info("%s%s factorises, as this PETSc has no %s", taken, copied, " and no ".join(missing))
     return mumps
 

@@ -21,7 +21,7 @@ ERRORS = {  # of PETSc, by number
     71: "the matrix has a zero pivot: check that the body is held or that mass enters A",
     81: "the matrix has a zero pivot: check that the body is held or that mass enters A",
 }
-UNKNOWN = "the message of PETSc is all that is known of the cause: correct petsc_options, or try another method"
+UNKNOWN = "PETSc says no more of the cause: check that the body is held and petsc_options fit, or try another method"
 GENERAL_ADVICE = "check that the body is held, try a smaller step, another method, or a larger iteration limit"
 
 
@@ -42,7 +42,7 @@ def stopped(method: str, reasons: type, reason: int, iterations: int, worst: flo
 def raised(method: str, error: Any) -> StepFailure:
     """Return the failure of a PETSc call that raised."""
     said = last_line(error)
-    code = getattr(error, "ierr", "unknown")
+    code: Any = getattr(error, "ierr", "unknown")
     advice = ERRORS.get(code, UNKNOWN)
     if re.search(r"\bnan\b", said, re.IGNORECASE):  # error 72, "Inf or NaN", or 83, "generated infinity or NaN"
         said, advice = f"not a number: {said}", CHECK_NUMBERS

@@ -13,6 +13,7 @@ from typing import Any
 
 from petsc4py import PETSc
 
+from ...core import packages
 from ...core.errors import InputError
 from .failures import last_line
 
@@ -69,31 +70,31 @@ def refuse(combination: str, reason: str, remedy: str) -> None:
 NOT_EXACT = "one application of it does not solve the system"
 TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 REDUCED_PC = TABLES["reduced_pc"]
-EXCHANGE = {"superlu_dist": "superlu_dist", "superlu": "superlu", "umfpack": "suitesparse"}  # solver: its package
+EXCHANGE = {"umfpack": "suitesparse", "superlu": "superlu"}  # solvers that exchange rows, and their packages
 
 
 def direct(kind: str, ranks: int, *, exchanges: bool = False) -> Options:
-    """Return the options of a direct solver, "cholesky" or "lu", of what this PETSc was built with: MUMPS, or PETSc's own
-    factorisation, of which every rank has a copy; the log says which where it is not MUMPS.
+    """Return the options of a direct solver, "cholesky" or "lu", of what this PETSc was built with: MUMPS, or one of
+    one rank, of which every rank has a copy; the log says which where it is not MUMPS. SuperLU_DIST is never taken: it
+    ends the process where a row is zero.
 
     ``exchanges``: whether rows have to be exchanged, as beside zeros on the diagonal, which PETSc's own does not do.
     InputError where nothing else is there."""
-    if PETSc.Sys.hasExternalPackage("mumps"):
+    if packages.petsc_has("mumps"):
         return {**TABLES["mumps"], "pc_type": kind}
-    own: dict[str, object] = {"pc_factor_mat_solver_type": "petsc", "pc_factor_mat_ordering_type": "nd"}
+    own = {"ksp_type": "preonly", "pc_type": kind, "pc_factor_mat_solver_type": "petsc"}
     if exchanges:
-        found = [name for name, package in EXCHANGE.items() if PETSc.Sys.hasExternalPackage(package)
-                 and (ranks == 1 or name == "superlu_dist")]
+        found = [name for name, package in EXCHANGE.items() if packages.petsc_has(package)]
         if not found:
-            raise InputError("Volume() with friction or with matrices that are not symmetric needs a direct solver that "
-                             "exchanges rows, and this PETSc has none (MUMPS, SuperLU_DIST): take Condensed(), or with "
-                             "friction Iterative()")
-        own = {"pc_factor_mat_solver_type": found[0]}
+            raise InputError("Volume() with friction needs a direct solver that exchanges rows, and this PETSc has "
+                             "none (MUMPS, SuiteSparse or SuperLU): take Condensed() or Iterative()")
+        own["pc_factor_mat_solver_type"] = found[0]
+    else:
+        own["pc_factor_mat_ordering_type"] = "nd"
     log.info("Volume: %s of '%s' factorises, as this PETSc has no MUMPS", kind, own["pc_factor_mat_solver_type"])
-    if ranks == 1 or exchanges:
-        return {"ksp_type": "preonly", "pc_type": kind, **own}
-    inner = {"ksp_type": "preonly", "pc_type": kind, **own}
-    return {"ksp_type": "preonly", "pc_type": "redundant", **{f"redundant_{key}": one for key, one in inner.items()}}
+    if ranks == 1:
+        return own
+    return {"ksp_type": "preonly", "pc_type": "redundant", **{f"redundant_{key}": one for key, one in own.items()}}
 
 
 def check_reduced(snes: Any, layers: OptionLayers) -> None:
@@ -126,7 +127,7 @@ def _check_unsymmetric(snes: Any, layers: OptionLayers, wanted: str, what: str, 
     for kind, name, symmetric in (("pc", pc, ("cholesky", "icc")), ("ksp", ksp, TABLES["symmetric_ksp"])):
         if name in symmetric:
             refuse(f"{kind}_type {name} with {what}", f"{matrix} is not symmetric", "use lu with preonly")
-    if ksp == "preonly" and pc != "lu":
+    if ksp == "preonly" and pc not in ("lu", "redundant"):
         refuse(f"ksp_type preonly with pc_type {pc}", NOT_EXACT, "use lu or gmres")
     _check_line_search(layers)
 
