@@ -1,7 +1,7 @@
 """What is made once of a system, a surface or a problem: never that of another argument.
 
-Every case makes something, uses it, changes an argument by a public method, uses it again, and compares with objects that
-nobody has used."""
+Every case makes something, uses it, changes an argument by a public method, uses it again, and compares with objects
+that nobody has used."""
 
 from __future__ import annotations
 
@@ -64,6 +64,7 @@ def downwards(problem: vc.ContactProblem, size: float) -> vc.ContactProblem:
     return replace(problem, system=system.loaded(Load(force)))
 
 
+SHAKING = vc.Harmonic(amplitude=20.0, frequency=40.0, direction=(1.0, 0.0))
 Change = Callable[[vc.ContactProblem, Any], vc.ContactProblem]
 CHANGES: dict[str, Change] = {
     "loaded": lambda p, tags: downwards(p, 300.0),
@@ -82,7 +83,7 @@ CHANGES: dict[str, Change] = {
     "level plane": lambda p, tags: replace(p, surface=level(p.system, tags["bottom"])),
     "other facets": lambda p, tags: replace(p, surface=level(p.system, tags["right"])),
     "friction": lambda p, tags: replace(p, friction=vc.Coulomb(0.3)),
-    "excitation": lambda p, tags: replace(p, excitation=vc.Harmonic(amplitude=20.0, frequency=40.0, direction=(1.0, 0.0))),
+    "excitation": lambda p, tags: replace(p, excitation=SHAKING),
 }
 
 

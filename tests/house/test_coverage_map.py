@@ -25,7 +25,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "cli/test_fuzz_cli.py": "cli.errors",
     "cli/test_entry.py": "cli.options studies.cases.library",
     "cli/test_motion.py": "plots.records",
-    "core/test_contact_last.py": "core.compiled",
+    "core/test_contact_last.py": "core.compiled core.packages",
     "core/test_friction_certificate.py": "core.certificate core.protocols",
     "core/test_identity.py": "run.method",
     "core/test_step.py": "core.errors core.problem",

@@ -177,7 +177,7 @@ def test_gaps_slips_and_states_that_are_no_numbers():
         return lambda t: np.full(shape, NAN if t > 1e-3 else 0.0)
 
     moved = replace(surface, motion=late(surface.count))
-    with pytest.raises(StepFailure, match="the gap of step 3 at t = 0.0012 s contains NaN or infinite values everywhere"):
+    with pytest.raises(StepFailure, match="the gap of step 3 at t = 0.0012 s contains NaN or infinite .*everywhere"):
         steps(ContactProblem(system, moved))
     slid = replace(surface, slide=late(surface.tangents.shape))
     with pytest.raises(StepFailure, match="the slip of step 3 at t = 0.0012 s contains NaN"):
