@@ -99,7 +99,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "solvers/test_volume_friction.py": "solvers.friction.nsgs solvers.volume.friction solvers.volume.route",
     "solvers/test_volume_options.py":
         "solvers.volume.failures solvers.volume.friction_jacobian "
-        "solvers.volume.friction_system solvers.volume.options",
+        "solvers.volume.friction_system solvers.volume.options solvers.petsc",
     "solvers/test_volume_system.py": "solvers.volume.bounded_system solvers.volume.scaled_step",
     "studies/test_case.py":
         "cli.case studies.cases.parsing studies.cases.toml_file studies.cases.vocabulary",

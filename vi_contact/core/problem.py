@@ -14,7 +14,7 @@ from .errors import InputError
 from .protocols import EXCITATION, Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
 from .stages import stage
 from .surfaces import ContactSurface
-from .system import SemiDiscreteSystem
+from .system import Load, SemiDiscreteSystem
 
 
 @dataclass(frozen=True)
@@ -93,12 +93,12 @@ class ContactProblem:
         system, basis, dual = self.system, self.surface.basis, self.surface.dual
         if basis is None:
             return system
-        known: dict[Any, tuple[SemiDiscreteSystem, SemiDiscreteSystem]] = system.cached("turned", dict)
+        known: dict[Any, tuple[Load, SemiDiscreteSystem]] = system.cached("turned", dict)
         if (basis, dual) not in known:
             known.clear()  # it takes as much memory as the system
-            known[basis, dual] = system, system.in_basis(basis, dual)
-        of, turned = known[basis, dual]
-        if of.load is system.load:
+            known[basis, dual] = system.load, system.in_basis(basis, dual)
+        load, turned = known[basis, dual]
+        if load is system.load:
             return turned
         return turned.loaded(system.load.in_basis(basis))  # the matrices are shared with systems of other loads
 

@@ -11,10 +11,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from petsc4py import PETSc
-
 from ...core import packages
 from ...core.errors import InputError
+from ..petsc import PETSc
 from .failures import last_line
 
 log = logging.getLogger(__name__)

@@ -10,8 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol, cast
 
-from petsc4py import PETSc
-
 from ...core.algebra import EffectiveMatrix
 from ...core.checks import instance, provides, real, shown
 from ...core.errors import InputError, StepFailure
@@ -19,6 +17,7 @@ from ...core.problem import ContactProblem
 from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
 from ..certified import check_laws
+from ..petsc import PETSc
 from .bounded_system import BoundedSystem
 from .failures import raised
 from .friction import VolumeFriction
