@@ -25,7 +25,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "cli/test_fuzz_cli.py": "cli.errors",
     "cli/test_entry.py": "cli.options studies.cases.library",
     "cli/test_motion.py": "plots.records",
-    "core/test_contact_last.py": "core.compiled",
+    "core/test_contact_last.py": "core.compiled core.packages",
     "core/test_friction_certificate.py": "core.certificate core.protocols",
     "core/test_identity.py": "run.method",
     "core/test_step.py": "core.errors core.problem",
@@ -101,7 +101,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "solvers/test_volume_friction.py": "solvers.friction.nsgs solvers.volume.friction solvers.volume.route",
     "solvers/test_volume_options.py":
         "solvers.volume.failures solvers.volume.friction_jacobian "
-        "solvers.volume.friction_system solvers.volume.options",
+        "solvers.volume.friction_system solvers.volume.options solvers.petsc",
     "solvers/test_volume_system.py": "solvers.volume.bounded_system solvers.volume.scaled_step",
     "studies/test_case.py":
         "cli.case studies.cases.parsing studies.cases.toml_file studies.cases.vocabulary",

@@ -19,6 +19,7 @@ from .algebra import Array, Comm, Indices, Mask, Matrix, SerialComm, largest, on
 from .checks import function, number, shown
 from .contact_last import at
 from .errors import InputError
+from .products import frozen
 from .system import Companion
 
 log = logging.getLogger(__name__)
@@ -69,6 +70,13 @@ class ContactSurface:
     dual: Matrix | None = None
     nodes: Indices | None = None
     frictionless_corners: bool = False
+
+    def __post_init__(self) -> None:
+        """Keep copies that nobody can write to: what is made of them once stays true."""
+        for name in ("points", "normals", "weights", "gap0", "bilateral", "compliance", "owned", "slots", "tangents"):
+            value = getattr(self, name)
+            if isinstance(value, np.ndarray) and value.flags.writeable:
+                object.__setattr__(self, name, frozen(value.copy()))
 
     def __repr__(self) -> str:
         """Return how many conditions this rank has, and of which kind: not the arrays."""

@@ -50,6 +50,7 @@ def checked_method(owner: str, problem: ContactProblem, scheme: Scheme | None,
     method = Method(problem, scheme, [Automatic() if first is None else first, *others], dt, tolerance)
     size = step_plan(dt, steps, t_end, start_time(owner, state)).dt(0)
     method.bind()
+    problem.equations.forget_loads()
     scheme.check(problem)
     method.solvers[0].check(problem)
     if state is not None:

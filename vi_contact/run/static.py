@@ -22,7 +22,8 @@ from ..core.problem import ContactProblem
 from ..core.state_checks import check_problem_given, check_sizes, initial_state
 from ..core.step import Solver, State, StepProblem, StepResult
 from ..solvers.automatic import Automatic
-from ..solvers.certified import TOLERANCE, CertifiedSolver, refuse_nan
+from ..solvers.certified import TOLERANCE, CertifiedSolver
+from ..solvers.door import refuse_matrix, refuse_nan
 from .method import check_methods
 from .proximal import Proximal
 
@@ -55,6 +56,7 @@ class Equilibria:
         self._problem = problem
         self._K = EffectiveMatrix(system.K, system.algebra, space=system.space, inertia=(0.0, system.M))
         self._solve: Callable[[StepProblem], StepResult]
+        refuse_matrix(problem, self._K)
         if system.floating:
             self._solve = Proximal(problem, self._K, solver, tolerance).solve
         else:
@@ -67,7 +69,7 @@ class Equilibria:
         step = StepProblem(A=self._K, b=problem.static_load.load.at_rest(t), bound=problem.surface.gap(t), scale=1.0,
                            surface=problem.surface, guess=old.u, active=old.active, t=t, k=old.k,
                            friction=problem.friction, slip0=problem.slip_origin(old.u, old.t, t))
-        refuse_nan(step)
+        refuse_nan(step, lambda: problem.static_load)
         result = self._solve(step)
         return State(t, old.k, result.x, np.zeros_like(old.u), result.r_n, result.active, r_t=result.r_t)
 

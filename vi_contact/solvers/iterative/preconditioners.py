@@ -15,12 +15,12 @@ contact open; the interpolation is kept, Galerkin products are renewed when over
 from typing import Any
 
 import numpy as np
-from petsc4py import PETSc
 
 from ...core.algebra import Array, EffectiveMatrix, Indices, Mask
 from ...core.errors import InputError
 from ...core.surfaces import ContactSurface
 from ...laws.mass_transfer import rigid_motions
+from ..petsc import PETSc
 from ..volume.failures import last_line
 from ..volume.options import OptionLayers, Options
 from .layout import Layout, Nodewise

@@ -13,7 +13,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from petsc4py import PETSc
 
 from ...core.algebra import EffectiveMatrix
 from ...core.checks import attributes, check_word, instance, shown, whole
@@ -22,6 +21,7 @@ from ...core.problem import ContactProblem
 from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
 from ..certified import check_laws
+from ..petsc import PETSc
 from ..volume.failures import raised
 from ..volume.options import OptionLayers
 from .conjugate_gradients import SOLVED, WRONG_SIGNS, ConjugateGradients, stopped

@@ -4,19 +4,22 @@ Layers, the later wins: the method's defaults, ``petsc_options`` of the settings
 PETSC_OPTIONS). SNES VI reads its options again whenever the active set changes, so they stay in the database for
 as long as a solve runs and are taken out afterwards: two solvers with one prefix do not meet."""
 
+import logging
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from petsc4py import PETSc
-
+from ...core import packages
 from ...core.errors import InputError
+from ..petsc import PETSc
 from .failures import last_line
 
+log = logging.getLogger(__name__)
 Options = Mapping[str, object | None]
 DIRECT = ("lu", "cholesky")
+EXACT = (*DIRECT, "redundant")  # by one application
 
 
 class OptionLayers:
@@ -66,6 +69,31 @@ def refuse(combination: str, reason: str, remedy: str) -> None:
 NOT_EXACT = "one application of it does not solve the system"
 TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 REDUCED_PC = TABLES["reduced_pc"]
+EXCHANGE = {"umfpack": "suitesparse", "superlu": "superlu"}  # solvers that exchange rows, and their packages
+
+
+def direct(kind: str, ranks: int, *, exchanges: bool = False) -> Options:
+    """Return the options of a direct solver, "cholesky" or "lu", of what this PETSc was built with: MUMPS, or one of
+    one rank, of which every rank has a copy; the log says which where it is not MUMPS. SuperLU_DIST is never taken: it
+    ends the process where a row is zero.
+
+    ``exchanges``: whether rows have to be exchanged, as beside zeros on the diagonal, which PETSc's own does not do.
+    InputError where nothing else is there."""
+    if packages.petsc_has("mumps"):
+        return {**TABLES["mumps"], "pc_type": kind}
+    own = {"ksp_type": "preonly", "pc_type": kind, "pc_factor_mat_solver_type": "petsc"}
+    if exchanges:
+        found = [name for name, package in EXCHANGE.items() if packages.petsc_has(package)]
+        if not found:
+            raise InputError("Volume() with friction needs a direct solver that exchanges rows, and this PETSc has "
+                             "none (MUMPS, SuiteSparse or SuperLU): take Condensed() or Iterative()")
+        own["pc_factor_mat_solver_type"] = found[0]
+    else:
+        own["pc_factor_mat_ordering_type"] = "nd"
+    log.info("Volume: %s of '%s' factorises, as this PETSc has no MUMPS", kind, own["pc_factor_mat_solver_type"])
+    if ranks == 1:
+        return own
+    return {"ksp_type": "preonly", "pc_type": "redundant", **{f"redundant_{key}": one for key, one in own.items()}}
 
 
 def check_reduced(snes: Any, layers: OptionLayers) -> None:
@@ -74,7 +102,7 @@ def check_reduced(snes: Any, layers: OptionLayers) -> None:
     pc, ksp = snes.ksp.pc.getType(), snes.ksp.getType()
     if pc in REDUCED_PC:
         refuse(f"pc_type {pc} with vinewtonrsls", REDUCED_PC[pc], "use cholesky with MUMPS, hypre or bjacobi")
-    if ksp == "preonly" and pc not in DIRECT:
+    if ksp == "preonly" and pc not in EXACT:
         refuse(f"ksp_type preonly with pc_type {pc}", NOT_EXACT, "use ksp_type cg")
     _check_line_search(layers)
 
@@ -98,7 +126,7 @@ def _check_unsymmetric(snes: Any, layers: OptionLayers, wanted: str, what: str, 
     for kind, name, symmetric in (("pc", pc, ("cholesky", "icc")), ("ksp", ksp, TABLES["symmetric_ksp"])):
         if name in symmetric:
             refuse(f"{kind}_type {name} with {what}", f"{matrix} is not symmetric", "use lu with preonly")
-    if ksp == "preonly" and pc != "lu":
+    if ksp == "preonly" and pc not in ("lu", "redundant"):
         refuse(f"ksp_type preonly with pc_type {pc}", NOT_EXACT, "use lu or gmres")
     _check_line_search(layers)
 

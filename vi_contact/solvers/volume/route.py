@@ -10,8 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol, cast
 
-from petsc4py import PETSc
-
 from ...core.algebra import EffectiveMatrix
 from ...core.checks import instance, provides, real, shown
 from ...core.errors import InputError, StepFailure
@@ -19,11 +17,12 @@ from ...core.problem import ContactProblem
 from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
 from ..certified import check_laws
+from ..petsc import PETSc
 from .bounded_system import BoundedSystem
 from .failures import raised
 from .friction import VolumeFriction
 from .friction_system import FrictionSystem, ScaledFrictionStep
-from .options import OptionLayers, Options
+from .options import OptionLayers, Options, direct
 from .scaled_step import ScaledStep
 from .snes import ReducedNewton, SemismoothNewton, SnesDriver
 from .tao import TaoDriver, TaoTron
@@ -87,8 +86,9 @@ class PreparedVolume:
         self._system = BoundedSystem(A, surface, scale)
         PETSc.garbage_cleanup(self._system.comm)
         self._settings, self._method = settings, settings.method
-        own = settings.method.defaults(surface.comm.size)
-        self._layers = self._layered(own if self._system.symmetric else {**own, "pc_type": "lu"})
+        ranks = surface.comm.size
+        own = settings.method.defaults(ranks)
+        self._layers = self._layered(own if self._system.symmetric else {**own, **direct("lu", ranks)})
         self._scaled = ScaledStep(self._system, settings.tolerance)
         self._name = f"Volume({type(settings.method).__name__})"
         self._friction: VolumeFriction | None = None
@@ -103,7 +103,8 @@ class PreparedVolume:
             self.close()
             method, tolerance = cast(ReducedNewton, self._method), self._settings.tolerance
             scaled = ScaledFrictionStep(FrictionSystem(self._system), tolerance)
-            self._driver = method.friction_driver(scaled, self._layered(method.friction_defaults()))
+            defaults = method.friction_defaults(self._system.comm.size)
+            self._driver = method.friction_driver(scaled, self._layered(defaults))
             self._friction = VolumeFriction(scaled, self._driver, self._name)
         return self._friction
 

@@ -7,10 +7,10 @@ any system of units and scaling loses no digit: a bound stays exactly a bound.""
 from typing import Any
 
 import numpy as np
-from petsc4py import PETSc
 
 from ...core.algebra import Array, Mask, max_abs, total
 from ...core.step import StepProblem
+from ..petsc import PETSc
 from .bounded_system import BoundedSystem
 from .failures import NOT_A_NUMBER, stopped
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from petsc4py import PETSc
 
 from ...core.algebra import Array
+from ..petsc import PETSc
 from .options import REDUCED_PC, TABLES, OptionLayers, Options, refuse
 from .scaled_step import ScaledStep
 from .snes import AssembledJacobian, weakly, write_bounds
