@@ -11,12 +11,23 @@ from dolfinx.mesh import Mesh
 
 from ..core.checks import check_word, flag, instance, optional, provides, refuse, several, shown
 from ..core.errors import InputError
-from ..laws.materials import Damping, LinearElastic, NoDamping, PlaneStrain, PlaneStress, Rayleigh, Section, Solid
+from ..laws.materials import (
+    BLIND_TO_RATIOS,
+    Damping,
+    DampingRatio,
+    LinearElastic,
+    NoDamping,
+    PlaneStrain,
+    PlaneStress,
+    Rayleigh,
+    Section,
+    Solid,
+)
 from . import compat
 from .communicators import MpiComm
 from .dashpots import Dashpots
 from .form_checks import refuse_complex
-from .forms import KINDS
+from .forms import KINDS, ElasticForms
 from .groups import cells_of, facets_of, field_given
 from .linear_forms import LOADS
 from .loads import Prescribed
@@ -69,6 +80,36 @@ def check_body(mesh: Any, material: Any, forms: Any, section: Any, damping: Any,
     if forms is None and degree == 1 and thick and integration == "full" and mesh.comm.rank == 0:
         _tell_locking([one for one in found if isinstance(one, LinearElastic)])
     return section, damping
+
+
+def check_ratios(body: ElasticForms, of_materials: bool) -> None:
+    """Raise InputError, on all ranks, for a damping law that damps nothing, and for damping ratios that no law reads.
+
+    body: the forms of a body, with its dashpots; of_materials: whether its stiffness and mass are those of materials,
+    and not the user's own forms."""
+    law, ratio = body.damping, body.largest_ratio
+    if isinstance(law, DampingRatio) and not any(callable(one.xi) or one.xi for _, one in body.materials):
+        raise InputError(f"assemble: {law} damps by the ratios xi of the materials, and none of them has one; give "
+                         "LinearElastic(…, xi=0.05), or another law, such as Rayleigh(alpha, beta)")
+    rayleigh = isinstance(law, Rayleigh) and (law.alpha > 0.0 or law.beta > 0.0)
+    damps = body.damped if of_materials else rayleigh or body.viscous is not None
+    if not isinstance(law, NoDamping | DampingRatio) and not damps:
+        raise InputError(f"assemble: {law} damps nothing, as its coefficients are zero; give coefficients above zero, "
+                         "or leave damping out")
+    if ratio and isinstance(law, BLIND_TO_RATIOS):
+        raise InputError(f"assemble: a material has the damping ratio xi = {ratio:g}, which {law} does not read; give "
+                         "damping=DampingRatio(frequency), or leave xi out")
+    _refuse_ratio_behind(body)
+
+
+def _refuse_ratio_behind(body: ElasticForms) -> None:
+    """Raise InputError for a ratio of a material that only dashpots have: they have no damping but their own."""
+    inside = [one for _, one in body.materials]
+    for boundary in body.boundaries:
+        behind = boundary.material
+        if behind is not None and behind.xi and behind not in inside:
+            raise InputError(f"assemble: the material of {type(boundary).__name__} on '{boundary.facets.name}' has the "
+                             f"damping ratio xi = {behind.xi:g}, and dashpots read none; leave xi out there")
 
 
 def _refuse_lonely_nodes(mesh: Mesh) -> None:

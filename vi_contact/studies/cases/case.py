@@ -43,7 +43,7 @@ from .own_classes import packages
 from .parsing import Words, arguments, nearest, read
 from .stage_tables import Stage, split
 from .stages import Reached, run_stages
-from .strain_compatible import CALL, iterate
+from .strain_compatible import CALL, iterate, with_known_damping
 from .table_calls import Call, Callee, Group, Node, Spot, build, callee, needs_body, nodes_in
 from .toml_file import read_toml, with_settings
 from .vocabulary import MeshFile, Parts, weight, words
@@ -212,7 +212,8 @@ class Case:
         mesh, tags = self.meshed(comm)
         early = "excitation" not in self.nodes or not needs_body(self.nodes["excitation"])  # else they need the system
         shaking = {"excitations": self.excitations()} if early else {}
-        system = self._made("system", mesh=mesh, tags=tags, **shaking)
+        body = with_known_damping(self.nodes["system"]) if "strain_compatible" in self.nodes else self.nodes["system"]
+        system = build(body, {"mesh": mesh, "tags": tags, **shaking})
         system = self._made("gravity", system=system, tags=tags) if "gravity" in self.nodes else system
         none = empty_surface(system.algebra.comm, system.space.dimension)
         surfaces = self._several("contact", system=system, tags=tags) or (none,)
