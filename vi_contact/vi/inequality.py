@@ -173,6 +173,8 @@ def solve_linear(settings: Volume, methods: Sequence[Method], A: PetscMatrix, b:
     step = StepProblem(matrix, b, upper, surface, 1.0, start, none, 0.0, 0, lower=lower)
     for method in methods:
         solver = replace(settings, method=method).prepare(matrix, surface, 1.0)
+        if tried:
+            solver.excuse_options()  # they were for the method before
         try:
             found = solver.solve(step)
             return np.clip(found.x, lower, upper), found.iterations, type(method).__name__
