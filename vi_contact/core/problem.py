@@ -3,11 +3,12 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 
-from .algebra import Array
+from .algebra import Array, largest
 from .checks import array, instance, optional, provides, refuse, shown
 from .corners import refuse_rubbing
 from .errors import InputError
@@ -161,6 +162,24 @@ def check_parts(problem: Any) -> None:
     refuse((*_of_system(system), *_of_surface(surface, system, surface.total)), surface.comm)
     if problem.frictional:
         refuse_rubbing(surface)
+    _refuse_vain(problem)
+
+
+def _refuse_vain(problem: Any) -> None:
+    """Raise InputError, on all ranks, for laws of contact that act on nothing, and what shakes twice. Collective."""
+    surface = problem.surface
+    laws = {"friction": problem.friction if problem.frictional else None, "impact": problem.impact}
+    for name, law in ((name, law) for name, law in laws.items() if law is not None):
+        if not surface.total:
+            raise InputError(f"ContactProblem: {name}={shown(law)} has no effect, as the surface has no contact "
+                             "conditions: leave it out, or give a surface that has some")
+    if problem.impact is not None and not largest(surface.comm, bool(np.any(surface.rigid))):
+        raise InputError(f"ContactProblem: impact={shown(problem.impact)} has no effect, as all conditions are on springs, "
+                         "which do not collide: leave it out")
+    for one, other in combinations(problem.excitations, 2):
+        if one is other:
+            raise InputError(f"ContactProblem: excitation names {shown(one)} twice, which would shake twice: leave it out "
+                             "once, or scale it")
 
 
 def _check_excitation(excitation: Any, system: SemiDiscreteSystem) -> None:

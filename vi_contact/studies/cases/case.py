@@ -182,7 +182,8 @@ class Case:
         if "strain_compatible" in self.nodes:
             raise InputError(f"{self.path}: [strain_compatible] is for single runs: leave it out of stages and studies")
         problem = self._problem(parts)
-        own = {name: value for name, value in self._timed(parts).items() if name != "out"}
+        vain = ("out",) if folder is not None else ("out", "checkpoint_every")
+        own = {name: value for name, value in self._timed(parts).items() if name not in vain}
         solver = self._made("solver")
         if state is None and parts.weighted:
             from ...run.static import static_equilibrium  # late: other runs need none of it
@@ -237,8 +238,10 @@ class Case:
         return mesh, tags
 
     def _problem(self, parts: Parts) -> ContactProblem:
-        return ContactProblem(parts.system, parts.surface, friction=self._made("friction") or Frictionless(),
-                              impact=self._made("impact"), mass=self._made("mass"),
+        touches = parts.surface.total > 0  # a setting may take the contact away, and leave the laws of the file
+        return ContactProblem(parts.system, parts.surface,
+                              friction=(self._made("friction") if touches else None) or Frictionless(),
+                              impact=self._made("impact") if touches else None, mass=self._made("mass"),
                               excitation=() if parts.moved else self.excitations(system=parts.system))
 
     def _duration(self, parts: Parts) -> float:

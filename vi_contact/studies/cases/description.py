@@ -21,6 +21,7 @@ from ...ground_motion.excitation import GroundMotion
 from ...ground_motion.record import Record
 from ...run.files.folder import MODEL
 from .table_calls import Call, Group, build, nodes_in
+from .unread_choices import left_over
 from .vocabulary import Parts
 
 ELEMENTS = 8.0  # of first order in a wave length: Kuhlemeyer and Lysmer (1973); the cautious take 10
@@ -63,7 +64,7 @@ def describe(case: Any, comm: Any, parts: Parts | None = None, *, most: int = 50
         "records": _records(case, parts.system),
         "run": run, "outline": outline(space, tags, [cells for cells, _ in space.forms.materials]),
     } | _modes(case, problem, most)
-    model |= {"defects": list(_defects(model)), "warnings": list(_warnings(model))}
+    model |= {"defects": list(_defects(model)), "warnings": [*_warnings(model), *left_over(case.path, case.tables)]}
     return dict(json.loads(to_json(model), parse_float=lambda text: float(f"{float(text):.{DIGITS}g}")))
 
 

@@ -53,6 +53,15 @@ def findings(path: Path, tables: Mapping[str, Any], parts: Sequence[Part]) -> It
         yield from _replaced(path, tables)
 
 
+def left_over(path: Path, tables: Mapping[str, Any]) -> Iterator[str]:
+    """Yield a sentence for each table that waits for a motion in a case of static stages. These are no mistake, as one
+    looks at the weight alone before the motion is added, but they are told."""
+    stages = tables.get("stage", ())
+    if stages and all(one.get("type") == "static" for one in stages):
+        for key in (one for one in OF_MOTION if one in tables):
+            yield f"[{key}] of {path} is for motions and is not read, as every [[stage]] is static"
+
+
 def refuse_unread(found: Sequence[tuple[str, str]], before: Sequence[tuple[str, str]] | None,
                   settings: Sequence[str]) -> None:
     """Raise InputError with the first finding. ``before``: those of the file without its settings, None where there are
@@ -170,24 +179,16 @@ def _replaced(path: Path, tables: Mapping[str, Any]) -> Iterator[tuple[str, str]
     """Tables and keys of the case that no stage takes over."""
     stages = tables["stage"]
     moving = [one for one in stages if one.get("type") == "dynamic"]
-    if not moving:
-        for key in (*OF_MOTION, *(f"run.{one}" for one in ("dt", "steps", "t_end"))):
-            table, _, inside = key.partition(".")
-            if table in tables and (not inside or inside in tables[table]):
-                yield (key, f"{path}: [{table}]{f' {inside}' if inside else ''} is for motions, and every [[stage]] is "
-                       "static: leave it out, or add a dynamic stage")
     for key in (one for one in WHOLE if one in tables):
         readers = moving if key in OF_MOTION else stages
-        if readers and all(key in one for one in readers):
+        if readers and all(one.get(key) for one in readers):  # excitation = [] takes it away, which is said
             yield (key, f"{path}: [{key}] is read by no stage, as every [[stage]] that could read it has its own: leave "
                    "it out there or here")
-    for table in ("system", "run"):
-        own = tables.get(table)
-        for key in own if isinstance(own, Mapping) else ():
-            readers = stages if table == "system" else moving
-            if key != "out" and readers and all(key in one.get(table, {}) for one in readers):
-                yield (f"{table}.{key}", f"{path}: [{table}] {key} is read by no stage, as every [[stage]] has its own: "
-                       "leave it out there or here")
+    own = tables.get("system")
+    for key in own if isinstance(own, Mapping) else ():
+        if all(key in one.get("system", {}) for one in stages):
+            yield (f"system.{key}", f"{path}: [system] {key} is read by no stage, as every [[stage]] has its own: leave "
+                   "it out there or here")
     for before, one in zip(stages, stages[1:], strict=False):
         held = [{key: {**tables.get("system", {}), **stage.get("system", {})}.get(key) for key in SUPPORTS}
                 for stage in (before, one)]

@@ -1,0 +1,301 @@
+"""Choices without effect: each is refused in one sentence with its table and a remedy that works, and every key of the
+laws and materials of case files changes the model, or is refused."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("dolfinx")
+
+from mpi4py import MPI
+
+import vi_contact as vc
+from vi_contact import fem
+from vi_contact.cli.entry import main
+from vi_contact.core.errors import InputError
+from vi_contact.core.surfaces import empty_surface
+from vi_contact.meshes.block import BlockMesh
+from vi_contact.studies import read_case
+from vi_contact.studies.cases.description import describe
+from vi_contact.studies.cases.vocabulary import _choices as choices
+
+COMM = MPI.COMM_WORLD
+CASE = """
+[mesh]
+type = "TwoBlocks"
+lower = {lengths = [3.0, 1.0], divisions = [3, 1]}
+upper = {lengths = [1.0, 1.0], divisions = [1, 1]}
+offset = [1.0]
+[material.lower]
+E = 1e8
+nu = 0.2
+rho = 2000.0
+[material.upper]
+E = 1e8
+nu = 0.2
+rho = 2000.0
+[system]
+clamped = "lower_bottom"
+[[contact]]
+type = "contact_pair"
+facets1 = "upper_bottom"
+facets2 = "lower_top"
+[run]
+dt = 1e-3
+steps = 2
+"""
+RUBS = '[friction]\ntype = "Coulomb"\nmu = 0.5\n'
+STRIKES = '[impact]\ntype = "Inelastic"\n[scheme]\ntype = "ZienkiewiczWoodTaylor"\n'
+SHAKES = '[[excitation]]\ntype = "Ricker"\namplitude = 3.0\nfrequency = 4.0\n'
+WEIGHS = '[[system.loads]]\ntype = "BodyForce"\nvalue = [0.0, -19620.0]\n'
+STATIC = '[[stage]]\nname = "rest"\ntype = "static"\n'
+MOVES = '[[stage]]\nname = "motion"\ntype = "dynamic"\n'
+ALONE = re.sub(r"\[\[contact\]\](.*?)\[run\]", "[run]", CASE, flags=re.DOTALL)
+SPRINGS = CASE.replace('type = "contact_pair"\nfacets1 = "upper_bottom"\nfacets2 = "lower_top"',
+                       'facets = "upper_top"\nsprings = 1e9\nobstacle = {type = "HalfSpace", point = [0.0, 2.0], '
+                       'normal = [0.0, -1.0]}')
+
+
+def added(table: str, line: str, text: str = CASE) -> str:
+    """The case with a line more in a table."""
+    return text.replace(f"[{table}]\n", f"[{table}]\n{line}\n", 1)
+
+
+# name -> (a case, what its sentence says after the file's name, the same case with the remedy of the sentence)
+VAIN: dict[str, tuple[str, str, str]] = {
+    "law without ratios": (
+        added("system", 'damping = {type = "DampingRatio", frequency = 5.0}'),
+        ": [system.damping] DampingRatio damps by the ratios of the materials, and none has one: give [material.lower] "
+        "xi = 0.05, or another type of damping",
+        added("system", 'damping = {type = "DampingRatio", frequency = 5.0}', added("material.lower", "xi = 0.05"))),
+    "ratios without law": (
+        added("material.upper", 'xi = "3 %"'),
+        ': [material.upper] has xi, which no damping reads here: give [system] damping = {type = "DampingRatio", frequency '
+        "= …} with a frequency in Hz, or leave xi out",
+        added("material.upper", 'xi = "3 %"', added("system", 'damping = {type = "DampingRatio", frequency = 5.0}'))),
+    "ratios under another law": (
+        added("material.upper", "xi = 0.03", added("system", 'damping = {type = "Rayleigh", alpha = 1.0, beta = 0.0}')),
+        ": [material.upper] has xi, which no damping reads here",
+        added("system", 'damping = {type = "Rayleigh", alpha = 1.0, beta = 0.0}')),
+    "law of zeros": (
+        added("system", 'damping = {type = "Rayleigh", alpha = 0.0, beta = 0.0}'),
+        ": [system] assemble: Rayleigh(alpha=0.0, beta=0.0) damps nothing, as its coefficients are zero", CASE),
+    "material of nothing": (
+        added("system", 'material = [["lower", "lower"], ["upper", "lower"]]'),
+        ": [material.upper] is of nothing, as [system] does not name it: give its cell group in [system] material", CASE),
+    "material of no group": (
+        CASE + "[material.spare]\nE = 1e8\nnu = 0.2\nrho = 2000.0\n", ": [system] material[3][1] is 'spare', but the", CASE),
+    "friction of nothing": (
+        ALONE + RUBS, ": [friction] has no effect, as nothing rubs without [[contact]]", CASE + RUBS),
+    "impact of nothing": (
+        ALONE + STRIKES, ": [impact] has no effect, as nothing strikes without [[contact]]", CASE + STRIKES),
+    "mass of nothing": (
+        ALONE + '[mass]\ntype = "Redistributed"\n', ": [mass] has no effect, as nothing touches without [[contact]]",
+        CASE + '[mass]\ntype = "Redistributed"\n'),
+    "impact on springs": (
+        SPRINGS + STRIKES, ": [impact] has no effect, as every [[contact]] has springs, which do not collide",
+        SPRINGS + '[scheme]\ntype = "ZienkiewiczWoodTaylor"\n'),
+    "impact without mass": (
+        CASE + '[impact]\ntype = "Inelastic"\n[scheme]\ntype = "Trapezoidal"\n', "the impact law Inelastic", CASE + STRIKES),
+    "method with friction": (
+        CASE + RUBS + '[solver]\ntype = "Condensed"\nmethod = {type = "Hildreth"}\n',
+        ": [solver] method is for contact without friction, and [friction] is given: give friction_method in its place",
+        CASE + RUBS + '[solver]\ntype = "Condensed"\nfriction_method = {type = "NSGS"}\n'),
+    "method without friction": (
+        CASE + '[solver]\ntype = "Condensed"\nfriction_method = {type = "NSGS"}\n',
+        ": [solver] friction_method is for contact with friction, and there is no [friction]",
+        CASE + RUBS + '[solver]\ntype = "Condensed"\nfriction_method = {type = "NSGS"}\n'),
+    "rates without rates": (
+        CASE + RUBS + '[solver]\ntype = "Condensed"\nrates = {type = "RateIteration"}\n',
+        ": [solver] rates is for friction that depends on the slip rate, and Coulomb does not", CASE + RUBS),
+    "mu of another law": (
+        CASE + '[friction]\ntype = "Tresca"\nthreshold = 1e4\nmu = 0.5\n', "has the unknown key 'mu' for Tresca", CASE + RUBS),
+    "the same solver again": (
+        CASE + '[solver]\ntype = "Condensed"\n[[escalation]]\ntype = "Condensed"\n',
+        ": [[escalation]] names Condensed with the same keys as the solver before it, which has failed by then",
+        CASE + '[solver]\ntype = "Condensed"\n[[escalation]]\ntype = "Volume"\n'),
+    "options of another solver": (
+        CASE + '[gravity]\n[solver]\ntype = "Volume"\npetsc_options = {pc_typ = "lu"}\n',
+        "nothing reads 'pc_typ' of petsc_options: did you mean 'pc_type'?",
+        CASE + '[gravity]\n[solver]\ntype = "Volume"\npetsc_options = {pc_type = "lu"}\n'),
+    "weight and body force": (
+        CASE + WEIGHS + "[gravity]\n", ": [gravity] with_weight: the system has this weight already among its constant "
+        "loads, as a BodyForce or from an earlier with_weight, and would weigh twice as much; leave one of the two out",
+        CASE + "[gravity]\n"),
+    "weight of nothing": (
+        CASE + "[gravity]\nacceleration = 0.0\n", ": [gravity] with_weight: no unknown feels the weight",
+        CASE + "[gravity]\nacceleration = 9.0\n"),
+    "weight of what is held": (
+        added("system", 'prescribed = [{facets = "lower_left"}, {facets = "lower_right"}, {facets = "lower_top"}]', ALONE)
+        + '[gravity]\ncells = "lower"\n', "no unknown feels the weight", CASE + '[gravity]\ncells = "upper"\n'),
+    "a load twice": (
+        CASE + 2 * WEIGHS, ": [[system.loads]] has two tables that are alike, word for word: leave one of them out",
+        CASE + WEIGHS),
+    "an excitation twice": (
+        CASE + 2 * SHAKES, ": [[excitation]] has two tables that are alike, word for word: leave one of them out",
+        CASE + SHAKES),
+    "velocity before rest": (
+        added("system", "initial_velocity = [0.0, 1.0]") + "[gravity]\n",
+        ": [system] initial_velocity is lost, as [gravity] lets the body begin at rest, in equilibrium",
+        added("system", "initial_velocity = [0.0, 1.0]")),
+    "base without motion": (
+        added("system", "base_inertia = false"), ": [system] base_inertia is about the inertia load of a ground motion",
+        added("system", "base_inertia = false") + SHAKES),
+    "table of no stage": (
+        CASE + "[gravity]\n" + STATIC + "gravity = {acceleration = 9.0}\n" + MOVES + "gravity = {acceleration = 9.0}\n",
+        ": [gravity] is read by no stage, as every [[stage]] that could read it has its own",
+        CASE + STATIC + "gravity = {acceleration = 9.0}\n" + MOVES + "gravity = {acceleration = 9.0}\n"),
+    "key of no stage": (
+        CASE + "[gravity]\n" + STATIC + 'system = {clamped = "lower_bottom"}\n' + MOVES
+        + 'system = {clamped = "lower_bottom"}\n',
+        ": [system] clamped is read by no stage, as every [[stage]] has its own", CASE + "[gravity]\n" + STATIC + MOVES),
+    "start of a later stage": (
+        CASE + "[gravity]\n" + STATIC + MOVES + "system = {initial_velocity = [0.0, 1.0]}\n",
+        "system has initial_velocity, and a stage begins where the stage before has left the body",
+        CASE + "[gravity]\n" + STATIC + MOVES),
+    "release of nothing": (
+        CASE + "[gravity]\n" + STATIC + MOVES + "release = true\n",
+        ": [[stage]] 'motion' has release = true, and the supports of the stage before it", CASE + "[gravity]\n" + STATIC
+        + MOVES),
+    "section of another dimension": (
+        added("system", 'section = {type = "Solid"}'), ": [system] assemble: Solid() is for a body in space and this one is "
+        "plane", added("system", 'section = {type = "PlaneStress", thickness = 2.0}')),
+    "thickness in space": (
+        added("system", 'section = {type = "PlaneStress", thickness = 2.0}', CASE.replace("[3.0, 1.0]", "[3.0, 1.0, 1.0]")
+              .replace("[3, 1]", "[3, 1, 1]").replace("[1.0, 1.0]", "[1.0, 1.0, 1.0]").replace("[1, 1]", "[1, 1, 1]")),
+        "is a section of a plane body and this one has three dimensions", CASE),
+}
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "case.toml"
+    if COMM.rank == 0:
+        path.write_text(text, encoding="utf-8")
+    COMM.Barrier()
+    return path
+
+
+@pytest.mark.parametrize("name", VAIN)
+def test_a_choice_in_vain_is_refused(shared_tmp: Path, name: str) -> None:
+    """In a sentence with table and remedy; the case with the remedy runs."""
+    text, words, better = VAIN[name]
+    with pytest.raises(InputError) as caught:
+        read_case(written(shared_tmp, text)).run(COMM, progress=False)
+    assert words in str(caught.value) and "\n" not in str(caught.value)
+    (shared_tmp / "better").mkdir(exist_ok=True)
+    solution = read_case(written(shared_tmp / "better", better)).run(COMM, progress=False)
+    assert solution.facts["status"] == "finished"
+
+
+@pytest.mark.serial
+def test_the_case_itself_runs(tmp_path: Path) -> None:
+    """What all of these begin with is in order, and so are the commands that check it."""
+    assert read_case(written(tmp_path, CASE)).run(COMM, progress=False).facts["status"] == "finished"
+    path = str(written(tmp_path, CASE))
+    assert main(["run", path, "--check", "--quiet", "--out", str(tmp_path / "out")]) == 0
+
+
+@pytest.mark.serial
+def test_settings_may_leave_laws_of_the_file_behind(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """``--set contact=`` asks for the body without contact; a law that is set beside it is in vain."""
+    path = str(written(tmp_path, CASE + RUBS + STRIKES))
+    assert main(["run", path, "--quiet", "--out", str(tmp_path / "out"), "--set", "contact="]) == 0
+    capsys.readouterr()
+    command = ["run", path, "--quiet", "--out", str(tmp_path / "out"), "--set", "contact=", "--set", "friction.mu=0.3"]
+    assert main(command) == 1
+    assert "[friction] has no effect, as nothing rubs without [[contact]]" in capsys.readouterr().err
+    for option in (["--restart"], ["--restart-changed"], ["--wall-time", "10:00"]):
+        assert main(["run", path, "--check", "--quiet", "--out", str(tmp_path / "out"), *option]) == 1
+        assert f"{option[0]} has no effect with --check, which computes no step" in capsys.readouterr().err
+
+
+def test_motions_of_static_stages_are_told(shared_tmp: Path) -> None:
+    """The weight alone is looked at before the motion is added: a warning of ``run --check``, and no refusal."""
+    text = CASE + RUBS + SHAKES + "[gravity]\n" + STATIC
+    model = describe(read_case(written(shared_tmp, text)), COMM)
+    (said,) = [one for one in model["warnings"] if "static" in one]
+    assert said.startswith("[excitation] of ") and said.endswith("is not read, as every [[stage]] is static")
+
+
+# The same in Python ---------------------------------------------------------------------------------------------------
+MATERIAL = vc.LinearElastic(E=1e8, nu=0.2, rho=2000.0)
+
+
+def block() -> tuple[Any, Any]:
+    return fem.build_mesh(BlockMesh(lengths=(2.0, 1.0), divisions=(4, 2)), COMM)
+
+
+def assembled(**options: Any) -> Any:
+    mesh, tags = block()
+    given = {name: one(mesh, tags) if callable(one) else one for name, one in options.items()}
+    return fem.assemble(mesh, MATERIAL, **{"clamped": tags["left"]} | given)
+
+
+def none(mesh: Any) -> Any:
+    """A boundary group without facets."""
+    return fem.Facets("none", np.zeros(0, dtype=np.int32), mesh)
+
+
+def shaken_twice() -> Any:
+    system, wave = assembled(), vc.Ricker(1.0, 4.0)
+    return vc.ContactProblem(system, empty_surface(system.algebra.comm, 2), excitation=[wave, wave])
+
+
+def on_springs() -> Any:
+    mesh, tags = block()
+    system = fem.assemble(mesh, MATERIAL, clamped=tags["left"])
+    surface = fem.contact_surface(system, tags["right"], obstacle=vc.HalfSpace((2.0, 0.0), (-1.0, 0.0))).on_springs(1e9)
+    return vc.ContactProblem(system, surface, impact=vc.Inelastic())
+
+
+def without_contact(**laws: Any) -> Any:
+    system = assembled()
+    return vc.ContactProblem(system, empty_surface(system.algebra.comm, 2), **laws)
+
+
+def two_loads(mesh: Any, tags: Any) -> Any:
+    return 2 * [fem.BodyForce((1.0, 0.0))]
+
+
+PYTHON = {
+    "weight twice": (lambda: vc.with_weight(vc.with_weight(assembled())), "the system has this weight already"),
+    "weight by 9.81": (lambda: vc.with_weight(assembled(loads=fem.BodyForce((0.0, -2000.0 * 9.81)))), "weight already"),
+    "no weight": (lambda: vc.with_weight(assembled(), acceleration=0.0), "no unknown feels the weight"),
+    "a load twice": (lambda: assembled(loads=two_loads), "loads names one BodyForce twice, which would act twice"),
+    "a motion twice": (shaken_twice, "excitation names .* twice, which would shake twice"),
+    "nothing clamped": (lambda: assembled(clamped=lambda mesh, _: none(mesh)), "'none' of clamped has no facets"),
+    "nothing loaded": (lambda: assembled(loads=lambda mesh, _: fem.Traction(none(mesh), (1.0, 0.0))),
+                       "'none' of loads has no facets"),
+    "nothing prescribed": (lambda: assembled(prescribed=lambda mesh, _: fem.Prescribed(none(mesh))),
+                           "'none' of prescribed has no facets"),
+    "solid in the plane": (lambda: assembled(section=vc.Solid()), r"Solid\(\) is for a body in space"),
+    "friction of nothing": (lambda: without_contact(friction=vc.Coulomb(0.5)), r"friction=Coulomb\(mu=0.5\) has no effect"),
+    "impact of nothing": (lambda: without_contact(impact=vc.Inelastic()), "impact=.* has no effect"),
+    "impact on springs": (on_springs, "impact=.* has no effect, as all conditions are on springs"),
+    "changed without restart": (lambda: vc.simulate(without_contact(), dt=0.1, steps=1, changed=True),
+                                "changed=True is for a run that is continued"),
+    "checkpoints of nothing": (lambda: vc.simulate(without_contact(), dt=0.1, steps=1, checkpoint_every=5),
+                               "checkpoint_every needs a folder"),
+}
+
+
+@pytest.mark.parametrize("name", PYTHON)
+def test_a_choice_in_vain_is_refused_in_python(name: str) -> None:
+    make, words = PYTHON[name]
+    with pytest.raises(InputError, match=words):
+        make()
+
+
+def test_weights_that_add_up_are_taken() -> None:
+    """Along another direction, of other bodies, buoyancy against it, and a load of another size."""
+    system = vc.with_weight(assembled(loads=fem.BodyForce((0.0, 1000.0 * 9.80665))))
+    pushed = vc.with_weight(system, acceleration=3.0, direction=(1.0, 0.0))
+    plain = vc.with_weight(assembled(loads=fem.BodyForce((0.0, -0.5 * 2000.0 * 9.80665))))
+    totals = [COMM.allreduce(float(one.load.constant @ one.influence[:, 1]), MPI.SUM) for one in (pushed, plain)]
+    assert totals[1] == pytest.approx(3.0 * totals[0], rel=0.2)  # 1.5 and 0.5 times the weight, less at the clamped side
