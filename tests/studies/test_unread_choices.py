@@ -4,7 +4,6 @@ laws and materials of case files changes the model, or is refused."""
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ from vi_contact.core.surfaces import empty_surface
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.studies import read_case
 from vi_contact.studies.cases.description import describe
+from vi_contact.studies.cases.toml_file import toml_value
 from vi_contact.studies.cases.vocabulary import _choices as choices
 
 COMM = MPI.COMM_WORLD
@@ -299,3 +299,197 @@ def test_weights_that_add_up_are_taken() -> None:
     plain = vc.with_weight(assembled(loads=fem.BodyForce((0.0, -0.5 * 2000.0 * 9.80665))))
     totals = [COMM.allreduce(float(one.load.constant @ one.influence[:, 1]), MPI.SUM) for one in (pushed, plain)]
     assert totals[1] == pytest.approx(3.0 * totals[0], rel=0.2)  # 1.5 and 0.5 times the weight, less at the clamped side
+
+
+# Every key of the laws changes the model ------------------------------------------------------------------------------
+# A block that flies at another one and slides on it: small, and every law that it may have does something.
+FLIGHT: dict[str, Any] = {
+    "mesh": {"type": "TwoBlocks", "lower": {"lengths": [3.0, 1.0], "divisions": [9, 3]},
+             "upper": {"lengths": [1.0, 1.0], "divisions": [3, 3]}, "offset": [1.0], "gap": 2e-3},
+    "material": {"lower": {"E": 1e8, "nu": 0.2, "rho": 2000.0}, "upper": {"E": 1e8, "nu": 0.2, "rho": 2000.0}},
+    "system": {"clamped": "lower_bottom", "initial_velocity": [1.0, -1.0]},
+    "contact": {"type": "contact_pair", "facets1": "upper_bottom", "facets2": "lower_top"},
+    "run": {"dt": 1e-3, "steps": 10},
+    "record": [{"type": "Energy"}, {"type": "Contact"}, {"type": "Probe", "points": {"top": [1.0, 2.002]}}],
+}
+SPACE = {"mesh": {"type": "TwoBlocks", "lower": {"lengths": [3.0, 1.0, 1.0], "divisions": [6, 2, 2]},
+                  "upper": {"lengths": [1.0, 1.0, 1.0], "divisions": [2, 2, 2]}, "offset": [1.0, 0.0], "gap": 2e-3},
+         "system.initial_velocity": [1.0, -1.0, 0.3],
+         "contact": {"type": "contact_pair", "facets1": "upper_bottom", "facets2": "lower_top"},
+         "scheme": {"type": "ZienkiewiczWoodTaylor"},
+         "record": [{"type": "Energy"}, {"type": "Contact"}, {"type": "Probe", "points": {"top": [1.0, 2.002, 0.0]}}]}
+RATIOS = {"system.damping": {"type": "DampingRatio", "frequency": 5.0}}
+COULOMB = {"friction": {"type": "Coulomb", "mu": 0.3}}
+HITS = {"scheme": {"type": "ZienkiewiczWoodTaylor"}}
+GROUND = {"contact": {"facets": "upper_bottom",
+                      "obstacle": {"type": "HalfSpace", "point": [0.0, 1.0], "normal": [0.0, 1.0]}}} | COULOMB
+WAVE = {"type": "Ricker", "amplitude": 3.0, "frequency": 20.0}
+RECORD = {"type": "synthetic", "spectrum": {"s0": 0.05}, "duration": 0.5, "dt": 0.005, "seed": 3}
+SPRUCE = {"E1": 1e8, "E2": 5e7, "E3": 6e7, "nu12": 0.2, "nu13": 0.2, "nu23": 0.2, "G12": 3e7, "G13": 2e7, "G23": 1e7,
+          "rho": 600.0, "axes": 0.3, "xi": 0.05}
+MULTISTEP = {"a": [0.25, 0.5, 0.25], "b": [0.25, 0.5, 0.25], "gamma": [1.0, -2.0, 1.0], "mu": 1.0}
+
+# (table, type, keys, another value of each key, what else is another in the case)
+KEYS: list[tuple[str, str, dict[str, Any], dict[str, Any], dict[str, Any]]] = [
+    ("material.upper", "LinearElastic", {"E": 1e8, "nu": 0.2, "rho": 2e3, "xi": 0.05},
+     {"E": 2e8, "nu": 0.3, "rho": 3e3, "xi": 0.1}, RATIOS),
+    ("material.upper", "LinearElastic.from_wave_speeds", {"c_p": 300.0, "c_s": 150.0, "rho": 2e3, "xi": 0.05},
+     {"c_p": 320.0, "c_s": 140.0, "rho": 3e3, "xi": 0.1}, RATIOS),
+    ("material.upper", "Orthotropic", SPRUCE,
+     {key: 1.2 * value if key[0] in "EGr" else 1.4 * value for key, value in SPRUCE.items()}, RATIOS | SPACE),
+    ("material.upper", "Heterogeneous", {"E": 1e8, "nu": 0.2, "rho": 2e3, "xi": 0.05},
+     {"E": "1e8*(1 + x)", "nu": "0.1 + 0.1*y", "rho": "2e3 + y", "xi": "0.01*y"}, RATIOS),
+    ("system.section", "PlaneStrain", {"thickness": 1.0}, {"thickness": 2.0}, {}),
+    ("system.section", "PlaneStress", {"thickness": 1.0}, {"thickness": 2.0}, {}),
+    ("system.damping", "DampingRatio", {"frequency": 5.0, "second": 20.0}, {"frequency": 6.0, "second": 30.0},
+     {"material.upper.xi": 0.05}),
+    ("system.damping", "KelvinVoigt", {"shear": 1e4, "bulk": 1e4}, {"shear": 2e4, "bulk": 2e4}, {}),
+    ("system.damping", "MassProportional", {"c": 1e3}, {"c": 2e3}, {}),
+    ("system.damping", "Rayleigh", {"alpha": 1.0, "beta": 1e-4}, {"alpha": 2.0, "beta": 2e-4}, {}),
+    ("system.damping", "Rayleigh.from_frequencies", {"f1": 5.0, "f2": 20.0, "xi1": 0.05, "xi2": 0.05},
+     {"f1": 6.0, "f2": 30.0, "xi1": 0.04, "xi2": 0.06}, {}),
+    ("friction", "Coulomb", {"mu": 0.3}, {"mu": 0.4}, {}),
+    ("friction", "Tresca", {"threshold": 1e4}, {"threshold": 2e4}, {}),
+    ("friction", "SlipRateCoulomb", {"mu": {"type": "ExponentialDecay", "mu_s": 0.5, "mu_k": 0.2, "v_c": 0.5}},
+     {"mu": {"type": "ExponentialDecay", "mu_s": 0.5, "mu_k": 0.2, "v_c": 0.8}}, {}),
+    ("friction", "SlipRateCoulomb", {"mu": {"type": "StaticKinetic", "mu_s": 0.5, "mu_k": 0.2}},
+     {"mu": {"type": "StaticKinetic", "mu_s": 0.5, "mu_k": 0.3}}, {}),
+    ("impact", "Inelastic", {"update": {"type": "ComponentReset"}}, {"update": {"type": "ImpulseUpdate"}}, HITS),
+    ("impact", "Newton", {"e": 0.5, "update": {"type": "ComponentReset"}},
+     {"e": 0.8, "update": {"type": "ImpulseUpdate"}}, HITS),
+    ("impact", "Elastic", {"update": {"type": "ComponentReset"}}, {"update": {"type": "ImpulseUpdate"}}, HITS),
+    ("mass", "Redistributed", {"lumping": 0.4}, {"lumping": 0.2}, COULOMB),
+    ("excitation", "FullSine", {"amplitude": 3.0, "duration": 0.01, "direction": [1.0, 0.0]},
+     {"amplitude": 2.0, "duration": 0.012, "direction": [0.0, 1.0]}, {}),
+    ("excitation", "HalfSine", {"amplitude": 3.0, "duration": 0.01, "direction": [1.0, 0.0]},
+     {"amplitude": 2.0, "duration": 0.012, "direction": [0.0, 1.0]}, {}),
+    ("excitation", "Rectangular", {"amplitude": 3.0, "duration": 0.01, "direction": [1.0, 0.0]},
+     {"amplitude": 2.0, "duration": 0.012, "direction": [0.0, 1.0]}, {}),
+    ("excitation", "Harmonic", {"amplitude": 3.0, "frequency": 20.0, "phase": 0.1, "direction": [1.0, 0.0]},
+     {"amplitude": 2.0, "frequency": 25.0, "phase": 0.2, "direction": [0.0, 1.0]}, {}),
+    ("excitation", "Ricker", {"amplitude": 3.0, "frequency": 20.0, "delay": 0.01, "direction": [1.0, 0.0]},
+     {"amplitude": 2.0, "frequency": 25.0, "delay": 0.02, "direction": [0.0, 1.0]}, {}),
+    ("excitation", "Tabulated", {"times": [0.0, 0.1], "values": [0.0, 3.0], "direction": [1.0, 0.0]},
+     {"times": [0.0, 0.2], "values": [1.0, 3.0], "direction": [0.0, 1.0]}, {}),
+    ("excitation", "GroundMotion", {"record": RECORD, "direction": [1.0, 0.0], "scale": 1.0},
+     {"record": RECORD | {"seed": 4}, "direction": [0.0, 1.0], "scale": 2.0}, {}),
+    ("contact", "contact_surface", {"facets": "upper_bottom", "held": False, "points": [[1.0, 1.002], [2.0, 1.002]],
+                                    "obstacle": GROUND["contact"]["obstacle"]},
+     {"facets": "upper_top", "held": True, "points": [[1.0, 1.002]], "springs": 1e8,
+      "obstacle": {"type": "HalfSpace", "point": [0.0, 0.999], "normal": [0.0, 1.0]}}, COULOMB),
+    ("contact.obstacle", "HalfSpace", {"point": [0.0, 1.0], "normal": [0.0, 1.0]},
+     {"point": [0.0, 1.001], "normal": [0.05, 1.0]}, GROUND),
+    ("contact.obstacle", "AnalyticGap", {"function": "y - 1.0"}, {"function": "y - 1.0005"}, GROUND),
+    ("contact", "contact_pair", {"facets1": "upper_bottom", "facets2": "lower_top", "held": False,
+                                 "matching": {"type": "DualMortar"}, "points": [[1.1, 1.002], [2.1, 1.002]]},
+     {"facets1": "upper_top", "facets2": "lower_bottom", "held": True, "matching": {"type": "NodeToNode"},
+      "points": [[1.1, 1.002]]}, {"mesh.offset": [1.1]}),
+    ("system.prescribed", "Prescribed", {"facets": "upper_left", "displacement": [0.0, 0.0], "velocity": [0.0, 0.0],
+                                         "acceleration": [0.0, 0.0], "components": [0]},
+     {"facets": "upper_right", "displacement": ["1e-3*t", 0.0], "velocity": [1e-3, 0.0], "acceleration": [1.0, 0.0],
+      "components": [0, 1]}, {"system.damping": {"type": "Rayleigh", "alpha": 1.0, "beta": 1e-4}}),
+    ("system.loads", "Traction", {"facets": "upper_top", "value": [1e4, 0.0], "history": "sin(t)"},
+     {"facets": "upper_left", "value": [2e4, 0.0], "history": "cos(t)"}, {}),
+    ("system.loads", "TangentialTraction", {"facets": "upper_top", "value": [1e4, 0.0], "history": "sin(t)"},
+     {"facets": "upper_bottom", "value": [2e4, 0.0], "history": "cos(t)"}, {}),
+    ("system.loads", "Pressure", {"facets": "upper_top", "value": 1e4, "history": "sin(t)"},
+     {"facets": "upper_left", "value": 2e4, "history": "cos(t)"}, {}),
+    ("system.loads", "BodyForce", {"value": [1e4, 0.0], "history": "sin(t)"},
+     {"value": [2e4, 0.0], "history": "cos(t)"}, {}),
+    ("system.dashpots", "Dashpots", {"facets": "upper_top", "normal": 1.0, "tangential": 1.0},
+     {"facets": "upper_left", "normal": 0.5, "tangential": 0.5, "material": {"E": 2e8, "nu": 0.2, "rho": 2e3}}, {}),
+    ("system.dashpots", "CompliantBase",
+     {"facets": "upper_top", "normal": 1.0, "tangential": 1.0, "motion": {"motion": WAVE, "dt": 1e-3}},
+     {"facets": "upper_left", "normal": 0.5, "tangential": 0.5, "material": {"E": 2e8, "nu": 0.2, "rho": 2e3},
+      "motion": {"motion": WAVE, "dt": 1e-3, "outcrop": False}}, {}),
+    ("gravity", "with_weight", {"acceleration": 9.0, "direction": [0.0, -1.0], "cells": "upper"},
+     {"acceleration": 8.0, "direction": [0.0, 1.0], "cells": "lower"},
+     {"system.initial_velocity": None, "system.prescribed": {"facets": "upper_right", "components": [0]},
+      "mesh.gap": 0.0, "contact.held": True}),
+    ("scheme", "ContactStabilisedNewmark", {"projected": False}, {"projected": True}, {}),
+    ("scheme", "GeneralisedAlpha", {"alpha_m": 0.0, "alpha_f": 0.1, "beta": 0.3, "gamma": 0.6},
+     {"alpha_m": 0.05, "alpha_f": 0.12, "beta": 0.35, "gamma": 0.65}, {}),
+    ("scheme", "GeneralisedAlpha.spectral_radius", {"rho_inf": 0.8}, {"rho_inf": 0.6}, {}),
+    ("scheme", "HHT", {"alpha": -0.1}, {"alpha": -0.2}, {}),
+    ("scheme", "LinearMultistep.newmark", {"beta": 0.25, "gamma": 0.5}, {"beta": 0.3, "gamma": 0.55}, {}),
+    ("scheme", "MoreauJean", {"theta": 0.5, "e": 0.0}, {"theta": 0.6, "e": 0.5}, {}),
+    ("scheme", "Newmark", {"beta": 0.25, "gamma": 0.5}, {"beta": 0.3, "gamma": 0.55}, {}),
+    ("scheme", "SS22", {"theta1": 0.5, "theta2": 0.5}, {"theta1": 0.6, "theta2": 0.6}, {}),
+    ("scheme", "Trapezoidal", {"mass": {"type": "Redistributed"}}, {"mass": {"type": "Redistributed", "lumping": 0.1}}, {}),
+    ("scheme", "ZienkiewiczWoodTaylor", {"phi": 0.5}, {"phi": 0.6}, {}),
+    ("system", "", {"initial_displacement": [0.0, 0.0], "initial_velocity": [1.0, -1.0], "base_inertia": True, "degree": 1,
+                    "integration": "full", "quadrature_degree": 2, "clamped": "lower_bottom"},
+     {"initial_displacement": [1e-4, 0.0], "initial_velocity": [1.0, -2.0], "base_inertia": False, "degree": 2,
+      "integration": "selective", "quadrature_degree": 1, "clamped": "lower_left",
+      "tied": {"first": "lower_left", "second": "lower_right"}}, {"excitation": WAVE}),
+]
+KINDS = ("LinearElastic", "Orthotropic", "Heterogeneous", "Section", "Damping", "FrictionLaw", "ImpactLaw", "MassLaw",
+         "Excitation", "Obstacle", "ContactSurface", "Prescribed", "Traction", "BodyForce", "Dashpots", "Scheme")
+ELSEWHERE = {  # type or type.key -> why nothing changes here, or where it is tested
+    "FirstModeHarmonic": "a Harmonic whose frequency is found", "FreeField": "tests/soil/test_free_field.py",
+    "LinearMultistep": "its coefficients belong together; newmark names them",
+    "MoreauJean.allow_energy_gain": "a permission", "contact_surface.name": "a label", "contact_pair.name": "a label",
+    "contact_surface.feature_angle": "of curved faces", "contact_pair.feature_angle": "of curved faces",
+    "contact_surface.frictionless_corners": "of corners", "contact_pair.frictionless_corners": "of corners",
+}
+
+
+def put(tables: dict[str, Any], where: str, value: Any) -> dict[str, Any]:
+    """The tables with another value at this key; None takes it away."""
+    first, _, rest = where.partition(".")
+    if rest:
+        return tables | {first: put(tables.get(first, {}), rest, value)}
+    return {key: one for key, one in (tables | {first: value}).items() if one is not None}
+
+
+def answers(folder: Path, tables: dict[str, Any]) -> dict[str, Any] | str:
+    """What a case computes, and products with its matrices; the sentence where it is refused."""
+    text = "\n".join(f"{name} = {toml_value(one)}" for name, one in tables.items())
+    try:
+        case = read_case(written(folder, text))
+        system = case.problem(COMM).system
+        found = dict(case.run(COMM, progress=False).history)
+    except InputError as error:
+        return str(error)
+    x = np.cos(np.arange(system.rows))
+    found |= {name: getattr(system, name) @ x for name in ("M", "C", "K") if getattr(system, name) is not None}
+    return found
+
+
+def differ(one: dict[str, Any], other: dict[str, Any]) -> bool:
+    """Whether some number of two answers is another one, beyond round-off."""
+    if one.keys() != other.keys():
+        return True
+    for name, a in one.items():
+        a, b = np.asarray(a, dtype=float), np.asarray(other[name], dtype=float)
+        if a.shape != b.shape or not np.allclose(a, b, rtol=1e-7, atol=1e-7 * np.abs(np.nan_to_num(a)).max(initial=0.0),
+                                                 equal_nan=True):
+            return True
+    return False
+
+
+@pytest.mark.serial
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(len(KEYS)), ids=[f"{table} {word}".strip() for table, word, *_ in KEYS])
+def test_every_key_changes_the_model(shared_tmp: Path, number: int) -> None:
+    """One key after the other has another value: what is computed is another, or the case is refused."""
+    table, word, keys, others, more = KEYS[number]
+    base = FLIGHT
+    for where, value in more.items():
+        base = put(base, where, value)
+    own = base.get("system", {}) if table == "system" else {"type": word} if table != "gravity" else {}
+    before = answers(shared_tmp, put(base, table, own | keys))
+    assert isinstance(before, dict), before
+    for key, value in others.items():
+        after = answers(shared_tmp, put(base, table, own | keys | {key: value}))
+        assert isinstance(after, str) or differ(before, after), f"{table} {word}: {key} = {value} changes nothing"
+
+
+@pytest.mark.serial
+def test_no_key_is_forgotten() -> None:
+    """Each key of each type of these kinds stands in the list above, or there is a reason why not."""
+    tried = {f"{word}.{key}" for _, word, _, others, _ in KEYS for key in others}
+    listed = {getattr(kind, "__name__", ""): words for kind, words in choices().items()}
+    missing = [f"{word}.{key}" for kind in KINDS for word, call in listed[kind].items() for key in call.hints
+               if f"{word}.{key}" not in tried and word not in ELSEWHERE and f"{word}.{key}" not in ELSEWHERE]
+    assert len(listed) > 20 and missing == []

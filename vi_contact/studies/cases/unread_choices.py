@@ -112,6 +112,13 @@ def _without_contact(part: Part) -> Iterator[tuple[str, str]]:
             yield (table, f"{part.label}: [{table}] has no effect, as nothing {happens} without [[contact]]: give the "
                    "contact, or leave it out")
     surfaces = part.calls("contact")
+    dt = part.nodes["run"].arguments.get("dt")
+    if isinstance(dt, Call) and dt.callee.name == "HalvedAtImpact" and not surfaces:
+        yield ("run.dt", f"{part.label}: [run] dt is HalvedAtImpact, which halves nothing without [[contact]]: give the "
+               "contact, or the step alone")
+    if part.calls("mass") and any("mass" in one.arguments for one in part.calls("scheme")):
+        yield ("scheme.mass", f"{part.label}: [scheme] mass is not read, as [mass] comes before it: leave one of the two "
+               "out")
     if part.calls("impact") and surfaces and all("springs" in one.arguments for one in surfaces):
         yield ("impact", f"{part.label}: [impact] has no effect, as every [[contact]] has springs, which do not collide: "
                "leave it out")
