@@ -106,7 +106,7 @@ def test_dashpots_count() -> None:
     material = vc.LinearElastic(E, 0.0, RHO)
     system = fem.assemble(mesh, material, clamped=tags["left"], dashpots=fem.Dashpots(tags["right"], normal=0.01))
     modes = first_modes(vc.ContactProblem(system, empty_surface(system.algebra.comm, 1)))
-    # phi = sin((2 k - 1) pi x / 2): phi(1)² = 1, ∫ phi² = 1/2, w = (2 k - 1) pi c / 2, so xi = 0.01 · 2 / ((2 k - 1) pi)
+    # phi = sin((2 k - 1) pi x / 2), phi(1)² = 1, ∫ phi² = 1/2, w = (2 k - 1) pi c / 2: xi = 0.01 · 2 / ((2 k - 1) pi)
     assert modes.ratios == pytest.approx([0.01 * 2.0 / ((2 * k - 1) * np.pi) for k in (1, 2, 3)], rel=2e-4)
 
 

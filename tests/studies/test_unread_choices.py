@@ -57,6 +57,7 @@ WEIGHS = '[[system.loads]]\ntype = "BodyForce"\nvalue = [0.0, -19620.0]\n'
 STATIC = '[[stage]]\nname = "rest"\ntype = "static"\n'
 MOVES = '[[stage]]\nname = "motion"\ntype = "dynamic"\n'
 ALONE = re.sub(r"\[\[contact\]\](.*?)\[run\]", "[run]", CASE, flags=re.DOTALL)
+SIDES = [f'facets = "lower_{side}"' for side in ("left", "right", "top")]
 SPRINGS = CASE.replace('type = "contact_pair"\nfacets1 = "upper_bottom"\nfacets2 = "lower_top"',
                        'facets = "upper_top"\nsprings = 1e9\nobstacle = {type = "HalfSpace", point = [0.0, 2.0], '
                        'normal = [0.0, -1.0]}')
@@ -76,8 +77,8 @@ VAIN: dict[str, tuple[str, str, str]] = {
         added("system", 'damping = {type = "DampingRatio", frequency = 5.0}', added("material.lower", "xi = 0.05"))),
     "ratios without law": (
         added("material.upper", 'xi = "3 %"'),
-        ': [material.upper] has xi, which no damping reads here: give [system] damping = {type = "DampingRatio", frequency '
-        "= …} with a frequency in Hz, or leave xi out",
+        ': [material.upper] has xi, which no damping reads here: give [system] damping = {type = "DampingRatio", '
+        "frequency = …} with a frequency in Hz, or leave xi out",
         added("material.upper", 'xi = "3 %"', added("system", 'damping = {type = "DampingRatio", frequency = 5.0}'))),
     "ratios under another law": (
         added("material.upper", "xi = 0.03", added("system", 'damping = {type = "Rayleigh", alpha = 1.0, beta = 0.0}')),
@@ -88,9 +89,11 @@ VAIN: dict[str, tuple[str, str, str]] = {
         ": [system] assemble: Rayleigh(alpha=0.0, beta=0.0) damps nothing, as its coefficients are zero", CASE),
     "material of nothing": (
         added("system", 'material = [["lower", "lower"], ["upper", "lower"]]'),
-        ": [material.upper] is of nothing, as [system] does not name it: give its cell group in [system] material", CASE),
+        ": [material.upper] is of nothing, as [system] does not name it: give its cell group in [system] material",
+        CASE),
     "material of no group": (
-        CASE + "[material.spare]\nE = 1e8\nnu = 0.2\nrho = 2000.0\n", ": [system] material[3][1] is 'spare', but the", CASE),
+        CASE + "[material.spare]\nE = 1e8\nnu = 0.2\nrho = 2000.0\n",
+        ": [system] material[3][1] is 'spare', but the", CASE),
     "friction of nothing": (
         ALONE + RUBS, ": [friction] has no effect, as nothing rubs without [[contact]]", CASE + RUBS),
     "impact of nothing": (
@@ -102,7 +105,8 @@ VAIN: dict[str, tuple[str, str, str]] = {
         SPRINGS + STRIKES, ": [impact] has no effect, as every [[contact]] has springs, which do not collide",
         SPRINGS + '[scheme]\ntype = "ZienkiewiczWoodTaylor"\n'),
     "impact without mass": (
-        CASE + '[impact]\ntype = "Inelastic"\n[scheme]\ntype = "Trapezoidal"\n', "the impact law Inelastic", CASE + STRIKES),
+        CASE + '[impact]\ntype = "Inelastic"\n[scheme]\ntype = "Trapezoidal"\n', "the impact law Inelastic",
+        CASE + STRIKES),
     "method with friction": (
         CASE + RUBS + '[solver]\ntype = "Condensed"\nmethod = {type = "Hildreth"}\n',
         ": [solver] method is for contact without friction, and [friction] is given: give friction_method in its place",
@@ -115,7 +119,8 @@ VAIN: dict[str, tuple[str, str, str]] = {
         CASE + RUBS + '[solver]\ntype = "Condensed"\nrates = {type = "RateIteration"}\n',
         ": [solver] rates is for friction that depends on the slip rate, and Coulomb does not", CASE + RUBS),
     "mu of another law": (
-        CASE + '[friction]\ntype = "Tresca"\nthreshold = 1e4\nmu = 0.5\n', "has the unknown key 'mu' for Tresca", CASE + RUBS),
+        CASE + '[friction]\ntype = "Tresca"\nthreshold = 1e4\nmu = 0.5\n',
+        "has the unknown key 'mu' for Tresca", CASE + RUBS),
     "the same solver again": (
         CASE + '[solver]\ntype = "Condensed"\n[[escalation]]\ntype = "Condensed"\n',
         ": [[escalation]] names Condensed with the same keys as the solver before it, which has failed by then",
@@ -132,7 +137,7 @@ VAIN: dict[str, tuple[str, str, str]] = {
         CASE + "[gravity]\nacceleration = 0.0\n", ": [gravity] with_weight: no unknown feels the weight",
         CASE + "[gravity]\nacceleration = 9.0\n"),
     "weight of what is held": (
-        added("system", 'prescribed = [{facets = "lower_left"}, {facets = "lower_right"}, {facets = "lower_top"}]', ALONE)
+        added("system", f"prescribed = [{{{SIDES[0]}}}, {{{SIDES[1]}}}, {{{SIDES[2]}}}]", ALONE)
         + '[gravity]\ncells = "lower"\n', "no unknown feels the weight", CASE + '[gravity]\ncells = "upper"\n'),
     "a load twice": (
         CASE + 2 * WEIGHS, ": [[system.loads]] has two tables that are alike, word for word: leave one of them out",
@@ -154,21 +159,24 @@ VAIN: dict[str, tuple[str, str, str]] = {
     "key of no stage": (
         CASE + "[gravity]\n" + STATIC + 'system = {clamped = "lower_bottom"}\n' + MOVES
         + 'system = {clamped = "lower_bottom"}\n',
-        ": [system] clamped is read by no stage, as every [[stage]] has its own", CASE + "[gravity]\n" + STATIC + MOVES),
+        ": [system] clamped is read by no stage, as every [[stage]] has its own",
+        CASE + "[gravity]\n" + STATIC + MOVES),
     "start of a later stage": (
         CASE + "[gravity]\n" + STATIC + MOVES + "system = {initial_velocity = [0.0, 1.0]}\n",
         "system has initial_velocity, and a stage begins where the stage before has left the body",
         CASE + "[gravity]\n" + STATIC + MOVES),
     "release of nothing": (
         CASE + "[gravity]\n" + STATIC + MOVES + "release = true\n",
-        ": [[stage]] 'motion' has release = true, and the supports of the stage before it", CASE + "[gravity]\n" + STATIC
-        + MOVES),
+        ": [[stage]] 'motion' has release = true, and the supports of the stage before it",
+        CASE + "[gravity]\n" + STATIC + MOVES),
     "section of another dimension": (
-        added("system", 'section = {type = "Solid"}'), ": [system] assemble: Solid() is for a body in space and this one is "
-        "plane", added("system", 'section = {type = "PlaneStress", thickness = 2.0}')),
+        added("system", 'section = {type = "Solid"}'),
+        ": [system] assemble: Solid() is for a body in space and this one is plane",
+        added("system", 'section = {type = "PlaneStress", thickness = 2.0}')),
     "thickness in space": (
-        added("system", 'section = {type = "PlaneStress", thickness = 2.0}', CASE.replace("[3.0, 1.0]", "[3.0, 1.0, 1.0]")
-              .replace("[3, 1]", "[3, 1, 1]").replace("[1.0, 1.0]", "[1.0, 1.0, 1.0]").replace("[1, 1]", "[1, 1, 1]")),
+        added("system", 'section = {type = "PlaneStress", thickness = 2.0}',
+              CASE.replace("[3.0, 1.0]", "[3.0, 1.0, 1.0]").replace("[3, 1]", "[3, 1, 1]")
+              .replace("[1.0, 1.0]", "[1.0, 1.0, 1.0]").replace("[1, 1]", "[1, 1, 1]")),
         "is a section of a plane body and this one has three dimensions", CASE),
 }
 
@@ -275,7 +283,8 @@ PYTHON = {
     "nothing prescribed": (lambda: assembled(prescribed=lambda mesh, _: fem.Prescribed(none(mesh))),
                            "'none' of prescribed has no facets"),
     "solid in the plane": (lambda: assembled(section=vc.Solid()), r"Solid\(\) is for a body in space"),
-    "friction of nothing": (lambda: without_contact(friction=vc.Coulomb(0.5)), r"friction=Coulomb\(mu=0.5\) has no effect"),
+    "friction of nothing": (lambda: without_contact(friction=vc.Coulomb(0.5)),
+                            r"friction=Coulomb\(mu=0.5\) has no effect"),
     "impact of nothing": (lambda: without_contact(impact=vc.Inelastic()), "impact=.* has no effect"),
     "impact on springs": (on_springs, "impact=.* has no effect, as all conditions are on springs"),
     "changed without restart": (lambda: vc.simulate(without_contact(), dt=0.1, steps=1, changed=True),
@@ -298,7 +307,7 @@ def test_weights_that_add_up_are_taken() -> None:
     pushed = vc.with_weight(system, acceleration=3.0, direction=(1.0, 0.0))
     plain = vc.with_weight(assembled(loads=fem.BodyForce((0.0, -0.5 * 2000.0 * 9.80665))))
     totals = [COMM.allreduce(float(one.load.constant @ one.influence[:, 1]), MPI.SUM) for one in (pushed, plain)]
-    assert totals[1] == pytest.approx(3.0 * totals[0], rel=0.2)  # 1.5 and 0.5 times the weight, less at the clamped side
+    assert totals[1] == pytest.approx(3.0 * totals[0], rel=0.2)  # 1.5 and 0.5 times the weight, less at a side
 
 
 # Every key of the laws changes the model ------------------------------------------------------------------------------
@@ -415,10 +424,11 @@ KEYS: list[tuple[str, str, dict[str, Any], dict[str, Any], dict[str, Any]]] = [
     ("scheme", "MoreauJean", {"theta": 0.5, "e": 0.0}, {"theta": 0.6, "e": 0.5}, {}),
     ("scheme", "Newmark", {"beta": 0.25, "gamma": 0.5}, {"beta": 0.3, "gamma": 0.55}, {}),
     ("scheme", "SS22", {"theta1": 0.5, "theta2": 0.5}, {"theta1": 0.6, "theta2": 0.6}, {}),
-    ("scheme", "Trapezoidal", {"mass": {"type": "Redistributed"}}, {"mass": {"type": "Redistributed", "lumping": 0.1}}, {}),
+    ("scheme", "Trapezoidal", {"mass": {"type": "Redistributed"}},
+     {"mass": {"type": "Redistributed", "lumping": 0.1}}, {}),
     ("scheme", "ZienkiewiczWoodTaylor", {"phi": 0.5}, {"phi": 0.6}, {}),
-    ("system", "", {"initial_displacement": [0.0, 0.0], "initial_velocity": [1.0, -1.0], "base_inertia": True, "degree": 1,
-                    "integration": "full", "quadrature_degree": 2, "clamped": "lower_bottom"},
+    ("system", "", {"initial_displacement": [0.0, 0.0], "initial_velocity": [1.0, -1.0], "base_inertia": True,
+                    "degree": 1, "integration": "full", "quadrature_degree": 2, "clamped": "lower_bottom"},
      {"initial_displacement": [1e-4, 0.0], "initial_velocity": [1.0, -2.0], "base_inertia": False, "degree": 2,
       "integration": "selective", "quadrature_degree": 1, "clamped": "lower_left",
       "tied": {"first": "lower_left", "second": "lower_right"}}, {"excitation": WAVE}),

@@ -65,7 +65,8 @@ def _run(options: argparse.Namespace) -> str:
     if options.check:
         vain = next((name for name in ("restart", "changed", "wall_time") if getattr(options, name)), None)
         if vain is not None:
-            raise InputError(f"{OPTIONS[vain]} has no effect with --check, which computes no step: leave one of them out")
+            raise InputError(f"{OPTIONS[vain]} has no effect with --check, which computes no step: leave one of the "
+                             "two out")
         return _checked(case, comm, Path(out))
     found = case.run(comm, out=out, restart=restart, progress=not options.quiet, changed=options.changed,
                      wall_time=options.wall_time)

@@ -174,12 +174,12 @@ def _refuse_vain(problem: Any) -> None:
             raise InputError(f"ContactProblem: {name}={shown(law)} has no effect, as the surface has no contact "
                              "conditions: leave it out, or give a surface that has some")
     if problem.impact is not None and not largest(surface.comm, bool(np.any(surface.rigid))):
-        raise InputError(f"ContactProblem: impact={shown(problem.impact)} has no effect, as all conditions are on springs, "
-                         "which do not collide: leave it out")
+        raise InputError(f"ContactProblem: impact={shown(problem.impact)} has no effect, as all conditions are on "
+                         "springs, which do not collide: leave it out")
     for one, other in combinations(problem.excitations, 2):
         if one is other:
-            raise InputError(f"ContactProblem: excitation names {shown(one)} twice, which would shake twice: leave it out "
-                             "once, or scale it")
+            raise InputError(f"ContactProblem: excitation names {shown(one)} twice, which would shake twice: leave it "
+                             "out once, or scale it")
 
 
 def _check_excitation(excitation: Any, system: SemiDiscreteSystem) -> None:

@@ -67,8 +67,9 @@ def damping_in_words(problem: ContactProblem, *, unknown: str = "") -> str:
 
 def _found(problem: ContactProblem) -> FirstModes:
     # the system in the nodal frames, without excitation; contact conditions that are closed become supports or springs
-    system, surface = problem.static_load, problem.surface
-    closed = (surface.gap0 <= TOUCHING * problem.system.space.size) | surface.bilateral
+    system, surface, space = problem.static_load, problem.surface, problem.system.space
+    size: float = getattr(space, "size", 0.0)  # of the bodies [m]
+    closed = (surface.gap0 <= TOUCHING * size) | surface.bilateral
     held, springs = np.zeros((2, system.rows))
     rigid = closed & surface.rigid
     held[surface.owned[rigid]] = 1.0

@@ -209,8 +209,8 @@ def _refuse_empty(mesh: Mesh, clamped: Any, prescribed: Any, tied: Any, dashpots
     counts = mesh.comm.allreduce(np.array([len(group.indices) for _, group in found], dtype=float))
     for (name, group), count in zip(found, counts, strict=True):
         if not count:
-            raise InputError(f"assemble: the boundary group '{group.name}' of {name} has no facets, so it has no effect; "
-                             "correct the group, or leave it out")
+            raise InputError(f"assemble: the boundary group '{group.name}' of {name} has no facets, so it has no "
+                             "effect; correct the group, or leave it out")
 
 
 def _contradictions(held: Sequence[Prescribed], tied: Sequence[Tied], damped: Sequence[Dashpots]) -> Iterator[str]:

@@ -52,8 +52,8 @@ def checked_method(owner: str, problem: ContactProblem, scheme: Scheme | None,
     method.bind()
     scheme.check(problem)
     if isinstance(dt, HalvedAtImpact) and not problem.surface.total:
-        raise InputError(f"{owner}: dt is {shown(dt)}, and without contact conditions there is no impact to halve it at; "
-                         "give the step alone")
+        raise InputError(f"{owner}: dt is {shown(dt)}, and without contact conditions there is no impact to halve it "
+                         "at; give the step alone")
     method.solvers[0].check(problem)
     if state is not None:
         check_state(owner, problem, state, dt=size, tolerance=tolerance, scheme=scheme)

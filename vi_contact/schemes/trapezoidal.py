@@ -42,8 +42,8 @@ class Trapezoidal:
         """Raise InputError for an impact law on massless contact nodes, and a mass of its own beside that of the
         problem; warn when contact nodes have mass."""
         if self.mass not in (Redistributed(), problem.mass):
-            raise InputError(f"Trapezoidal: mass={self.mass} is not read, as the problem has mass={problem.mass}: leave "
-                             "one of the two out")
+            raise InputError(f"Trapezoidal: mass={self.mass} is not read, as the problem has mass={problem.mass}: "
+                             "leave one of the two out")
         check_balance("Trapezoidal()", problem)
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:

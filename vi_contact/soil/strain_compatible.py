@@ -6,7 +6,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from ..core.algebra import Array, Indices, largest
+from ..core.algebra import Array, largest
 from ..core.checks import at, function, instance, number, refuse, several
 from ..core.errors import InputError
 from ..fem import compat
@@ -90,7 +90,7 @@ def strain_compatible(mesh: Any, material: Materials, curves: Sequence[tuple[Cel
     return StrainCompatible(*found, changes)
 
 
-def _refuse_lost_ratios(material: Materials, pairs: Sequence[tuple[Indices, SoilCurves]], comm: MpiComm) -> None:
+def _refuse_lost_ratios(material: Materials, pairs: Sequence[tuple[Any, SoilCurves]], comm: MpiComm) -> None:
     """Raise InputError for a material with a damping ratio whose cells all have curves, which give it another one."""
     if isinstance(material, KINDS):
         return  # of a whole mesh: cells beside the curves keep its ratio

@@ -157,7 +157,7 @@ def solve_linear(settings: Volume, methods: Sequence[Method], A: PetscMatrix, b:
                  start: Array, comm: MpiComm) -> tuple[Array, int, str]:
     """Return (x, iterations, name) of the first method that finds x, of those that suit A if none is given; StepFailure
     with what all said. Every unknown is the one of a contact condition. Collective."""
-    numbers, tried = np.arange(A.rows), []
+    numbers, tried = np.arange(A.rows), list[str]()
     symmetric = asymmetry(A, comm, PetscAlgebra(comm.mpi).first(A.rows) + numbers) <= SYMMETRIC
     if not methods:
         methods = (TaoTron(), ReducedNewton()) if symmetric else (ReducedNewton(), SemismoothNewton())

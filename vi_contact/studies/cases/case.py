@@ -263,7 +263,7 @@ def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence
     case = _read(path, with_settings(file, settings), settings, allow)
     found = _unread(case)
     if found:
-        refuse_unread(found, _unread_in(path, file, allow) if settings else None, settings)
+        refuse_unread(found, _unread_in(path, file, allow) if settings else [], settings)
     return case
 
 
