@@ -53,6 +53,8 @@ steps = 2
 RUBS = '[friction]\ntype = "Coulomb"\nmu = 0.5\n'
 STRIKES = '[impact]\ntype = "Inelastic"\n[scheme]\ntype = "ZienkiewiczWoodTaylor"\n'
 SHAKES = '[[excitation]]\ntype = "Ricker"\namplitude = 3.0\nfrequency = 4.0\n'
+REACTIONS = ('[[record]]\ntype = "Reactions"\nname = "rock"\nfacets = "lower_bottom"\ncentre = [0.0, 0.0]\n'
+             "gravity = [0.0, -9.80665]\n")
 WEIGHS = '[[system.loads]]\ntype = "BodyForce"\nvalue = [0.0, -19620.0]\n'
 STATIC = '[[stage]]\nname = "rest"\ntype = "static"\n'
 MOVES = '[[stage]]\nname = "motion"\ntype = "dynamic"\n'
@@ -139,6 +141,18 @@ VAIN: dict[str, tuple[str, str, str]] = {
     "weight of what is held": (
         added("system", f"prescribed = [{{{SIDES[0]}}}, {{{SIDES[1]}}}, {{{SIDES[2]}}}]", ALONE)
         + '[gravity]\ncells = "lower"\n', "no unknown feels the weight", CASE + '[gravity]\ncells = "upper"\n'),
+    "weight of a recorder": (
+        CASE + REACTIONS,
+        ": [[record]] Reactions has gravity, and the body has no weight: give [gravity], or leave it out",
+        CASE + "[gravity]\n" + REACTIONS),
+    "halved without contact": (
+        ALONE.replace("dt = 1e-3", 'dt = {type = "HalvedAtImpact", dt = 1e-3}'),
+        ": [run] dt is HalvedAtImpact, which halves nothing without [[contact]]",
+        CASE.replace("dt = 1e-3", 'dt = {type = "HalvedAtImpact", dt = 1e-3}')),
+    "mass of scheme and problem": (
+        CASE + '[mass]\ntype = "ConsistentMass"\n[scheme]\ntype = "Trapezoidal"\nmass = {type = "Redistributed"}\n',
+        ": [scheme] mass is not read, as [mass] comes before it: leave one of the two out",
+        CASE + '[mass]\ntype = "ConsistentMass"\n[scheme]\ntype = "Trapezoidal"\n'),
     "a load twice": (
         CASE + 2 * WEIGHS, ": [[system.loads]] has two tables that are alike, word for word: leave one of them out",
         CASE + WEIGHS),
@@ -287,6 +301,11 @@ PYTHON = {
                             r"friction=Coulomb\(mu=0.5\) has no effect"),
     "impact of nothing": (lambda: without_contact(impact=vc.Inelastic()), "impact=.* has no effect"),
     "impact on springs": (on_springs, "impact=.* has no effect, as all conditions are on springs"),
+    "halved without contact": (lambda: vc.simulate(without_contact(), dt=vc.HalvedAtImpact(0.1), steps=1),
+                               "without contact conditions there is no impact to halve it at"),
+    "mass of scheme and problem": (
+        lambda: vc.simulate(without_contact(mass=vc.Redistributed()), dt=0.1, steps=1,
+                            scheme=vc.Trapezoidal(vc.ConsistentMass())), "mass=ConsistentMass.* is not read"),
     "changed without restart": (lambda: vc.simulate(without_contact(), dt=0.1, steps=1, changed=True),
                                 "changed=True is for a run that is continued"),
     "checkpoints of nothing": (lambda: vc.simulate(without_contact(), dt=0.1, steps=1, checkpoint_every=5),

@@ -62,6 +62,7 @@ def findings(path: Path, tables: Mapping[str, Any], parts: Sequence[Part]) -> It
         yield from _without_contact(part)
         yield from _of_solvers(part)
         yield from _twice(part)
+        yield from _recorded_weight(part)
     yield from _start(parts)
     yield from _ground(path, parts)
     if "stage" in tables:
@@ -201,6 +202,19 @@ def _twice(part: Part) -> Iterator[Finding]:
                     f"{part.label}: [[{key}]] has two tables that are alike, word for word: leave "
                     "one of them out, or give one of twice the size"
                 )
+
+
+def _recorded_weight(part: Part) -> Iterator[Finding]:
+    """Yield recorders that take off a weight which the body does not have."""
+    loads = [one for one in nodes_in(part.system.get("loads", ())) if isinstance(one, Call)]
+    if part.calls("gravity") or any(one.callee.name == "BodyForce" for one in loads):
+        return
+    for one in part.calls("record"):
+        if "gravity" in one.arguments:
+            yield "record", (
+                f"{part.label}: [[record]] {one.callee.name} has gravity, and the body has no "
+                "weight: give [gravity], or leave it out"
+            )
 
 
 def _start(parts: Sequence[Part]) -> Iterator[Finding]:
