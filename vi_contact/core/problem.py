@@ -166,14 +166,11 @@ def check_parts(problem: Any) -> None:
 
 
 def _refuse_vain(problem: Any) -> None:
-    """Raise InputError, on all ranks, for laws of contact that act on nothing, and what shakes twice. Collective."""
+    """Raise InputError, on all ranks, for an impact law on springs alone, and what shakes twice. Collective.
+
+    A surface without conditions is let be: it says that there is no contact, whatever laws stand beside it."""
     surface = problem.surface
-    laws = {"friction": problem.friction if problem.frictional else None, "impact": problem.impact}
-    for name, law in ((name, law) for name, law in laws.items() if law is not None):
-        if not surface.total:
-            raise InputError(f"ContactProblem: {name}={shown(law)} has no effect, as the surface has no contact "
-                             "conditions: leave it out, or give a surface that has some")
-    if problem.impact is not None and not largest(surface.comm, bool(np.any(surface.rigid))):
+    if surface.total and problem.impact is not None and not largest(surface.comm, bool(np.any(surface.rigid))):
         raise InputError(f"ContactProblem: impact={shown(problem.impact)} has no effect, as all conditions are on "
                          "springs, which do not collide: leave it out")
     for one, other in combinations(problem.excitations, 2):

@@ -238,10 +238,8 @@ class Case:
         return mesh, tags
 
     def _problem(self, parts: Parts) -> ContactProblem:
-        touches = parts.surface.total > 0  # a setting may take the contact away, and leave the laws of the file
-        return ContactProblem(parts.system, parts.surface,
-                              friction=(self._made("friction") if touches else None) or Frictionless(),
-                              impact=self._made("impact") if touches else None, mass=self._made("mass"),
+        return ContactProblem(parts.system, parts.surface, friction=self._made("friction") or Frictionless(),
+                              impact=self._made("impact"), mass=self._made("mass"),
                               excitation=() if parts.moved else self.excitations(system=parts.system))
 
     def _duration(self, parts: Parts) -> float:
