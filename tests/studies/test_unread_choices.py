@@ -269,13 +269,6 @@ def shaken_twice() -> Any:
     return vc.ContactProblem(system, empty_surface(system.algebra.comm, 2), excitation=[wave, wave])
 
 
-def on_springs() -> Any:
-    mesh, tags = block()
-    system = fem.assemble(mesh, MATERIAL, clamped=tags["left"])
-    surface = fem.contact_surface(system, tags["right"], obstacle=vc.HalfSpace((2.0, 0.0), (-1.0, 0.0))).on_springs(1e9)
-    return vc.ContactProblem(system, surface, impact=vc.Inelastic())
-
-
 def without_contact(**laws: Any) -> Any:
     system = assembled()
     return vc.ContactProblem(system, empty_surface(system.algebra.comm, 2), **laws)
@@ -297,16 +290,11 @@ PYTHON = {
     "nothing prescribed": (lambda: assembled(prescribed=lambda mesh, _: fem.Prescribed(none(mesh))),
                            "'none' of prescribed has no facets"),
     "solid in the plane": (lambda: assembled(section=vc.Solid()), r"Solid\(\) is for a body in space"),
-    "impact on springs": (on_springs, "impact=.* has no effect, as all conditions are on springs"),
-    "halved without contact": (lambda: vc.simulate(without_contact(), dt=vc.HalvedAtImpact(0.1), steps=1),
-                               "without contact conditions there is no impact to halve it at"),
     "mass of scheme and problem": (
         lambda: vc.simulate(without_contact(mass=vc.Redistributed()), dt=0.1, steps=1,
                             scheme=vc.Trapezoidal(vc.ConsistentMass())), "mass=ConsistentMass.* is not read"),
     "changed without restart": (lambda: vc.simulate(without_contact(), dt=0.1, steps=1, changed=True),
                                 "changed=True is for a run that is continued"),
-    "checkpoints of nothing": (lambda: vc.simulate(without_contact(), dt=0.1, steps=1, checkpoint_every=5),
-                               "checkpoint_every needs a folder"),
 }
 
 

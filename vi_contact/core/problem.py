@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .algebra import Array, largest
+from .algebra import Array
 from .checks import array, instance, optional, provides, refuse, shown
 from .corners import refuse_rubbing
 from .errors import InputError
@@ -162,18 +162,12 @@ def check_parts(problem: Any) -> None:
     refuse((*_of_system(system), *_of_surface(surface, system, surface.total)), surface.comm)
     if problem.frictional:
         refuse_rubbing(surface)
-    _refuse_vain(problem)
+    _refuse_repeated(excitations)
 
 
-def _refuse_vain(problem: Any) -> None:
-    """Raise InputError, on all ranks, for an impact law on springs alone, and what shakes twice. Collective.
-
-    A surface without conditions is let be: it says that there is no contact, whatever laws stand beside it."""
-    surface = problem.surface
-    if surface.total and problem.impact is not None and not largest(surface.comm, bool(np.any(surface.rigid))):
-        raise InputError(f"ContactProblem: impact={shown(problem.impact)} has no effect, as all conditions are on "
-                         "springs, which do not collide: leave it out")
-    for one, other in combinations(problem.excitations, 2):
+def _refuse_repeated(excitations: Sequence[Any]) -> None:
+    """Raise InputError for an excitation that is named twice: it would shake twice."""
+    for one, other in combinations(excitations, 2):
         if one is other:
             raise InputError(f"ContactProblem: excitation names {shown(one)} twice, which would shake twice: leave it "
                              "out once, or scale it")

@@ -16,7 +16,7 @@ from ..laws.mass import ConsistentMass
 from ..schemes.trapezoidal import Trapezoidal
 from ..schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from ..solvers.automatic import Automatic
-from .time_steps import HalvedAtImpact, TimeSteps, step_plan
+from .time_steps import TimeSteps, step_plan
 
 SCHEME = ("check", "start", "jump", "effective_matrix", "step", "finish", "balance")
 SLACK = 10.0  # of the tolerance, and of the largest displacement: what a state may penetrate
@@ -51,9 +51,6 @@ def checked_method(owner: str, problem: ContactProblem, scheme: Scheme | None,
     size = step_plan(dt, steps, t_end, start_time(owner, state)).dt(0)
     method.bind()
     scheme.check(problem)
-    if isinstance(dt, HalvedAtImpact) and not problem.surface.total:
-        raise InputError(f"{owner}: dt is {shown(dt)}, and without contact conditions there is no impact to halve it "
-                         "at; give the step alone")
     method.solvers[0].check(problem)
     if state is not None:
         check_state(owner, problem, state, dt=size, tolerance=tolerance, scheme=scheme)

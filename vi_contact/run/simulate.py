@@ -27,13 +27,12 @@ from .time_steps import TimeSteps, step_plan
 from .wall_time import WallTime
 
 __all__ = ["Solution", "simulate"]
-CHECKPOINT_EVERY = 100  # base steps
 
 
 def simulate(problem: ContactProblem, *, scheme: Scheme | None = None, solver: Solver | None = None, dt: TimeSteps,
              t_end: float | None = None, steps: int | None = None, record: Sequence[Recorder] | None = None,
              out: str | Path | None = None, state: State | None = None, escalation: Sequence[Solver] = (),
-             tolerance: float = TOLERANCE, checkpoint_every: int = CHECKPOINT_EVERY, restart: bool | str | Path = False,
+             tolerance: float = TOLERANCE, checkpoint_every: int = 100, restart: bool | str | Path = False,
              changed: bool = False, progress: bool = True, fields: FieldWriter | None = None,
              cross_check: Comparison | None = None, wall_time: str | None = None,
              callback: Callable[[State, Report], Any] | None = None) -> Solution:
@@ -120,8 +119,6 @@ def _check_outputs(record: Any, out: Any, restart: Any, checkpoint_every: Any, f
     optional(instance, owner, "out", out, (str, Path), "give a path, or None")
     instance(owner, "restart", restart, (bool, str, Path), "give True, False or the path of a run folder")
     whole(owner, "checkpoint_every", checkpoint_every, least=1)
-    if out is None and checkpoint_every != CHECKPOINT_EVERY:
-        raise InputError("simulate: checkpoint_every needs a folder for the checkpoints: give out, or leave it out")
     for meaning, value in zip(("progress", "changed"), flags, strict=True):
         flag(owner, meaning, value)
     if fields is not None:

@@ -182,8 +182,7 @@ class Case:
         if "strain_compatible" in self.nodes:
             raise InputError(f"{self.path}: [strain_compatible] is for single runs: leave it out of stages and studies")
         problem = self._problem(parts)
-        vain = ("out",) if folder is not None else ("out", "checkpoint_every")
-        own = {name: value for name, value in self._timed(parts).items() if name not in vain}
+        own = {name: value for name, value in self._timed(parts).items() if name != "out"}
         solver = self._made("solver")
         if state is None and parts.weighted:
             from ...run.static import static_equilibrium  # late: other runs need none of it
