@@ -203,6 +203,7 @@ def written(folder: Path, text: str) -> Path:
     return path
 
 
+@pytest.mark.serial  # most are told when the file is read; those of Python below are found on several ranks
 @pytest.mark.parametrize("name", VAIN)
 def test_a_choice_in_vain_is_refused(shared_tmp: Path, name: str) -> None:
     """In a sentence with table and remedy; the case with the remedy runs."""
