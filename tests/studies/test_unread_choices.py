@@ -141,6 +141,10 @@ VAIN: dict[str, tuple[str, str, str]] = {
     "weight of what is held": (
         added("system", f"prescribed = [{{{SIDES[0]}}}, {{{SIDES[1]}}}, {{{SIDES[2]}}}]", ALONE)
         + '[gravity]\ncells = "lower"\n', "no unknown feels the weight", CASE + '[gravity]\ncells = "upper"\n'),
+    "a comparison with nothing": (
+        CASE + '[solver]\ntype = "CrossChecked"\nprimary = {type = "Condensed"}\nothers = []\n',
+        ": [solver] CrossChecked: others names no solver, so that nothing is compared",
+        CASE + '[solver]\ntype = "CrossChecked"\nprimary = {type = "Condensed"}\nothers = [{type = "Volume"}]\n'),
     "weight of a recorder": (
         CASE + REACTIONS,
         ": [[record]] Reactions has gravity, and the body has no weight: give [gravity], or leave it out",
