@@ -2,8 +2,8 @@
 
     xi_k = phi_kᵀ C phi_k / (2 w_k phi_kᵀ M phi_k),    K phi_k = w_k² M phi_k
 
-with the whole C, of materials and of dashpots, and the contact as it is at the start: closed where it is held or has no
-gap, sticking where there is friction."""
+with the whole C, of materials and of dashpots, and the contact as it is at the start: closed where
+it is held or has no gap, sticking where there is friction."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -29,7 +29,8 @@ NOT_COMPUTED = "not computed at its periods"
 class FirstModes:
     """Hold the first natural modes with the contact closed where it touches at the start.
 
-    periods: T_k [s], the longest first; ratios: xi_k; rigid_motions: how many motions meet no stiffness."""
+    periods: T_k [s], the longest first; ratios: xi_k; rigid_motions: how many motions meet no
+    stiffness."""
 
     periods: tuple[float, ...]
     ratios: tuple[float, ...]
@@ -37,7 +38,7 @@ class FirstModes:
 
 
 def first_modes(problem: ContactProblem) -> FirstModes:
-    """Return the first three undamped natural modes of a problem, and the damping ratios that its C gives them.
+    """Return the first three undamped natural modes of a problem, with the ratios that its C gives.
 
     They are found once for a system and a surface. Collective."""
     surface, frictional = problem.surface, problem.frictional
@@ -50,8 +51,9 @@ def first_modes(problem: ContactProblem) -> FirstModes:
 
 
 def damping_in_words(problem: ContactProblem, *, unknown: str = "") -> str:
-    """Return the damping of a problem as a text: "none", or its law and, where ``first_modes`` have been found, their
-    ratios; ``unknown``: why they have not."""
+    """Return the damping of a problem as a text: "none", or its law and the ratios of its modes.
+
+    The ratios are told where ``first_modes`` have been found; ``unknown``: why they have not."""
     system = problem.system
     law = "; ".join(_sources(system))
     if not law:
@@ -66,7 +68,7 @@ def damping_in_words(problem: ContactProblem, *, unknown: str = "") -> str:
 
 
 def _found(problem: ContactProblem) -> FirstModes:
-    # the system in the nodal frames, without excitation; contact conditions that are closed become supports or springs
+    # The system in the nodal frames, without excitation; closed conditions become supports or springs.
     system, surface, space = problem.static_load, problem.surface, problem.system.space
     size: float = getattr(space, "size", 0.0)  # of the bodies [m]
     closed = (surface.gap0 <= TOUCHING * size) | surface.bilateral
@@ -80,18 +82,21 @@ def _found(problem: ContactProblem) -> FirstModes:
     K, M = (algebra.block(one, free) for one in (K, system.M))
     most = sum(body.motions.shape[1] for body in free_motions(problem.system))
     frequencies, modes, rigid_motions = natural_modes(algebra, K, M, rigid=most)
-    # the share of each mode in C: phiᵀ C phi / (2 w phiᵀ M phi)
+    # The share of each mode in C: phiᵀ C phi / (2 w phiᵀ M phi).
     ratios = np.zeros(len(frequencies))
     if system.C is not None:
         C, w = algebra.block(system.C, free), 2.0 * np.pi * frequencies
         columns = [np.ascontiguousarray(one) for one in modes.T]
-        damped, moving = (np.array([total(algebra.comm, one @ (A @ one)) for one in columns]) for A in (C, M))
+        damped, moving = (
+            np.array([total(algebra.comm, one @ (A @ one)) for one in columns]) for A in (C, M)
+        )
         ratios = _of_alike(frequencies, damped / (2.0 * w * moving))
     return FirstModes(tuple((1.0 / frequencies).tolist()), tuple(ratios.tolist()), rigid_motions)
 
 
 def _of_alike(frequencies: Array, ratios: Array) -> Array:
-    """Return the ratios with their mean over modes of one frequency: no one of these is a mode more than another."""
+    """Return the ratios with their mean over modes of one frequency, of which none is more a mode
+    than another, so that the answer does not depend on the basis that the solver found."""
     close = np.abs(frequencies[:, None] - frequencies) <= ALIKE * frequencies[:, None]
     return np.asarray((close @ ratios) / close.sum(axis=1))
 
@@ -121,7 +126,9 @@ def _ratios(forms: Any) -> str:
     if any(callable(one) for one in given):
         return f"up to {_per_cent(forms.largest_ratio)}"
     least = min(given)
-    return _per_cent(least) if least == max(given) else f"{100.0 * least:.3g} to {_per_cent(max(given))}"
+    if least == max(given):
+        return _per_cent(least)
+    return f"{100.0 * least:.3g} to {_per_cent(max(given))}"
 
 
 def _frequencies(law: DampingRatio) -> str:

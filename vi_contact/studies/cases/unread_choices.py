@@ -80,7 +80,9 @@ def left_over(path: Path, tables: Mapping[str, Any]) -> Iterator[str]:
             yield f"[{key}] of {path} is for motions and is not read, as every [[stage]] is static"
 
 
-def refuse_unread(found: Sequence[Finding], before: Sequence[Finding], settings: Sequence[str]) -> None:
+def refuse_unread(
+    found: Sequence[Finding], before: Sequence[Finding], settings: Sequence[str]
+) -> None:
     """Raise InputError with the first finding that settings of other tables have not made.
 
     before: findings in the file without its settings; none where the file alone is no case."""
