@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from ..studies.cases.case import Case
 
 
+OPTIONS = {"restart": "--restart", "changed": "--restart-changed", "wall_time": "--wall-time"}
+
+
 def add_case_commands(commands: Any) -> None:
     """Add ``run``, ``cases``, ``schema`` and ``new`` to the commands of the top parser."""
     words = {"schemes": ", ".join(schemes.__all__), "starters": ", ".join(starters())}
@@ -60,6 +63,10 @@ def _run(options: argparse.Namespace) -> str:
     restart = options.restart or options.changed
     out = options.out or case.out or Path("results") / path.stem
     if options.check:
+        vain = next((name for name in ("restart", "changed", "wall_time") if getattr(options, name)), None)
+        if vain is not None:
+            raise InputError(f"{OPTIONS[vain]} has no effect with --check, which computes no step: leave one of the "
+                             "two out")
         return _checked(case, comm, Path(out))
     found = case.run(comm, out=out, restart=restart, progress=not options.quiet, changed=options.changed,
                      wall_time=options.wall_time)

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -166,6 +167,15 @@ def check_parts(problem: Any) -> None:
     refuse((*_of_system(system), *_of_surface(surface, system, surface.total)), surface.comm)
     if problem.frictional:
         refuse_rubbing(surface)
+    _refuse_repeated(excitations)
+
+
+def _refuse_repeated(excitations: Sequence[Any]) -> None:
+    """Raise InputError for an excitation that is named twice: it would shake twice."""
+    for one, other in combinations(excitations, 2):
+        if one is other:
+            raise InputError(f"ContactProblem: excitation names {shown(one)} twice, which would shake twice: leave it "
+                             "out once, or scale it")
 
 
 def _check_excitation(excitation: Any, system: SemiDiscreteSystem) -> None:

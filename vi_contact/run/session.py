@@ -18,6 +18,7 @@ from ..core.checks import on_all
 from ..core.errors import InputError, Interrupted, OutOfTime
 from ..core.stages import done
 from ..core.step import Recorder, Report, State, StepResult
+from ..engineering.damping import NOT_COMPUTED, damping_in_words
 from .files.checkpoint import RestartPoint
 from .files.identity import identity
 from .files.log import Progress, versions
@@ -92,7 +93,7 @@ class Session:
                 "solver": repr(solver if self.cross_check is None else getattr(solver, "primary", solver)),
                 "dt": described(method.dt), "tolerance": method.tolerance, "ranks": self._comm.size,
                 "unknowns": problem.system.space.unknowns, "contact_points": problem.surface.total,
-                "boundaries": list(problem.system.notes),
+                "boundaries": list(problem.system.notes), "damping": damping_in_words(problem, unknown=NOT_COMPUTED),
                 "sampling": sampling_warning(problem.excitations, max(pieces_of(method.dt))[0]) or ""}
 
     @property

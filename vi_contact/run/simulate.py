@@ -84,6 +84,9 @@ def opened(problem: ContactProblem, scheme: Scheme | None, solver: Solver | None
     optional(function, "simulate", "callback", callback, "give a function of a state and a report, or None")
     if wall_time is not None and out is None:
         raise InputError("wall_time needs a folder from which the run continues: give out")
+    if changed and restart is False:
+        raise InputError("changed=True is for a run that is continued, and this one begins anew: give restart too, or "
+                         "leave it out")
     end = WallTime(wall_time, runs)
     problem, scheme = with_defaults(problem, scheme, others)
     method = checked_method("simulate", problem, scheme, (solver, escalation), dt, steps=steps, t_end=t_end,

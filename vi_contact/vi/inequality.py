@@ -157,7 +157,7 @@ def solve_linear(settings: Volume, methods: Sequence[Method], A: PetscMatrix, b:
                  start: Array, comm: MpiComm) -> tuple[Array, int, str]:
     """Return (x, iterations, name) of the first method that finds x, of those that suit A if none is given; StepFailure
     with what all said. Every unknown is the one of a contact condition. Collective."""
-    numbers, tried = np.arange(A.rows), []
+    numbers, tried = np.arange(A.rows), list[str]()
     symmetric = asymmetry(A, comm, PetscAlgebra(comm.mpi).first(A.rows) + numbers) <= SYMMETRIC
     if not methods:
         methods = (TaoTron(), ReducedNewton()) if symmetric else (ReducedNewton(), SemismoothNewton())
@@ -173,6 +173,8 @@ def solve_linear(settings: Volume, methods: Sequence[Method], A: PetscMatrix, b:
     step = StepProblem(matrix, b, upper, surface, 1.0, start, none, 0.0, 0, lower=lower)
     for method in methods:
         solver = replace(settings, method=method).prepare(matrix, surface, 1.0)
+        if tried:
+            solver.excuse_options()  # they were for the method before
         try:
             found = solver.solve(step)
             return np.clip(found.x, lower, upper), found.iterations, type(method).__name__

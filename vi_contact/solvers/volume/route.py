@@ -47,7 +47,8 @@ class Volume:
 
     Attributes:
         method: ReducedNewton (the reference), SemismoothNewton or TaoTron.
-        petsc_options: PETSc options without prefix, e.g. {"snes_monitor": None}; the command line overrides them.
+        petsc_options: PETSc options without prefix, e.g. {"snes_monitor": None}; the command line overrides them. One
+            that nothing has read by the end of the first step with an iteration is refused, with the nearest known.
         prefix: the prefix of these options on the command line and in PETSC_OPTIONS.
         tolerance: the largest relative error that is accepted when a solver stops improving above round-off."""
 
@@ -86,6 +87,7 @@ class PreparedVolume:
         self._system = BoundedSystem(A, surface, scale)
         PETSc.garbage_cleanup(self._system.comm)
         self._settings, self._method = settings, settings.method
+        self._comm, self._read, self._all_read = surface.comm, set[str](), False
         ranks = surface.comm.size
         own = settings.method.defaults(ranks)
         self._layers = self._layered(own if self._system.symmetric else {**own, **direct("lu", ranks)})
@@ -95,7 +97,7 @@ class PreparedVolume:
         self._driver: SnesDriver | TaoDriver | None = self._method.driver(self._scaled, self._layers)
 
     def _layered(self, defaults: Options) -> OptionLayers:
-        return OptionLayers(self._settings.prefix, defaults, self._settings.petsc_options)
+        return OptionLayers(self._settings.prefix, defaults, self._settings.petsc_options, self._read)
 
     def _friction_method(self) -> VolumeFriction:
         """The problem with friction, made at the first step that has some, in the place of the other one."""
@@ -131,7 +133,7 @@ class PreparedVolume:
     def solve(self, step: StepProblem) -> StepResult:
         """Return the step; StepFailure with PETSc's reason when it does not converge."""
         try:
-            return self._solve(step) if step.slip0 is None else self._friction_method().solve(step)
+            found = self._solve(step) if step.slip0 is None else self._friction_method().solve(step)
         except PETSc.Error as error:
             self.close()  # its state is unknown; the next step gets a new one
             if error.__cause__ is not None:
@@ -140,6 +142,18 @@ class PreparedVolume:
         except StepFailure:
             self.close()
             raise
+        self._refuse_unread(found.iterations)
+        return found
+
+    def excuse_options(self) -> None:
+        """Take options that nothing reads: they are for another method, in whose place this one is tried."""
+        self._all_read = True
+
+    def _refuse_unread(self, iterations: int) -> None:
+        """Raise InputError for options that nothing has read, once the parts of the solver have been at work."""
+        if iterations and not self._all_read:
+            self._all_read = True
+            self._layers.refuse_unread(self._name, self._comm)
 
     def _solve(self, step: StepProblem) -> StepResult:
         """The step without friction."""

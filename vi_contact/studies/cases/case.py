@@ -47,9 +47,10 @@ from .own_classes import packages
 from .parsing import Words, arguments, nearest, read
 from .stage_tables import Stage, split
 from .stages import Reached, run_stages
-from .strain_compatible import CALL, iterate
+from .strain_compatible import CALL, iterate, with_known_damping
 from .table_calls import Call, Callee, Group, Node, Spot, build, callee, needs_body, nodes_in
 from .toml_file import read_toml, with_settings
+from .unread_choices import Part, findings, refuse_unread
 from .vocabulary import MeshFile, Parts, weight, words
 
 _TABLES: dict[str, Any] = {  # in the order in which they are read: type of what a table makes, or the one call it is
@@ -223,7 +224,8 @@ class Case:
         mesh, tags = self.meshed(comm)
         early = "excitation" not in self.nodes or not needs_body(self.nodes["excitation"])  # else they need the system
         shaking = {"excitations": self.excitations()} if early else {}
-        system = self._made("system", mesh=mesh, tags=tags, **shaking)
+        body = with_known_damping(self.nodes["system"]) if "strain_compatible" in self.nodes else self.nodes["system"]
+        system = build(body, {"mesh": mesh, "tags": tags, **shaking})
         system = self._made("gravity", system=system, tags=tags) if "gravity" in self.nodes else system
         none = empty_surface(system.algebra.comm, system.space.dimension)
         surfaces = self._several("contact", system=system, tags=tags) or (none,)
@@ -266,7 +268,16 @@ def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence
     nobody knows (with the nearest known), a missing key, a value of the wrong kind. Groups are looked up by ``run``."""
     check("read_case", "path", path, str | Path)
     path = Path(path)
-    tables = with_settings(read_toml(path), settings)
+    file = read_toml(path)
+    case = _read(path, with_settings(file, settings), settings, allow)
+    found = _unread(case)
+    if found:
+        refuse_unread(found, _unread_in(path, file, allow) if settings else [], settings)
+    return case
+
+
+def _read(path: Path, tables: Mapping[str, Any], settings: Sequence[str], allow: Sequence[str]) -> Case:
+    """Return the case of tables that have their settings."""
     allowed = packages(allow)
     known = words(base_folder(path), allowed)
     check_format(path, tables)
@@ -279,6 +290,23 @@ def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence
     stages = tuple(replace(one, case=replace(whole, nodes=_nodes(one.tables, one.label, known)))
                    for one in split(path, tables))
     return replace(whole, nodes=stages[-1].case.nodes if stages else _nodes(tables, str(path), known), stages=stages)
+
+
+def _unread(case: Case) -> list[tuple[str, str]]:
+    """Return the choices of a case that nothing reads: key and sentence of each."""
+    if case.stages:
+        parts = [Part(one.label, one.tables, one.case.nodes, one.static) for one in case.stages]
+    else:
+        parts = [Part(str(case.path), case.tables, case.nodes)]
+    return list(findings(case.path, case.tables, parts))
+
+
+def _unread_in(path: Path, tables: Mapping[str, Any], allow: Sequence[str]) -> list[tuple[str, str]]:
+    """Return the same of a file alone; none where it is no case without the settings that complete it."""
+    try:
+        return _unread(_read(path, tables, (), allow))
+    except InputError:
+        return []
 
 
 def _nodes(tables: Mapping[str, Any], source: str, known: Words) -> dict[str, Node]:

@@ -21,7 +21,7 @@ from ...run.files.folder import locked, move_run, remove_if_empty, remove_run, r
 from ...run.recorders import Contact, Energy
 from ...run.simulate import Solution
 from ...soil.strain_compatible import strain_compatible
-from .table_calls import Call, build, callee
+from .table_calls import Call, build, callee, nodes_in
 
 PLACE = "iterations"  # in the run folder
 CALL = replace(callee(strain_compatible, only=("curves", "ratio", "tolerance", "most"), given=()), function=dict)
@@ -66,6 +66,13 @@ def iterate(case: Any, comm: Any, folder: Path | None, *, restart: bool | str | 
             told = to_json({"changes": found.changes}).encode()
             on_root(ranks, partial(write_atomically, folder / "strain_compatible.json", told))
         return found.solution
+
+
+def with_known_damping(system: Call) -> Call:
+    """Return the call of [system] without its damping where no material has a ratio: curves give them, run by run."""
+    ratios = [one for one in nodes_in(system) if isinstance(one, Call) and one.arguments.get("xi")]
+    known = {name: node for name, node in system.arguments.items() if name != "damping" or ratios}
+    return replace(system, arguments=known)
 
 
 def _set_aside(folder: Path, number: int) -> None:
