@@ -62,6 +62,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "house/test_architecture.py": "core.lazy",
     "laws/test_excitation.py": "ground_motion.excitation",
     "meshes/test_ball.py": "meshes.checks meshes.extract meshes.mesh_file",
+    "meshes/test_geo_file.py": "meshes.geo_script",
     "meshes/test_mesh_files.py": "meshes.channel",
     "meshes/test_meshes.py": "meshes.gmsh_session meshes.grid meshes.wall",
     "meshes/test_partition.py": "meshes.rows",

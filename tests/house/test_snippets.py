@@ -17,7 +17,6 @@ from typing import Any
 import pytest
 from site_pages import DOCS, FENCE, ROOT, blocks, loaded
 
-import vi_contact
 from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
 from vi_contact.studies import read_case

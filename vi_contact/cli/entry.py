@@ -6,7 +6,7 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 
-from ..core.errors import InputError, Interrupted, OutOfTime, ViContactError
+from ..core.errors import Interrupted, OutOfTime, ViContactError
 from ..core.version import __version__
 from .case import add_case_commands
 from .errors import Parser, check_words, fail_together, keep_streams, say, told, world
