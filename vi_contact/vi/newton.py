@@ -1,0 +1,116 @@
+"""Find the answer by Newton's method for variational inequalities, when F(u; v) is given.
+
+Each step solves F(u_k) + J(u_k) (u - u_k) in the place of F between the same bounds (N. H. Josephy, 1979, Newton's
+method for generalized equations) and goes towards the answer as far as makes the natural residual smaller.
+
+The first step begins at the u that was given, *before* Dirichlet conditions and bounds have changed it, and carries
+their change through the body with the linear step. Written into u by themselves they would turn the cells beside a
+clamped side inside out as soon as the change is larger than a cell."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core.algebra import Array
+from ..core.errors import StepFailure
+from ..solvers.volume.route import Method, Volume
+from .forms import Problem
+from .judged import Judged
+from .linear_steps import LinearSteps, reduced_step
+
+ARMIJO = 1e-4  # the part of what the slope promises that a step must bring
+HALVINGS = 12  # of a step that brings too little
+REFINEMENTS = 5  # of a linear problem, at most
+
+
+@dataclass
+class Found:
+    """Hold where a method stopped: the best u, how many steps it took, with which inner method, and what failed."""
+
+    best: Judged
+    steps: int = 0
+    inner: int = 0
+    method: str = ""
+    failure: str = ""
+
+
+def begin(problem: Problem, lower: Array, upper: Array) -> Judged:
+    """Write where to begin into u, and judge it: u as it was given if conditions and bounds change a problem that is
+    not linear, else, and where F is not a number at this u, u with the conditions and between the bounds. Collective.
+    """
+    given = problem.x
+    if not problem.constant and problem.moves(lower, upper):
+        problem.put(given, 1.0)
+        point = Judged(problem, lower, upper, 1.0)
+        if not point.broken:
+            return point
+    problem.put(np.clip(given, lower, upper))
+    return Judged(problem, lower, upper)
+
+
+def newton(problem: Problem, lower: Array, upper: Array, settings: Volume, methods: Sequence[Method],
+           limit: int) -> Found:
+    """Return where Newton's method ends: below the tolerance of the settings, or with a failure. Collective."""
+    point = begin(problem, lower, upper)
+    found = Found(point)
+    steps = LinearSteps(settings, methods, problem.comm)
+    limit = min(limit, REFINEMENTS) if problem.constant else limit
+    while found.best.certificate.worst > settings.tolerance:
+        if point.broken:
+            found.failure = "F or J is not a number there: check the form and the first guess"
+            return found
+        if found.steps == limit:
+            found.failure = "give a better first guess in u, or more iterations"
+            return found
+        left = take_step(found, point, steps)
+        if left is None:
+            return found
+        point = Judged(problem, lower, upper, left)
+        found.steps += 1
+        if point.certificate.worst < found.best.certificate.worst or found.best.left:
+            found.best = point
+    return found
+
+
+def take_step(found: Found, point: Judged, steps: LinearSteps) -> float | None:
+    """Take one step from a point, in u: towards the answer of the linear problem between the bounds or, where this one
+    is not found or leads nowhere, a reduced step. Return the share of the change of held unknowns that is then left;
+    None, and the reason in ``found``, where neither helps. Collective."""
+    start = np.clip(point.x, point.lower, point.upper)
+    try:
+        x, its, found.method = steps.solve(point.A, point.b, point.lower, point.upper, start)
+        found.inner += its
+        left = advance(point, x)
+        if left is not None:
+            return left
+        found.failure = "no step in Newton's direction improves u: give a better first guess"
+    except StepFailure as failure:
+        found.failure = str(failure)
+    if point.problem.constant:
+        return None
+    try:
+        left = advance(point, reduced_step(point))
+    except StepFailure:
+        return None
+    if left is not None:
+        found.failure, found.method = "", "reduced step"
+        found.inner += 1
+    return left
+
+
+def advance(point: Judged, target: Array) -> float | None:
+    """Go from a point towards the target as far as is an improvement, in u; return the share of the change of held
+    unknowns that is then left, None where no length helps. Collective."""
+    problem = point.problem
+    if problem.constant:
+        problem.put(target)
+        return 0.0
+    # Bounds widened by the point, which may lie outside: on the way to the target nothing leaves them but by rounding.
+    lower, upper = np.minimum(point.lower, point.x), np.maximum(point.upper, point.x)
+    step, natural = target - point.x, point.natural(point.x, point.F)
+    for length in 0.5 ** np.arange(HALVINGS):
+        x, left = np.clip(point.x + length * step, lower, upper), point.left * (1.0 - length)
+        if point.natural(x, point.put(x, left)) <= (1.0 - 2.0 * ARMIJO * length) * natural:
+            return float(left)
+    return None
