@@ -122,6 +122,29 @@ class Problem:
         values[: self.owned][self.free] = x
         self.u.x.scatter_forward()
 
+    def dot(self, x: Array, y: Array) -> float:
+        """Return x·y over all ranks. Collective."""
+        return total(self.comm, x @ y)
+
+    def count(self, mask: Mask) -> int:
+        """Return how many entries of a mask are True, over all ranks. Collective."""
+        return round(total(self.comm, np.count_nonzero(mask)))
+
+    def all(self, here: bool) -> bool:
+        """Say whether something is true on every rank. Collective."""
+        return not largest(self.comm, not here)
+
+    def places(self) -> Array:
+        """Return (n, 4) where the free unknowns are: coordinates as shares of the body's box, and the component as a
+        share of their number. Collective."""
+        space, width = self.u.function_space, self.u.function_space.dofmap.index_map_bs
+        x = space.tabulate_dof_coordinates()[: self.owned // width]
+        low = -self.comm.max(-np.min(x, axis=0, initial=np.inf))
+        high = self.comm.max(np.max(x, axis=0, initial=-np.inf))
+        shares = np.repeat((x - low) / np.where(high > low, high - low, 1.0), width, axis=0)
+        component = np.tile(np.arange(width) / width, len(x))
+        return np.column_stack([shares, component])[self.free]
+
     def put_back(self) -> None:
         """Write the first guess into u, with the held values that it had."""
         self.u.x.array[:] = self.given

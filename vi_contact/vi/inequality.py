@@ -13,13 +13,19 @@ import numpy as np
 
 from ..core.algebra import total
 from ..core.certificate import Certificate
-from ..core.checks import instance, whole
+from ..core.checks import instance, shown, whole
 from ..core.errors import StepFailure
 from ..fem import compat
 from ..fem.form_checks import refuse_complex
+from ..solvers.volume.options import OptionLayers
 from ..solvers.volume.route import Method, TaoTron, Volume
 from .forms import Problem, refused
-from .newton import newton
+from .linear_steps import is_symmetric
+from .minimum import minimise
+from .model import Model
+from .newton import Found, newton
+
+NEWTON_STEPS, DESCENT_STEPS = 50, 200  # at most, unless told otherwise
 
 
 @dataclass(frozen=True)
@@ -31,7 +37,7 @@ class Result:
     ``active``: how many unknowns are on their lower and upper bounds, those where the multiplier is above zero.
     ``certificate``: relative residuals (``core.certificate``): equilibrium of inactive unknowns, distance of active
     ones from their bound (complementarity), signs of distances (penetration) and of multipliers (tension).
-    ``iterations``, ``inner``: Newton steps, and iterations of ``method`` in them; ``seconds`` of this rank's processor.
+    ``iterations``, ``inner``: steps, and iterations of ``method`` in them, of conjugate gradients for an energy; ``seconds`` of this rank's processor.
     """
 
     u: Any
@@ -46,39 +52,101 @@ class Result:
     seconds: Mapping[str, float]
 
 
-def solve(form: Any, u: Any, *, lower: Any = None, upper: Any = None, bcs: Sequence[Any] = (), J: Any = None,
-          method: Method | None = None, petsc_options: Mapping[str, object | None] | None = None,
-          prefix: str = "vi_contact_vi_", tolerance: float = 1e-9, iterations: int = 50) -> Result:
-    """Solve F(u; v - u) >= 0 for all v between the bounds; u holds the first guess, and the answer.
+def solve(form: Any = None, u: Any = None, *, energy: Any = None, lower: Any = None, upper: Any = None,
+          bcs: Sequence[Any] = (), J: Any = None, method: Method | None = None,
+          petsc_options: Mapping[str, object | None] | None = None, prefix: str = "vi_contact_vi_",
+          tolerance: float = 1e-9, iterations: int | None = None) -> Result:
+    """Solve F(u; v - u) >= 0 for all v between the bounds, or find a local minimum of an energy between them; u holds
+    the first guess, and the answer.
 
-    ``form``: F(u; v) of UFL, linear or not in the Function u, or (a, L) for a(u, v) - L(v). ``lower``, ``upper``:
-    Functions on the space of u, Constants, numbers, one or one for each component, or None. ``bcs``: dirichletbc on
-    that space or its components. ``J``: the Jacobian, else the derivative of F.
+    ``form``: F(u; v) of UFL, linear or not in the Function u, or (a, L) for a(u, v) - L(v). ``energy``: in its place a
+    functional Pi(u), whose derivative is F; F need not be monotone then. The answer satisfies the same conditions, and
+    no direction of negative curvature is found there. ``lower``, ``upper``: Functions on the space of u, Constants,
+    numbers, one or one for each component, or None. ``bcs``: dirichletbc on that space or its components; what they
+    change in u goes into it with the first step. ``J``: the Jacobian, else the derivative of F.
     ``method``: TaoTron(), ReducedNewton() or SemismoothNewton() of ``solvers``; None takes the first two where J is
-    symmetric, the last two elsewhere. ``petsc_options``: for it, under ``prefix`` on the command line.
+    symmetric, the last two elsewhere. ``petsc_options``: for it, and of an energy for the preconditioner of conjugate
+    gradients, e.g. {"pc_type": "hypre"}; under ``prefix`` on the command line.
 
     The unknowns must be values at points (Lagrange of any degree, DG0, …): bounds hold there, which for degrees above
     one is not everywhere. InputError for forms, bounds and bcs that do not fit; StepFailure when the certificate stays
-    above ``tolerance`` after ``iterations`` Newton steps, with the best u so far kept. Collective."""
-    start, limit = time.process_time(), whole("vi.solve", "iterations", iterations, least=1)
+    above ``tolerance`` after ``iterations`` steps (None: 50, and 200 of an energy), with the best u so far kept.
+    Collective."""
+    start = time.process_time()
+    most = NEWTON_STEPS if energy is None else DESCENT_STEPS
+    limit = whole("vi.solve", "iterations", most if iterations is None else iterations, least=1)
     refuse_complex("vi.solve")
     instance("vi.solve", "u", u, compat.fem.Function, "give the DOLFINx Function to solve for")
     if not compat.nodal(u.function_space):
         raise refused("the unknowns of u are not values of one field at points: take Lagrange or DG0, not mixed")
+    refuse_choices(form, energy, J, method)
     settings = Volume(method or TaoTron(), {} if petsc_options is None else petsc_options, prefix, tolerance)
-    problem = Problem(form, u, bcs, J)
+
+    problem = Problem(form, u, bcs, J, energy)
     low, high = problem.bounds(lower, upper)
     ready = time.process_time()
+    methods = () if method is None else (method,)
+    layers = OptionLayers(prefix, preconditioner(problem.comm.size), settings.petsc_options)
     try:
-        found = newton(problem, low, high, settings, () if method is None else (method,), limit)
+        if energy is None:
+            found = newton(problem, low, high, settings, methods, limit)
+            if found.failure:
+                found.failure = remedy(found, layers)
+        else:
+            found = minimise(problem, low, high, tolerance, limit, layers)
     finally:
         problem.close()
-    best = found.best
-    problem.put(best.x, best.left)
-    reason = f"the certificate is {best.certificate.worst:.1e} after {found.steps} Newton steps"
+
+    best, steps = found.best, "Newton steps" if energy is None else "steps downhill"
+    reason = f"the certificate is {best.certificate.worst:.1e} after {found.steps} {steps}"
     if found.failure:
-        raise StepFailure(f"vi.solve: {reason}, above {tolerance:g}: {found.failure} (u holds the best iterate)")
+        raise failed(problem, found, f"vi.solve: {reason}, above {tolerance:g}: {found.failure}")
+    problem.put(best.x)
+    if energy is not None:
+        reason += ", at a local minimum: no direction of negative curvature is found"
     active = [round(total(problem.comm, np.count_nonzero(push))) for push in best.push]
     pushes, seconds = [problem.spread(one) for one in best.push], time.process_time() - ready
     return Result(u, pushes[0], pushes[1], (active[0], active[1]), best.certificate, found.steps, found.inner,
                   found.method, reason, {"setup": ready - start, "solve": seconds})
+
+
+def refuse_choices(form: Any, energy: Any, J: Any, method: Any) -> None:
+    """Raise InputError unless there is a form or an energy, and not both, nor what an energy has no use for."""
+    if form is None and energy is None:
+        raise refused("there is nothing to solve: give the form F(u; v), or energy=, a functional of u")
+    if form is not None and energy is not None:
+        raise refused("both a form and energy= are given: give one of them, as the form is the derivative of the energy")
+    if energy is not None and J is not None:
+        raise refused("J is given beside energy=, whose second derivative is J: leave J out")
+    if energy is not None and method is not None:
+        raise refused(f"method is {shown(method)}, which solves the linear steps of a form; leave it out with energy=")
+
+
+def preconditioner(ranks: int) -> Mapping[str, object | None]:
+    """Return the options that come before the user's, for the conjugate gradients of an energy."""
+    return {"pc_type": "icc"} if ranks == 1 else {"pc_type": "bjacobi", "sub_pc_type": "icc"}
+
+
+def remedy(found: Found, layers: OptionLayers) -> str:
+    """Return why Newton's method ended, with what to do when the Jacobian of F turns out not to be positive there.
+    Collective."""
+    point = found.best
+    if point.broken or point.problem.constant or not is_symmetric(point.A, point.problem.comm):
+        return found.failure
+    model = Model(point, layers)
+    negative = model.curves_down()
+    model.close()
+    if not negative:
+        return found.failure
+    return ("the Jacobian of F is not positive at this u, so that Newton's method may lead away from every answer: give "
+            "the functional whose derivative is F as energy= in the place of F, or take smaller load steps")
+
+
+def failed(problem: Problem, found: Found, sentence: str) -> StepFailure:
+    """Write the best values into u, or the first guess where conditions were never met, and return the error.
+    Collective."""
+    if found.best.left:
+        problem.put_back()
+        return StepFailure(f"{sentence} (u holds the first guess)")
+    problem.put(found.best.x)
+    return StepFailure(f"{sentence} (u holds the best iterate)")

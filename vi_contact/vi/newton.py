@@ -23,6 +23,10 @@ ARMIJO = 1e-4  # the part of what the slope promises that a step must bring
 HALVINGS = 12  # of a step that brings too little
 REFINEMENTS = 5  # of a linear problem, at most
 
+NO_STEP = "no step of Newton's method improves u: take smaller load steps, or give a better first guess"
+UNHELD = ("the linear problem is not solved: check that bcs or bounds hold u, that F is a(u, v) - L(v) with a(v, v) > 0, "
+          "and that its coefficients are finite, or try another method=")
+
 
 @dataclass
 class Found:
@@ -58,7 +62,7 @@ def newton(problem: Problem, lower: Array, upper: Array, settings: Volume, metho
     limit = min(limit, REFINEMENTS) if problem.constant else limit
     while found.best.certificate.worst > settings.tolerance:
         if point.broken:
-            found.failure = "F or J is not a number there: check the form and the first guess"
+            found.failure = "F or its Jacobian is not a number there: check the form and the first guess"
             return found
         if found.steps == limit:
             found.failure = "give a better first guess in u, or more iterations"
@@ -84,9 +88,10 @@ def take_step(found: Found, point: Judged, steps: LinearSteps) -> float | None:
         left = advance(point, x)
         if left is not None:
             return left
-        found.failure = "no step in Newton's direction improves u: give a better first guess"
+        found.failure = NO_STEP
     except StepFailure as failure:
-        found.failure = str(failure)
+        found.failure = UNHELD if point.problem.constant else NO_STEP
+        found.petsc = str(failure)
     if point.problem.constant:
         return None
     try:
