@@ -78,7 +78,7 @@ class Problem:
 
     Attributes:
         constant: whether J is the same at every u, so that the problem is linear.
-        given: the values of u before the first step, those of ghosts too."""
+        given: the values of u before the first step (of a part of the change, see ``aim``), those of ghosts too."""
 
     def __init__(self, form: Any, u: Any, bcs: Sequence[Any], J: Any, energy: Any = None) -> None:
         if energy is None:
@@ -90,11 +90,12 @@ class Problem:
         self.owned = space.dofmap.index_map_bs * space.dofmap.index_map.size_local
         if not isinstance(bcs, list | tuple) or not all(compat.constrains(bc, space) for bc in bcs):
             raise refused("bcs is wrong: give a list of dirichletbc objects on the space of u or its components")
-        self.given = np.array(u.x.array)
+        self.given = self._first = np.array(u.x.array)
         self._held, self._values = np.zeros(len(self.given), dtype=bool), np.zeros(len(self.given))
         for bc in bcs:
             held, values = compat.bc_values(bc, len(self._values))
             self._held[held], self._values[held] = True, values
+        self._prescribed = self._values
         self.free: Mask = ~self._held[: self.owned]
         for one in (F, J):
             refuse_not_linear("vi.solve: F or J", one)
@@ -146,8 +147,16 @@ class Problem:
         return np.column_stack([shares, component])[self.free]
 
     def put_back(self) -> None:
-        """Write the first guess into u, with the held values that it had."""
-        self.u.x.array[:] = self.given
+        """Write the first guess into u, with the held values that it had, as if nothing had been done."""
+        self.u.x.array[:] = self.given = self._first
+        self._values = self._prescribed
+
+    def aim(self, share: float) -> None:
+        """Take the present u for the first guess, and as prescribed values those that are so far on the way from the
+        values of the very first guess."""
+        self.given = np.array(self.u.x.array)
+        way = self._prescribed - self._first
+        self._values = self._prescribed if share == 1.0 else self._first + share * way
 
     def residual(self) -> Array:
         """Return F at u. Collective."""

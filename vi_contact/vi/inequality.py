@@ -20,12 +20,13 @@ from ..fem.form_checks import refuse_complex
 from ..solvers.volume.options import OptionLayers
 from ..solvers.volume.route import Method, TaoTron, Volume
 from .forms import Problem, refused
+from .judged import Judged
 from .linear_steps import is_symmetric
 from .minimum import minimise
 from .model import Model
-from .newton import Found, newton
+from .newton import Found, solve_in_parts
 
-NEWTON_STEPS, DESCENT_STEPS = 50, 200  # at most, unless told otherwise
+NEWTON_STEPS, DESCENT_STEPS = 50, 500  # at most, unless told otherwise
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,7 @@ def solve(form: Any = None, u: Any = None, *, energy: Any = None, lower: Any = N
 
     The unknowns must be values at points (Lagrange of any degree, DG0, …): bounds hold there, which for degrees above
     one is not everywhere. InputError for forms, bounds and bcs that do not fit; StepFailure when the certificate stays
-    above ``tolerance`` after ``iterations`` steps (None: 50, and 200 of an energy), with the best u so far kept.
+    above ``tolerance`` after ``iterations`` steps (None: 50, and 500 of an energy), with the best u so far kept.
     Collective."""
     start = time.process_time()
     most = NEWTON_STEPS if energy is None else DESCENT_STEPS
@@ -89,7 +90,7 @@ def solve(form: Any = None, u: Any = None, *, energy: Any = None, lower: Any = N
     layers = OptionLayers(prefix, preconditioner(problem.comm.size), settings.petsc_options)
     try:
         if energy is None:
-            found = newton(problem, low, high, settings, methods, limit)
+            found = solve_in_parts(problem, low, high, settings, methods, limit)
             if found.failure:
                 found.failure = remedy(found, layers)
         else:
@@ -130,8 +131,13 @@ def preconditioner(ranks: int) -> Mapping[str, object | None]:
 def remedy(found: Found, layers: OptionLayers) -> str:
     """Return why Newton's method ended, with what to do when the Jacobian of F turns out not to be positive there.
     Collective."""
-    point = found.best
-    if point.broken or point.problem.constant or not is_symmetric(point.A, point.problem.comm):
+    best = found.best
+    problem = best.problem
+    if best.broken or problem.constant:
+        return found.failure
+    problem.put(best.x, best.left)
+    point = Judged(problem, best.lower, best.upper, best.left)  # its Jacobian, which later points have replaced
+    if not is_symmetric(point.A, problem.comm):
         return found.failure
     model = Model(point, layers)
     negative = model.curves_down()

@@ -41,7 +41,8 @@ class Judged:
 
         # A bound acts where the multiplier, in units of forces, exceeds the distance, in units of u.
         below, above = self.x - lower, upper - self.x
-        at_lower, at_upper = below * r_ref < self.F * x_ref, above * r_ref < -self.F * x_ref
+        with np.errstate(invalid="ignore"):  # a broken point may have no size
+            at_lower, at_upper = below * r_ref < self.F * x_ref, above * r_ref < -self.F * x_ref
         self.push = np.where(at_lower, self.F, 0.0), np.where(at_upper, -self.F, 0.0)
 
         # The certificate: forces that no bound carries; distances below zero; multipliers below zero; distances from

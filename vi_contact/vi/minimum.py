@@ -104,7 +104,11 @@ def descend(found: Found, tolerance: float, limit: int, layers: OptionLayers) ->
                 model = Model(point, layers)
                 found.best, found.steps = point, found.steps + 1
                 continue
-            radius = 0.25 * length
+            # Judging the broken point has replaced the Jacobian of this one: judge it again.
+            model.close()
+            problem.put(point.x)
+            point = Judged(problem, point.lower, point.upper)
+            model, radius = Model(point, layers), 0.25 * length
         if done and radius <= 1e-6 * first:
             break  # the curvature that was found is rounding
         if radius <= SHORTEST * first:

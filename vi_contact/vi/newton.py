@@ -20,7 +20,8 @@ from .judged import Judged
 from .linear_steps import LinearSteps, reduced_step
 
 ARMIJO = 1e-4  # the part of what the slope promises that a step must bring
-HALVINGS = 12  # of a step that brings too little
+HALVINGS = 24  # of a step that brings too little
+SMALLEST_PART = 1.0 / 16.0  # of the change that Dirichlet conditions bring, when it is taken in parts
 REFINEMENTS = 5  # of a linear problem, at most
 
 NO_STEP = "no step of Newton's method improves u: take smaller load steps, or give a better first guess"
@@ -30,9 +31,10 @@ UNHELD = ("the linear problem is not solved: check that bcs or bounds hold u, th
 
 @dataclass
 class Found:
-    """Hold where a method stopped: the best u, how many steps it took, with which inner method, and what failed."""
+    """Hold where a method stopped: the best u, whether conditions or bounds had to move the first guess, how many steps it took, with which inner method, and what failed."""
 
     best: Judged
+    moved: bool = False
     steps: int = 0
     inner: int = 0
     method: str = ""
@@ -53,11 +55,38 @@ def begin(problem: Problem, lower: Array, upper: Array) -> Judged:
     return Judged(problem, lower, upper)
 
 
+def solve_in_parts(problem: Problem, lower: Array, upper: Array, settings: Volume, methods: Sequence[Method],
+                   limit: int) -> Found:
+    """Return where Newton's method ends. Where it fails as Dirichlet conditions change the first guess too much at
+    once, they change it in parts, each from the answer of the part before. Collective."""
+    whole = newton(problem, lower, upper, settings, methods, limit)
+    if not whole.failure or not whole.moved:
+        return whole
+    problem.put_back()
+    reached, part, steps, inner = 0.0, 0.5, whole.steps, whole.inner
+    while part >= SMALLEST_PART:
+        before = np.array(problem.u.x.array)
+        problem.aim(reached + part)
+        found = newton(problem, lower, upper, settings, methods, limit)
+        steps, inner = steps + found.steps, inner + found.inner
+        if found.failure:
+            problem.u.x.array[:] = before
+            part *= 0.5
+            continue
+        problem.put(found.best.x)
+        reached += part
+        if reached == 1.0:
+            found.steps, found.inner = steps, inner
+            return found
+    problem.put_back()
+    return whole
+
+
 def newton(problem: Problem, lower: Array, upper: Array, settings: Volume, methods: Sequence[Method],
            limit: int) -> Found:
     """Return where Newton's method ends: below the tolerance of the settings, or with a failure. Collective."""
     point = begin(problem, lower, upper)
-    found = Found(point)
+    found = Found(point, moved=point.left > 0.0)
     steps = LinearSteps(settings, methods, problem.comm)
     limit = min(limit, REFINEMENTS) if problem.constant else limit
     while found.best.certificate.worst > settings.tolerance:
@@ -111,8 +140,9 @@ def advance(point: Judged, target: Array) -> float | None:
     if problem.constant:
         problem.put(target)
         return 0.0
-    # Bounds widened by the point, which may lie outside: on the way to the target nothing leaves them but by rounding.
-    lower, upper = np.minimum(point.lower, point.x), np.maximum(point.upper, point.x)
+    # Bounds widened by both ends, which may lie outside: on the way nothing leaves them but by rounding.
+    lower = np.minimum(point.lower, np.minimum(point.x, target))
+    upper = np.maximum(point.upper, np.maximum(point.x, target))
     step, natural = target - point.x, point.natural(point.x, point.F)
     for length in 0.5 ** np.arange(HALVINGS):
         x, left = np.clip(point.x + length * step, lower, upper), point.left * (1.0 - length)
