@@ -4,6 +4,7 @@ Newton's method (N. H. Josephy, 1979) solves F(u_k) + J(u_k) (u - u_k) in the pl
 towards the answer as far as makes the natural residual u - mid(lower, u - F/J_ii, upper) smaller by a part of what the
 slope promises. A linear problem takes one step."""
 
+import logging
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -26,6 +27,12 @@ from .minimum import minimise
 from .model import Model
 from .newton import Found, solve_in_parts
 
+log = logging.getLogger(__name__)
+
+NEGATIVE = ("the Jacobian of F is not positive at this u, so that Newton's method may lead away from every answer: give "
+            "the functional whose derivative F is as energy= in the place of F, or take smaller load steps")
+HILL = ("the Jacobian of F is not positive at the answer: if F is the derivative of an energy, this u is no minimum of it, "
+        "and energy= in the place of F finds one")
 NEWTON_STEPS, DESCENT_STEPS = 50, 500  # at most, unless told otherwise
 
 
@@ -91,18 +98,21 @@ def solve(form: Any = None, u: Any = None, *, energy: Any = None, lower: Any = N
     try:
         if energy is None:
             found = solve_in_parts(problem, low, high, settings, methods, limit)
-            if found.failure:
-                found.failure = remedy(found, layers)
+            hill = (found.failure or found.doubted) and curves_down(found, layers)
         else:
-            found = minimise(problem, low, high, tolerance, limit, layers)
+            found, hill = minimise(problem, low, high, tolerance, limit, layers), False
     finally:
         problem.close()
 
     best, steps = found.best, "Newton steps" if energy is None else "steps downhill"
     reason = f"the certificate is {best.certificate.worst:.1e} after {found.steps} {steps}"
     if found.failure:
-        raise failed(problem, found, f"vi.solve: {reason}, above {tolerance:g}: {found.failure}")
+        raise failed(problem, found, f"vi.solve: {reason}, above {tolerance:g}: {NEGATIVE if hill else found.failure}")
     problem.put(best.x)
+    if hill:
+        reason += f", {HILL}"
+        if problem.comm.rank == 0:
+            log.warning("vi.solve: %s", HILL)
     if energy is not None:
         reason += ", at a local minimum: no direction of negative curvature is found"
     active = [round(total(problem.comm, np.count_nonzero(push))) for push in best.push]
@@ -128,24 +138,20 @@ def preconditioner(ranks: int) -> Mapping[str, object | None]:
     return {"pc_type": "icc"} if ranks == 1 else {"pc_type": "bjacobi", "sub_pc_type": "icc"}
 
 
-def remedy(found: Found, layers: OptionLayers) -> str:
-    """Return why Newton's method ended, with what to do when the Jacobian of F turns out not to be positive there.
-    Collective."""
+def curves_down(found: Found, layers: OptionLayers) -> bool:
+    """Say whether F has a symmetric Jacobian with a direction of negative curvature at the best u. Collective."""
     best = found.best
     problem = best.problem
     if best.broken or problem.constant:
-        return found.failure
+        return False
     problem.put(best.x, best.left)
     point = Judged(problem, best.lower, best.upper, best.left)  # its Jacobian, which later points have replaced
     if not is_symmetric(point.A, problem.comm):
-        return found.failure
+        return False
     model = Model(point, layers)
     negative = model.curves_down()
     model.close()
-    if not negative:
-        return found.failure
-    return ("the Jacobian of F is not positive at this u, so that Newton's method may lead away from every answer: give "
-            "the functional whose derivative is F as energy= in the place of F, or take smaller load steps")
+    return negative
 
 
 def failed(problem: Problem, found: Found, sentence: str) -> StepFailure:

@@ -19,6 +19,7 @@ ACCEPTED = 1e-4  # the part of the promised decrease that a step must bring
 POOR, GOOD = 0.25, 0.75  # parts of it below which the radius shrinks and above which it grows
 FIRST_RADIUS = 1e3  # steps of Jacobi's method: the first radius
 DIGITS = 1e-8  # of the energy: a smaller decrease is taken from forces, as energies cancel
+UNBOUNDED = 1e30  # times the first radius: no answer is so far away
 SHORTEST = 1e-14  # of the first radius, and of the whole change of the conditions
 NOT_A_NUMBER = "the energy or its derivatives are not a number there: check the energy and the first guess"
 TOO_FEW = "the iterations are used up: give a better first guess in u, or more iterations"
@@ -58,6 +59,7 @@ def carry_conditions(found: Found, layers: OptionLayers) -> None:
     found.failure = "Dirichlet conditions or bounds lead where the energy is not a number: take a smaller load step"
 
 
+@np.errstate(over="ignore", invalid="ignore")  # energies that have no minimum
 def descend(found: Found, tolerance: float, limit: int, layers: OptionLayers) -> None:
     """Go down from the best point until it is a local minimum. Collective."""
     point = found.best
@@ -68,21 +70,22 @@ def descend(found: Found, tolerance: float, limit: int, layers: OptionLayers) ->
         return
     model = Model(point, layers)
     radius = first = FIRST_RADIUS * model.jacobi_step()
+    shrunk = 1.0  # the length of a step along negative curvature, as a share of the first one that is tried
     while True:
         done = point.certificate.worst <= tolerance
         if done:
             # First-order conditions hold. A maximum or a saddle is left along a direction of negative curvature.
-            step, its = model.downward(radius or 1.0)
+            step, its = model.downward(shrunk)
             found.inner += its
             if step is None:
                 break
             radius = first = model.length(step)
-        elif found.steps >= limit:
-            found.failure = TOO_FEW
-            break
         else:
             step, its = model.minimise(radius)
             found.inner += its
+        if found.steps >= limit or radius > UNBOUNDED * first:
+            found.failure = TOO_FEW if found.steps >= limit else NO_DESCENT
+            break
         promised, length = -model.value(step), model.length(step)
 
         problem.put(np.clip(point.x + step, point.lower, point.upper))
@@ -102,16 +105,19 @@ def descend(found: Found, tolerance: float, limit: int, layers: OptionLayers) ->
                 model.close()
                 point, energy = next_point, trial
                 model = Model(point, layers)
-                found.best, found.steps = point, found.steps + 1
+                found.best, found.steps, shrunk = point, found.steps + 1, 1.0
                 continue
             # Judging the broken point has replaced the Jacobian of this one: judge it again.
             model.close()
             problem.put(point.x)
             point = Judged(problem, point.lower, point.upper)
             model, radius = Model(point, layers), 0.25 * length
-        if done and radius <= 1e-6 * first:
-            break  # the curvature that was found is rounding
-        if radius <= SHORTEST * first:
+        if done:
+            # Too far in this direction: shorter, until what is promised is rounding of the energy.
+            shrunk *= 0.25
+            if shrunk <= SHORTEST:
+                break
+        elif radius <= SHORTEST * first:
             found.failure = NO_DESCENT
             break
     model.close()

@@ -5,6 +5,8 @@
 First comes the Cauchy step, along the projected direction of steepest descent in the norm above. From there conjugate
 gradients run on the unknowns that are off their bounds, some rounds, as each round may bring others onto them."""
 
+from typing import Any
+
 import numpy as np
 from petsc4py import PETSc
 
@@ -19,6 +21,8 @@ ROUNDS = 20  # of conjugate gradients, each on the unknowns that are then off th
 FORCING = 1e-2  # how far a round of conjugate gradients reduces the residual of the model, at most
 SMALLEST = 1e-10  # and at least
 PROBED = 1e-8  # reduction of the residual of the search for negative curvature
+PART = 0.02  # of the energy, by which the first step along negative curvature changes it
+EVEN = 1e-9  # of the energy: two sides of a hill that differ by less are equal
 MOST = 2000  # conjugate gradient iterations of a round
 
 
@@ -76,22 +80,27 @@ class Model:
                 break  # the edge of the region is reached, or no further bound
         return s, count
 
-    def downward(self, radius: float) -> tuple[Array | None, int]:
-        """Return (s, iterations): a step of this length along a direction of negative curvature on the unknowns that no
-        bound holds, on the side where the energy is lower; None where conjugate gradients find no such direction.
-        Collective."""
+    def downward(self, share: float) -> tuple[Array | None, int]:
+        """Return (s, iterations): a step along a direction of negative curvature on the unknowns that no bound holds, on
+        the side where the energy is lower; None where conjugate gradients find no such direction. Its length is this
+        share of one that, by the curvature, changes the energy by a part of its size. Collective."""
         direction, its = self._negative()
         if direction is None:
             return None, its
-        s = direction * (radius / self.length(direction))
+        self.problem.put(self.x)
+        energy = abs(self.problem.energy())
+        curvature = -self.problem.dot(direction, self.J @ direction)
+        length = np.sqrt(2.0 * PART * energy / curvature) * self.length(direction)
+        if length == 0.0:  # an energy of zero tells nothing: the size of the field, or of one where there is none
+            length = self.length(np.full_like(self.x, self.problem.size or 1.0))
+        s = direction * (share * length / self.length(direction))
         sides = [self._projected(one) for one in (s, -s)]
         energies = []
         for one in sides:
             self.problem.put(self.x + one)
             energies.append(self.problem.energy())
         # Of two sides that differ by rounding the first is taken, whatever the number of ranks.
-        lower_by = energies[0] - energies[1]
-        second = lower_by > 1e-9 * max(abs(energies[0]), abs(energies[1]))
+        second = energies[0] > energies[1] + EVEN * abs(energies[1])
         return sides[1] if second else sides[0], its
 
     def curves_down(self) -> bool:
@@ -216,9 +225,7 @@ class Preconditioner:
         self._pc.setOptionsPrefix(layers.prefix)
         block.mat.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         self._pc.setOperators(block.mat)
-        with layers.in_force():
-            self._pc.setFromOptions()
-            self._pc.setUp()
+        layers.apply(self._pc, _set_up)
 
     def __call__(self, r: Array) -> Array:
         self._x.array[:] = r
@@ -229,6 +236,11 @@ class Preconditioner:
         """Free the PETSc objects. Collective."""
         for one in (self._pc, self._x, self._y):
             one.destroy()
+
+
+def _set_up(pc: Any, _layers: OptionLayers) -> None:
+    """Set a preconditioner up while its options are in force. Collective."""
+    pc.setUp()
 
 
 def _uneven(places: Array) -> Array:

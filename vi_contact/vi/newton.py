@@ -7,6 +7,7 @@ The first step begins at the u that was given, *before* Dirichlet conditions and
 their change through the body with the linear step. Written into u by themselves they would turn the cells beside a
 clamped side inside out as soon as the change is larger than a cell."""
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -19,11 +20,14 @@ from .forms import Problem
 from .judged import Judged
 from .linear_steps import LinearSteps, reduced_step
 
+log = logging.getLogger(__name__)
+
 ARMIJO = 1e-4  # the part of what the slope promises that a step must bring
 HALVINGS = 24  # of a step that brings too little
 SMALLEST_PART = 1.0 / 16.0  # of the change that Dirichlet conditions bring, when it is taken in parts
 REFINEMENTS = 5  # of a linear problem, at most
 
+NOT_A_NUMBER = "F or its Jacobian is not a number there: check the form and the first guess"
 NO_STEP = "no step of Newton's method improves u: take smaller load steps, or give a better first guess"
 UNHELD = ("the linear problem is not solved: check that bcs or bounds hold u, that F is a(u, v) - L(v) with a(v, v) > 0, "
           "and that its coefficients are finite, or try another method=")
@@ -31,7 +35,8 @@ UNHELD = ("the linear problem is not solved: check that bcs or bounds hold u, th
 
 @dataclass
 class Found:
-    """Hold where a method stopped: the best u, whether conditions or bounds had to move the first guess, how many steps it took, with which inner method, and what failed."""
+    """Hold where a method stopped: the best u, whether conditions or bounds had to move the first guess, how many steps it took, with which inner method, what failed,
+    and whether a method for positive Jacobians did."""
 
     best: Judged
     moved: bool = False
@@ -39,6 +44,7 @@ class Found:
     inner: int = 0
     method: str = ""
     failure: str = ""
+    doubted: bool = False
 
 
 def begin(problem: Problem, lower: Array, upper: Array) -> Judged:
@@ -91,12 +97,13 @@ def newton(problem: Problem, lower: Array, upper: Array, settings: Volume, metho
     limit = min(limit, REFINEMENTS) if problem.constant else limit
     while found.best.certificate.worst > settings.tolerance:
         if point.broken:
-            found.failure = "F or its Jacobian is not a number there: check the form and the first guess"
+            found.failure = NO_STEP if found.steps else NOT_A_NUMBER
             return found
         if found.steps == limit:
             found.failure = "give a better first guess in u, or more iterations"
             return found
         left = take_step(found, point, steps)
+        found.doubted = bool(steps.failed)
         if left is None:
             return found
         point = Judged(problem, lower, upper, left)
@@ -120,7 +127,7 @@ def take_step(found: Found, point: Judged, steps: LinearSteps) -> float | None:
         found.failure = NO_STEP
     except StepFailure as failure:
         found.failure = UNHELD if point.problem.constant else NO_STEP
-        found.petsc = str(failure)
+        log.debug("vi.solve: %s", failure)
     if point.problem.constant:
         return None
     try:
