@@ -4,23 +4,28 @@
     python3 benchmarks/load_steps.py [--cells 16 32 64] [--steps 0.1 0.2] [--json FILE]
     mpirun -n 2 python3 benchmarks/load_steps.py
 
-A block, 1 wide and 2 high in plane strain, of compressible neo-Hookean material with E = 1 and nu = 0.3 at small strain,
-has n x 2n squares of two triangles. Its top is moved down by 0.8 in equal steps and held sideways. No node of its
-boundary may pass the floor at height 0, u_y >= -y. Every step starts from the answer of the step before.
+A block, 1 wide and 2 high in plane strain, of compressible neo-Hookean material with E = 1 and
+nu = 0.3 at small strain, has n x 2n squares of two triangles. Its top is moved down by 0.8 in equal
+steps and held sideways. No node of its boundary may pass the floor at height 0, u_y >= -y. Every
+step starts from the answer of the step before.
 
-"SNES" is PETSc's vinewtonrsls with the line search bt and a factor of MUMPS in every iteration. Its Dirichlet data are
-lifted as DOLFINx does it: the residual of the free unknowns is that of the linear step to the prescribed values. A
-tolerance of 1e-9 relative to the first residual ends it. Each row is one size of mesh and of step; it ends at the first
-step that fails. ``iterations`` are Newton steps of all load steps, ``linear`` the iterations of the linear methods in
-them, ``certificate`` the worst one, ``failures`` the load steps that were not solved (0 or 1), ``difference`` the largest
-difference of u at the last step that both solved, as a share of 0.8. ``ratio`` is the processor time of ``vi.solve``
-over that of SNES for the load steps that both solved, of the busiest rank.
+"SNES" is PETSc's vinewtonrsls with the line search bt and a factor of MUMPS in every iteration. Its
+Dirichlet data are lifted as DOLFINx does it: the residual of the free unknowns is that of the linear
+step to the prescribed values. A tolerance of 1e-9 relative to the first residual ends it.
+
+Each row is one size of mesh and of step; it ends at the first step that fails. ``iterations`` are
+Newton steps of all load steps, ``linear`` the iterations of the linear methods in them,
+``certificate`` the worst one, ``failures`` the load steps that were not solved (0 or 1). SNES has
+its own ``snes_...``. ``difference`` is the largest difference of u at the last step that both
+solved, as a share of 0.8. ``ratio`` is the processor time of ``vi.solve`` over that of SNES for the
+load steps that both solved, of the busiest rank.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import logging
 import os
 import sys
 import time
@@ -42,6 +47,7 @@ from petsc4py import PETSc  # noqa: E402
 from vi_contact import StepFailure, vi  # noqa: E402
 from vi_contact.fem import compat  # noqa: E402
 
+logging.getLogger("vi_contact").setLevel(logging.ERROR)  # answers that are no minima
 COMM = MPI.COMM_WORLD
 DOWN = 0.8  # what the top moves in all
 HEIGHT = 2.0

@@ -103,8 +103,8 @@ def test_a_bound_that_moves_by_more_than_a_cell(comm: Any) -> None:
 
 @pytest.mark.two_ranks
 def test_a_change_that_is_too_large_is_taken_in_parts(comm: Any) -> None:
-    """-div((1 + 50 u²)² grad u) = 0 with 0 and 3 at the ends: the linear step alone leads nowhere near. In one dimension
-    ∫(1 + 50 u²)² du is linear between the ends."""
+    """-div((1 + 50 u²)² grad u) = 0 with 0 and 3 at the ends: the linear step alone leads nowhere near. In one
+    dimension ∫(1 + 50 u²)² du is linear between the ends."""
     V = space(mesh.create_interval(comm, 64, [0.0, 1.0]), ("Lagrange", 1))
     u, v, g = fem.Function(V), ufl.TestFunction(V), fem.Function(V)
     g.interpolate(lambda x: 3.0 * x[0])

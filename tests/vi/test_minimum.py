@@ -131,8 +131,8 @@ def test_failures_are_one_sentence(comm: Any) -> None:
 
 
 def test_a_form_that_is_not_positive_offers_the_energy(comm: Any, caplog: pytest.LogCaptureFixture) -> None:
-    """Newton's method for F goes to the hill between the wells, where it is not far. A failure offers energy=, an answer
-    is told to be no minimum, and energy= finds one."""
+    """Newton's method for F goes to the hill between the wells, where it is not far. A failure offers energy=, an
+    answer is told to be no minimum, and energy= finds one."""
     u = fem.Function(space(square(comm, 8), ("Lagrange", 1)))
     energy = double_well(u, 0.1, 0.05)
     F = ufl.derivative(energy, u)

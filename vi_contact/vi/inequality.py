@@ -29,10 +29,15 @@ from .newton import Found, solve_in_parts
 
 log = logging.getLogger(__name__)
 
-NEGATIVE = ("the Jacobian of F is not positive at this u, so that Newton's method may lead away from every answer: give "
-            "the functional whose derivative F is as energy= in the place of F, or take smaller load steps")
-HILL = ("the Jacobian of F is not positive at the answer: if F is the derivative of an energy, this u is no minimum of it, "
-        "and energy= in the place of F finds one")
+NEGATIVE = (
+    "the Jacobian of F is not positive at this u, so that Newton's method may lead away from every "
+    "answer: give the functional whose derivative F is as energy= in the place of F, or take "
+    "smaller load steps"
+)
+HILL = (
+    "the Jacobian of F is not positive at the answer: if F is the derivative of an energy, this u "
+    "is no minimum of it, and energy= in the place of F finds one"
+)
 NEWTON_STEPS, DESCENT_STEPS = 50, 500  # at most, unless told otherwise
 
 
@@ -45,7 +50,8 @@ class Result:
     ``active``: how many unknowns are on their lower and upper bounds, those where the multiplier is above zero.
     ``certificate``: relative residuals (``core.certificate``): equilibrium of inactive unknowns, distance of active
     ones from their bound (complementarity), signs of distances (penetration) and of multipliers (tension).
-    ``iterations``, ``inner``: steps, and iterations of ``method`` in them, of conjugate gradients for an energy; ``seconds`` of this rank's processor.
+    ``iterations``, ``inner``: steps, and iterations of ``method`` in them, of conjugate gradients for an energy.
+    ``reason``: why it ended, and whether u is a local minimum. ``seconds``: of this rank's processor.
     """
 
     u: Any
@@ -107,7 +113,8 @@ def solve(form: Any = None, u: Any = None, *, energy: Any = None, lower: Any = N
     best, steps = found.best, "Newton steps" if energy is None else "steps downhill"
     reason = f"the certificate is {best.certificate.worst:.1e} after {found.steps} {steps}"
     if found.failure:
-        raise failed(problem, found, f"vi.solve: {reason}, above {tolerance:g}: {NEGATIVE if hill else found.failure}")
+        why = NEGATIVE if hill else found.failure
+        raise failed(problem, found, f"vi.solve: {reason}, above {tolerance:g}: {why}")
     problem.put(best.x)
     if hill:
         reason += f", {HILL}"
@@ -126,11 +133,13 @@ def refuse_choices(form: Any, energy: Any, J: Any, method: Any) -> None:
     if form is None and energy is None:
         raise refused("there is nothing to solve: give the form F(u; v), or energy=, a functional of u")
     if form is not None and energy is not None:
-        raise refused("both a form and energy= are given: give one of them, as the form is the derivative of the energy")
+        raise refused("both a form and energy= are given: give one of them, as the form is the "
+                      "derivative of the energy")
     if energy is not None and J is not None:
         raise refused("J is given beside energy=, whose second derivative is J: leave J out")
     if energy is not None and method is not None:
-        raise refused(f"method is {shown(method)}, which solves the linear steps of a form; leave it out with energy=")
+        raise refused(f"method is {shown(method)}, which solves the linear steps of a form; leave it "
+                      "out with energy=")
 
 
 def preconditioner(ranks: int) -> Mapping[str, object | None]:

@@ -32,6 +32,7 @@ class LinearSteps:
     def __init__(self, settings: Volume, given: Sequence[Method], comm: MpiComm) -> None:
         self.settings, self.given, self.comm = settings, given, comm
         self.failed: set[str] = set()
+        self.helps = True  # whether no problem so far was given up by all methods
 
     def methods(self, symmetric: bool) -> list[Method]:
         """Return the methods to try, in this order; InputError for one that does not suit A."""
@@ -70,6 +71,7 @@ class LinearSteps:
                 self.failed.add(type(method).__name__)
             finally:
                 solver.close()
+        self.helps = False
         raise StepFailure("; ".join(failures))
 
 

@@ -81,8 +81,8 @@ class Model:
         return s, count
 
     def downward(self, share: float) -> tuple[Array | None, int]:
-        """Return (s, iterations): a step along a direction of negative curvature on the unknowns that no bound holds, on
-        the side where the energy is lower; None where conjugate gradients find no such direction. Its length is this
+        """Return (s, iterations): a step along a direction of negative curvature on the unknowns that no bound holds,
+        on the side where the energy is lower; None where conjugate gradients find no such direction. Its length is this
         share of one that, by the curvature, changes the energy by a part of its size. Collective."""
         direction, its = self._negative()
         if direction is None:

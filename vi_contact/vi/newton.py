@@ -24,19 +24,23 @@ log = logging.getLogger(__name__)
 
 ARMIJO = 1e-4  # the part of what the slope promises that a step must bring
 HALVINGS = 24  # of a step that brings too little
-SMALLEST_PART = 1.0 / 16.0  # of the change that Dirichlet conditions bring, when it is taken in parts
+STEPS_OF_A_PART = 20  # at most
+SMALLEST_PART = 1.0 / 8.0  # of the change that Dirichlet conditions bring, when it is taken in parts
 REFINEMENTS = 5  # of a linear problem, at most
 
 NOT_A_NUMBER = "F or its Jacobian is not a number there: check the form and the first guess"
 NO_STEP = "no step of Newton's method improves u: take smaller load steps, or give a better first guess"
-UNHELD = ("the linear problem is not solved: check that bcs or bounds hold u, that F is a(u, v) - L(v) with a(v, v) > 0, "
-          "and that its coefficients are finite, or try another method=")
+UNHELD = (
+    "the linear problem is not solved: check that bcs or bounds hold u, that F is a(u, v) - L(v) "
+    "with a(v, v) > 0, and that its coefficients are finite, or try another method="
+)
 
 
 @dataclass
 class Found:
-    """Hold where a method stopped: the best u, whether conditions or bounds had to move the first guess, how many steps it took, with which inner method, what failed,
-    and whether a method for positive Jacobians did."""
+    """Hold where a method stopped: the best u, whether conditions or bounds had to move the first
+    guess, how many steps it took, with which inner method, what failed, and whether a method for
+    positive Jacobians did."""
 
     best: Judged
     moved: bool = False
@@ -73,7 +77,7 @@ def solve_in_parts(problem: Problem, lower: Array, upper: Array, settings: Volum
     while part >= SMALLEST_PART:
         before = np.array(problem.u.x.array)
         problem.aim(reached + part)
-        found = newton(problem, lower, upper, settings, methods, limit)
+        found = newton(problem, lower, upper, settings, methods, min(limit, STEPS_OF_A_PART))
         steps, inner = steps + found.steps, inner + found.inner
         if found.failure:
             problem.u.x.array[:] = before
@@ -117,26 +121,42 @@ def take_step(found: Found, point: Judged, steps: LinearSteps) -> float | None:
     """Take one step from a point, in u: towards the answer of the linear problem between the bounds or, where this one
     is not found or leads nowhere, a reduced step. Return the share of the change of held unknowns that is then left;
     None, and the reason in ``found``, where neither helps. Collective."""
+    if point.problem.constant:
+        return linear_step(found, point, steps)
+    # Where all methods have failed before, the tangents are not positive: a reduced step costs one factor.
+    ways = [linear_step, reduced] if steps.helps else [reduced, linear_step]
+    for way in ways:
+        left = way(found, point, steps)
+        if left is not None:
+            found.failure = ""
+            return left
+    return None
+
+
+def linear_step(found: Found, point: Judged, steps: LinearSteps) -> float | None:
+    """Go towards the answer of the linear problem between the bounds; None if that fails. Collective."""
     start = np.clip(point.x, point.lower, point.upper)
     try:
         x, its, found.method = steps.solve(point.A, point.b, point.lower, point.upper, start)
-        found.inner += its
-        left = advance(point, x)
-        if left is not None:
-            return left
-        found.failure = NO_STEP
     except StepFailure as failure:
         found.failure = UNHELD if point.problem.constant else NO_STEP
         log.debug("vi.solve: %s", failure)
-    if point.problem.constant:
         return None
+    found.inner += its
+    found.failure = NO_STEP
+    return advance(point, x)
+
+
+def reduced(found: Found, point: Judged, steps: LinearSteps) -> float | None:
+    """Take a reduced step; None if that fails. Collective."""
+    found.failure = NO_STEP
     try:
         left = advance(point, reduced_step(point))
-    except StepFailure:
+    except StepFailure as failure:
+        log.debug("vi.solve: %s", failure)
         return None
     if left is not None:
-        found.failure, found.method = "", "reduced step"
-        found.inner += 1
+        found.inner, found.method = found.inner + 1, "reduced step"
     return left
 
 
