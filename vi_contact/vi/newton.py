@@ -121,10 +121,10 @@ def take_step(found: Found, point: Judged, steps: LinearSteps) -> float | None:
     """Take one step from a point, in u: towards the answer of the linear problem between the bounds or, where this one
     is not found or leads nowhere, a reduced step. Return the share of the change of held unknowns that is then left;
     None, and the reason in ``found``, where neither helps. Collective."""
-    if point.problem.constant:
-        return linear_step(found, point, steps)
     # Where all methods have failed before, the tangents are not positive: a reduced step costs one factor.
     ways = [linear_step, reduced] if steps.helps else [reduced, linear_step]
+    if point.problem.constant:
+        ways = [linear_step]
     for way in ways:
         left = way(found, point, steps)
         if left is not None:
