@@ -24,6 +24,7 @@ log = logging.getLogger(__name__)
 
 ARMIJO = 1e-4  # the part of what the slope promises that a step must bring
 HALVINGS = 24  # of a step that brings too little
+SMALL_CHANGE = 2.0  # times the natural residual of the linear step that carries the change
 STEPS_OF_A_PART = 20  # at most
 SMALLEST_PART = 1.0 / 8.0  # of the change that Dirichlet conditions bring, when it is taken in parts
 REFINEMENTS = 5  # of a linear problem, at most
@@ -38,12 +39,12 @@ UNHELD = (
 
 @dataclass
 class Found:
-    """Hold where a method stopped: the best u, whether conditions or bounds had to move the first
-    guess, how many steps it took, with which inner method, what failed, and whether a method for
+    """Hold where a method stopped: the best u, whether all conditions were met from the start, how
+    many steps it took, with which inner method, what failed, and whether a method for
     positive Jacobians did."""
 
     best: Judged
-    moved: bool = False
+    at_once: bool = False
     steps: int = 0
     inner: int = 0
     method: str = ""
@@ -51,29 +52,36 @@ class Found:
     doubted: bool = False
 
 
-def begin(problem: Problem, lower: Array, upper: Array) -> Judged:
-    """Write where to begin into u, and judge it: u as it was given if conditions and bounds change a problem that is
-    not linear, else, and where F is not a number at this u, u with the conditions and between the bounds. Collective.
-    """
+def begin(problem: Problem, lower: Array, upper: Array, *, carry: bool = True) -> Judged:
+    """Write where to begin into u, and judge it. Collective.
+
+    Where conditions and bounds change a problem that is not linear, this is u as it was given; a small change, which
+    leaves forces hardly larger than the linear step that carries it would, is written into u at once unless told to
+    ``carry`` it. Else, and where F is not a number at this u, it is u with the conditions and between the bounds."""
     given = problem.x
     if not problem.constant and problem.moves(lower, upper):
         problem.put(given, 1.0)
         point = Judged(problem, lower, upper, 1.0)
         if not point.broken:
-            return point
+            changed = np.clip(given, lower, upper)
+            forces = point.natural(changed, point.put(changed, 0.0))
+            if carry or forces > SMALL_CHANGE * point.natural(point.x, point.F):
+                problem.put(given, 1.0)
+                return point
     problem.put(np.clip(given, lower, upper))
     return Judged(problem, lower, upper)
 
 
 def solve_in_parts(problem: Problem, lower: Array, upper: Array, settings: Volume, methods: Sequence[Method],
-                   limit: int) -> Found:
+                   limit: int, *, carry: bool = True) -> Found:
     """Return where Newton's method ends. Where it fails as Dirichlet conditions change the first guess too much at
     once, they change it in parts, each from the answer of the part before. Collective."""
-    whole = newton(problem, lower, upper, settings, methods, limit)
-    if not whole.failure or not whole.moved:
+    moves = not problem.constant and problem.moves(lower, upper)
+    whole = newton(problem, lower, upper, settings, methods, limit, carry=False)
+    if not whole.failure or not moves:
         return whole
     problem.put_back()
-    reached, part, steps, inner = 0.0, 0.5, whole.steps, whole.inner
+    reached, part, steps, inner = 0.0, 1.0 if whole.at_once else 0.5, whole.steps, whole.inner
     while part >= SMALLEST_PART:
         before = np.array(problem.u.x.array)
         problem.aim(reached + part)
@@ -93,10 +101,10 @@ def solve_in_parts(problem: Problem, lower: Array, upper: Array, settings: Volum
 
 
 def newton(problem: Problem, lower: Array, upper: Array, settings: Volume, methods: Sequence[Method],
-           limit: int) -> Found:
+           limit: int, *, carry: bool = True) -> Found:
     """Return where Newton's method ends: below the tolerance of the settings, or with a failure. Collective."""
-    point = begin(problem, lower, upper)
-    found = Found(point, moved=point.left > 0.0)
+    point = begin(problem, lower, upper, carry=carry)
+    found = Found(point, at_once=point.left == 0.0)
     steps = LinearSteps(settings, methods, problem.comm)
     limit = min(limit, REFINEMENTS) if problem.constant else limit
     while found.best.certificate.worst > settings.tolerance:
