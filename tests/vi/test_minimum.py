@@ -37,7 +37,7 @@ def test_from_the_top_of_the_hill(comm: Any, width: float, element: tuple[str, i
         assert result.certificate.worst <= 1e-9 and result.iterations <= 30
         assert "at a local minimum" in result.reason
         side = np.sign(comm.allreduce(float(np.sum(owned(u)))))
-        assert np.max(np.abs(u.x.array - side)) <= 1e-8
+        assert abs(side) == 1.0 and np.max(np.abs(u.x.array - side)) <= 1e-8
 
 
 @pytest.mark.two_ranks
