@@ -111,6 +111,7 @@ DEMOS = {  # the test that runs a demo in its short form, main(quick=True), on t
 }
 BENCHMARKS = {  # the test that runs a benchmark, or one of its rows, with small sizes
     "obstacle": "vi/test_plain_snesvi.py::test_units_and_warm_starts",
+    "load_steps": "vi/test_load_steps.py::test_beside_snes",
     "scale": "validation/test_scale_ratios.py::test_counts_are_those_of_the_table",
     "long_steps": "validation/test_long_steps.py::test_the_scheme_of_the_warning_creates_none",
     "bem_multiplier": "bem/test_multiplier_mesh.py::test_the_benchmark",

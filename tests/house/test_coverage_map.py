@@ -112,6 +112,9 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "studies/test_strain_compatible_case.py": "studies.cases.strain_compatible",
     "studies/test_ida.py":
         "cli.batch cli.ida plots.studies studies.ida.measures studies.ida.processes studies.ida.runs",
+    "vi/test_inequality.py": "vi.judged",
+    "vi/test_load_steps.py": "vi.linear_steps vi.newton",
+    "vi/test_minimum.py": "vi.model",
     "vi/test_wrong_forms.py": "vi.forms",
     "validation/test_pressed_square.py": "plots.deformed",
 }

@@ -26,7 +26,7 @@ pytestmark = pytest.mark.serial
 PAGES = loaded(DOCS / "run_commands.py").pages()
 RUN = {  # page, its blocks -> what runs them, or compares them with a run
     "README.md": {"python 1, text 1": "house/test_documents.py::test_first_example_prints_what_readme_says"},
-    "docs/guide/bounds.md": {"python 1, text 1": "house/test_documents.py::test_programs_print_what_their_pages_say"},
+    "docs/guide/bounds.md": {"python 2, text 2": "house/test_documents.py::test_programs_print_what_their_pages_say"},
     "docs/guide/bring_your_own.md": {
         "python 12, text 1": "house/test_documents.py::test_programs_print_what_their_pages_say"},
     "docs/guide/check.md": {"sh 1": "commands",

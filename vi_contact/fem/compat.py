@@ -267,6 +267,11 @@ def assemble_vector(form: Any) -> PETSc.Vec:
     return vector
 
 
+def assemble_scalar(form: Any) -> float:
+    """Assemble a compiled functional over the cells and facets of this rank; the ranks' values are not added."""
+    return float(fem.assemble_scalar(form))
+
+
 def cell_space(mesh: Mesh) -> Any:
     """Make the space of functions that are constant on every cell."""
     return lagrange(mesh, 0, continuous=False)

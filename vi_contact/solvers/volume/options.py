@@ -38,7 +38,7 @@ class OptionLayers:
         self.read: set[str] = set() if read is None else read
 
     def apply(self, solver: Any, check: "Callable[[Any, OptionLayers], None]") -> None:
-        """Set up a SNES or TAO object from the options; InputError when PETSc or ``check`` does not take them."""
+        """Set up a SNES, TAO or PC object from the options; InputError when PETSc or ``check`` does not take them."""
         with self.in_force():
             try:
                 solver.setFromOptions()
