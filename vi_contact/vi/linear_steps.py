@@ -60,7 +60,7 @@ class LinearSteps:
         matrix = EffectiveMatrix(A, (PetscAlgebra if symmetric else UnsymmetricAlgebra)(comm.mpi))
         step = StepProblem(matrix, b, upper, surface, 1.0, start, none, 0.0, 0, lower=lower)
 
-        failures = []
+        failures: list[str] = []
         for method in methods:
             solver = replace(self.settings, method=method).prepare(matrix, surface, 1.0)
             if failures:
