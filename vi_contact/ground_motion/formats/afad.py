@@ -8,8 +8,11 @@ COMPONENTS = ("N-S", "E-W", "U-D")
 
 
 def recognises(text: TextFile) -> bool:
-    """Tell whether the first line is one of the national network."""
-    return text.lines[0].strip().upper().startswith("STRONG GROUND MOTION RECORDS OF TURK")
+    """Tell whether the title of the national network, or its columns and their count, stand in the header."""
+    head = [line.strip().upper() for line in text.heads[:60]]
+    titled = any(line.startswith("STRONG GROUND MOTION RECORDS OF TURK") for line in head)
+    columns = any(tuple(line.split()) == COMPONENTS for line in head)
+    return titled or columns and any(line.startswith("SAMPLING INTERVAL (SEC)") for line in head)
 
 
 def read(text: TextFile) -> Record:
@@ -30,6 +33,6 @@ def read(text: TextFile) -> Record:
     text.refuse_other_count(text.entry(header, "NUMBER OF DATA")[0], text.entry_number(header, "NUMBER OF DATA"),
                             len(samples))
     station, date = (header.get(key, (0, ""))[1] for key in ("STATION ID", "EARTHQUAKE DATE"))
-    return text.record(samples, units="gal", dt=text.entry_number(header, "SAMPLING INTERVAL (SEC)"), format="AFAD",
+    return text.record(samples, lines=data, units="gal", dt=text.entry_number(header, "SAMPLING INTERVAL (SEC)"), format="AFAD",
                        title=f"{date} {station} {COMPONENTS[channel]}".strip(), station=station,
                        notes=tuple(filter(None, notes)), component=COMPONENTS[channel])
