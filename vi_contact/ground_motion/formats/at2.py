@@ -9,7 +9,7 @@ import re
 from itertools import pairwise
 
 from ...core.errors import InputError
-from ..record import Record, known_units
+from ..record import Record, canonical_units, known_units
 from .statements import agreed, refuse_other_motion, stated_counts, stated_steps
 from .text import NUMBER, TextFile
 
@@ -54,12 +54,14 @@ def read(text: TextFile) -> Record:
     told = [index for index in range(start) if text.heads[index].strip()]
     told = [index for index in told if not (text.heads[0].startswith(OURS) and index == 1)]  # the title of another file
     header = [" ".join(text.heads[index].split()) for index in range(start) if text.heads[index].strip()]
+    line, units = _stated_units(text, told)
+    if line is not None and units is not None:
+        canonical_units(text.at(line), units)
     refuse_other_motion(text, told)
     values, lines = text.series(start)
     if npts is not None:
         text.refuse_other_count(int(npts[0]), npts[1], len(values))
     title = next((line for line in header if not line.upper().startswith("PEER")), "")
-    line, units = _stated_units(text, told)
     return text.record(values, units=units, line=line, dt=stated_dt and stated_dt[1], lines=lines, title=title,
                        format="PEER AT2", notes=tuple(header),
                        dt_from=f"header, line {stated_dt[0] + 1}" if stated_dt else "",

@@ -62,7 +62,7 @@ def read(text: TextFile) -> Record:
     header, lines = _parts(text)
     rows = list(text.rows(lines))
     header, lines, rows, found = _header(text, header, lines, rows)
-    if len(rows) < 2 and len(rows[0] if rows else ()) < 2:
+    if len(rows) < 2 and len(rows[0] if rows else ()) < (3 if text.dt is None else 2):
         raise InputError(f"{text.path}: the file has {len(rows)} samples; give two or more")
     text.refuse_uneven_rows(lines, rows)
     step = text.dt if found.step is None else found.step[1]
@@ -199,8 +199,8 @@ def _is_series(text: TextFile, lines: Sequence[int], rows: Sequence[Sequence[flo
         return width > 2 or step_known
     names = _listed([Column("", "", None, 0)] * width)
     if not step_known:
-        raise InputError(f"{text.at(lines[0])}: {width} columns of which none is a time ({names}); pass dt= in seconds "
-                         "where the rows follow one another, and channel= too where the columns are components")
+        raise InputError(f"{text.at(lines[0])}: {width} columns instead of 2, and none is a time ({names}); pass dt= in "
+                         "seconds where the rows follow one another, and channel= too where the columns are components")
     table = np.array(rows)
     across = float(np.mean(np.abs(np.diff(table.ravel()))))
     along = float(np.mean(np.abs(np.diff(table, axis=0)))) if len(rows) > 1 else across

@@ -66,9 +66,9 @@ def read(text: TextFile) -> Record:
     """Return the record of one channel; channel: 1 for the first of the file, required where it holds several."""
     blocks = _blocks(text)
     if not blocks:
-        raise InputError(f"{text.at(0)}: the first line is one of a COSMOS or CSMIP file, but no line such as '7500 points "
-                         "of accel data equally spaced at .010 sec, in cm/sec2. (8f10.6)' begins accelerations; this "
-                         "layout, or this part of the file, is not read")
+        raise InputError(f"{text.at(0)}: no block of accelerations follows, which a line such as '7500 points of accel data "
+                         "equally spaced at .010 sec, in cm/sec2. (8f10.6)' begins; other layouts are not read, write "
+                         "columns of time and acceleration")
     block = blocks[text.chosen([_component(text, block) for block in blocks])]
     line = text.heads[block.line]
     if _UNEVEN.search(line):
@@ -127,11 +127,12 @@ def _samples(text: TextFile, block: Block) -> tuple[list[float], list[int]]:
     values: list[float] = []
     lines: list[int] = []
     for index in range(block.line + 1, block.end):
-        row = text.fixed(index, block.width) if index < len(text.lines) else []
-        wanted = min(block.per_line, block.count - len(values))
-        if len(row) != wanted:
+        line = text.lines[index].rstrip() if index < len(text.lines) else ""
+        fields, wanted = -(-len(line) // block.width), min(block.per_line, block.count - len(values))
+        if fields != wanted:
             raise InputError(f"{text.at(block.line)}: {block.count:.12g} samples are announced but line {index + 1} "
-                             f"holds {len(row)} of them instead of {wanted:g}; get the complete file")
+                             f"holds {fields} of them instead of {wanted:g}; get the complete file")
+        row = text.fixed(index, block.width)
         if unknown in row:
             raise InputError(f"{text.at(index)}: a sample is marked as unknown ({unknown:g}); use another record")
         values += row
@@ -145,12 +146,11 @@ def _samples(text: TextFile, block: Block) -> tuple[list[float], list[int]]:
 
 def _step(text: TextFile, block: Block) -> float | None:
     """Return the time step stated with the samples, in the text of the header or among its real numbers."""
-    found: list[tuple[int, float]] = []
     rate = _RATE.search(text.heads[block.line])
     if rate and text.number(block.line, rate[1]) > 0.0:
-        found.append((block.line, 1.0 / text.number(block.line, rate[1])))
-    found += [(index, text.number(index, spaced[1]))
-              for index, spaced in _found(text, (block.line, *block.header), _SPACED)]
+        return 1.0 / text.number(block.line, rate[1])
+    found = [(index, text.number(index, spaced[1]))
+             for index, spaced in _found(text, (block.line, *block.header), _SPACED)]
     for index, reals in _found(text, block.header, _REALS) if not found else ():
         if form := _FORMAT.search(text.heads[index]):
             rows = range(index + 1, min(index + 1 + int(text.number(index, reals[2])), block.line))

@@ -9,7 +9,7 @@ from ...core.algebra import Array
 from ...core.errors import InputError
 
 _SAC = 12345.0  # what SAC writes for an undefined number, with a minus
-_HUGE = 1e20  # beyond it a number is a mark (1e30, 1.7e38) and no motion in any unit
+_HUGE = 1e20, 1e40  # between them a number is a mark (1e30, 1.7e38) and no motion in any unit
 
 
 def refuse_fill_values(samples: Sequence[float] | Array, place: Callable[[int], str]) -> None:
@@ -38,7 +38,7 @@ def refuse_fill_values(samples: Sequence[float] | Array, place: Callable[[int], 
 
 def _is_mark(size: float) -> bool:
     """Tell whether a number is made of nines only, at least three of them before the point, or is huge."""
-    if size >= _HUGE or size == _SAC:
+    if _HUGE[0] <= size <= _HUGE[1] or size == _SAC:
         return True
     if size < 999.0 or not math.isfinite(size):
         return False

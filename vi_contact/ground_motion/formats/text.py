@@ -186,7 +186,7 @@ class TextFile:
             values.append(self.number(index, field.strip(), where))
             if len(field) < width or field[-1].isspace():
                 raise InputError(f"{self.at(index)}: {shown(field.strip())}{where} does not end where its columns do, "
-                                 "so that a character is missing or too many on the line; get the file again")
+                                 "so that a character is missing or too many on the line; get the complete file")
         return values
 
     def number(self, index: int, word: str, where: str = "") -> float:
