@@ -26,6 +26,7 @@ def read(text: TextFile) -> Record:
     header = {key.strip().upper(): (index, value.strip()) for index, (key, colon, value) in parts if colon}
     data = text.filled(start)
     samples = []
+    text.refuse_misaligned(data)
     for index, row in zip(data, text.rows(data), strict=True):
         if len(row) != 3:
             raise InputError(f"{text.at(index)}: {len(row)} values instead of N-S, E-W and U-D; get the file again")

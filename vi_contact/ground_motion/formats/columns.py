@@ -34,7 +34,8 @@ from .times import interpolated, rises_evenly, time_step
 LONGEST_TIME_STEP = 0.5  # s; times that count up by more, in a unit that nobody states, may be in ms or be numbers
 INTERLEAVED = 0.5  # columns that are so much smoother than the rows are components, and no series in rows
 
-_WORDS = re.compile(r"[^\W\d_]{2,}")
+_WORD = re.compile(r"[^\W\d_]{3,}\W*+")
+_NO_VALUE = ("nan", "inf", "infinity", "null", "none", "missing", "nodata")
 _RULER = re.compile(r"^[\s\-=+_|*]*$")
 _OURS = re.compile(rf"^#\s*+time \[s\], acceleration \[([^\]]++)\], dt = ({NUMBER}) s$")
 _WHOLE = re.compile(r"[\s\d+,;-]++")
@@ -65,6 +66,7 @@ def read(text: TextFile) -> Record:
     if len(rows) < 2 and len(rows[0] if rows else ()) < (3 if text.dt is None else 2):
         raise InputError(f"{text.path}: the file has {len(rows)} samples; give two or more")
     text.refuse_uneven_rows(lines, rows)
+    text.refuse_misaligned(lines)
     step = text.dt if found.step is None else found.step[1]
     leading = _leading(text, lines, rows, found)
     if not leading and _is_series(text, lines, rows, found, step is not None):
@@ -96,10 +98,10 @@ def _is_words(line: str) -> bool:
     start = line.lstrip("\"'%!/;([ \t")
     if start[:3].lower() in ("nan", "inf") and not start[3:4].isalpha():
         return False
-    words = [word for word in _WORDS.findall(line) if word.lower() not in ("nan", "inf", "infinity")]
     if start[:1].isalpha():
-        return True
-    return len(words) >= 2 or bool(line) and bool(_RULER.match(line)) and len(line) > 2 and "*" not in line
+        return start.split()[0].strip(",;").lower() not in _NO_VALUE
+    words = [word for word in line.replace(",", " ").split() if _WORD.fullmatch(word) and word.lower() not in _NO_VALUE]
+    return bool(words) or bool(line) and bool(_RULER.match(line)) and len(line) > 2 and "*" not in line
 
 
 def _header(text: TextFile, header: list[int], lines: list[int], rows: list[list[float]]
@@ -236,6 +238,8 @@ def _component(text: TextFile, header: Sequence[int], lines: Sequence[int], tabl
                leading: Sequence[int]) -> Record:
     """Return the record of one column of a table."""
     width = table.shape[1]
+    if table.shape[0] < 2:
+        raise InputError(f"{text.path}: the file has {table.shape[0]} samples; give two or more")
     columns = found.columns or [Column(f"column {k + 1}", "", None, 0) for k in range(width)]
     places = [k for k in range(width) if k not in leading and columns[k].kind in ("acceleration", "")]
     clear = [k for k in places if columns[k].kind == "acceleration"]

@@ -29,6 +29,7 @@ _UNEVEN = re.compile(r"unequally", re.IGNORECASE)
 _RATE = re.compile(rf"\bat\s++({NUMBER})\s*+pts/sec", re.IGNORECASE)
 _REALS = re.compile(r"^\s*+(\d++)\s++real-header values follow on\s++(\d++)\s++lines", re.IGNORECASE)
 _CHANNEL = re.compile(r"\bchan?:?\s++([\w?]++):([^(]*+)", re.IGNORECASE)
+_COMPONENT = re.compile(r"^\s*+COMP\s++(\S++)")
 _FROM = re.compile(r"\bfrom\b", re.IGNORECASE)
 _STATION = re.compile(r"\bstat(?:io)?n\s*+(?:no|id)[.:](.*+)", re.IGNORECASE)
 _CODE = re.compile(r"\bcode:(.*+)", re.IGNORECASE)
@@ -57,9 +58,13 @@ class Block:
 
 def recognises(text: TextFile) -> bool:
     """Tell whether the first line is one of a COSMOS or CSMIP file of any volume, or a line begins its samples."""
-    return _FIRST.search(text.heads[0]) is not None or any(
-        _announced(text, index) and (_FORMAT.search(line) or _SPACED.search(line)) and "header" not in line.lower()
-        for index, line in enumerate(text.heads[:400]))
+    return _FIRST.search(text.heads[0]) is not None or begins_blocks(text)
+
+
+def begins_blocks(text: TextFile) -> bool:
+    """Tell whether one of the first lines announces a block of samples with its format or its step."""
+    return any(_announced(text, index) and (_FORMAT.search(line) or _SPACED.search(line)) and "header" not in line.lower()
+               for index, line in enumerate(text.heads[:400]))
 
 
 def read(text: TextFile) -> Record:
@@ -164,7 +169,8 @@ def _step(text: TextFile, block: Block) -> float | None:
 def _component(text: TextFile, block: Block) -> str:
     """Return the direction of the channel, such as "90 Deg" or "UP", from the text of its header."""
     named = (_FROM.split(match[2], maxsplit=1)[0].split() for _, match in _found(text, block.header, _CHANNEL))
-    return " ".join(next(filter(None, named), []))
+    older = (match[1] for _, match in _found(text, block.header, _COMPONENT))
+    return " ".join(next(filter(None, named), [])) or next(older, "")
 
 
 def _station(text: TextFile, block: Block) -> str:

@@ -48,7 +48,7 @@ def read(text: TextFile) -> Record:
     seconds = text.entry_number(header, "RECORDLENGTH(SEC)")
     if rate <= 0.0 or len(rows) < 2:
         raise InputError(f"{text.at(rate_line)}: {len(rows)} samples at {rate:g} Hz are no record; get the complete file")
-    if not abs(len(rows) - seconds * rate) <= max(1.0, 0.5 * rate * (not seconds.is_integer())):
+    if not abs(len(rows) - seconds * rate) <= 0.5:
         raise InputError(f"{text.at(text.entry(header, 'RECORDLENGTH(SEC)')[0])}: {seconds:g} s at {rate:g} Hz are "
                          f"announced but {len(rows)} samples follow; get the complete file")
     table = np.array(rows)
@@ -61,7 +61,7 @@ def read(text: TextFile) -> Record:
     station = header.get("STATIONCODE", (0, ""))[1]
     origin = next((content for key, (_, content) in header.items() if key.startswith("ORIGIN TIME")), "")
     down = signs[place] is not None and signs[place][2] == "-"  # type: ignore[index]
-    return text.record(table[:, place], units=unit[0] if unit else units, line=units_line, dt=1.0 / rate, lines=lines,
+    return text.record(table[:, place + 1], units=unit[0] if unit else units, line=units_line, dt=1.0 / rate, lines=lines,
                        format="CWA", title=f"{origin} {station}".strip(), station=station,
                        component=plain[place] + (", positive the other way" if down else ""),
                        notes=tuple(text.heads[index].lstrip("# ").strip() for index, content in header.values() if content),

@@ -12,7 +12,7 @@ _STEP_NAME = (r"\b(?:dt|delta[ _]?t|(?:time|sampl(?:e|ing))[ _]?(?:step|incremen
               r"sampling[ _]interval[ _]s|intervalo de muestreo)\b")
 _STEP = re.compile(rf"{_STEP_NAME}\s*+(?:[(\[]\s*+(?P<unit>[a-z]++)\s*+[)\]])?\s*+(?:[:=]|is|of)?\s*+"
                    rf"(?P<step>{NUMBER})\s*+(?P<behind>[a-z]++)?", re.IGNORECASE)
-_RATE = re.compile(r"\b(?:sampl(?:e|ing)[ _]?(?:rate|freq\w*+)|samples per sec\w*+|sps)\b\s*+(?:[(\[]\s*+[a-z/]++\s*+[)\]])?"
+_RATE = re.compile(r"\b(?:sampl(?:e|ing)[ _]?(?:rate|freq\w*+)|samples\s*+(?:per|/)\s*+sec\w*+|sps)\b\s*+(?:[(\[]\s*+[a-z/]++\s*+[)\]])?"
                    rf"\s*+(?:[:=]|is|of)?\s*+({NUMBER})", re.IGNORECASE)
 _PROSE = (re.compile(rf"\b(?:spacing|spaced|step|intervals?|every|sampled at)\b[^\d.+-]{{0,20}}{_SECONDS}",
                      re.IGNORECASE),

@@ -8,6 +8,7 @@ import hashlib
 import math
 import os
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -35,6 +36,7 @@ _BETWEEN_DECIMALS = re.compile(r"[\s;]+")
 _COMMA_INSIDE = re.compile(r"(?<=\d),(?=\d)")
 _EMPTY_CELL = re.compile(r"[,;]\s*+[,;]|^\s*+[,;]")
 _LEADING_ZERO = re.compile(r"[EeDd][+-]?0\d")
+_END_DATA = re.compile(r"^\s*+\*++\s*+end\s++(?:of\s++)?data\b", re.IGNORECASE)
 _EXPONENT = re.compile(r"[EeDd][+-]?(\d++)")
 
 Entries = Mapping[str, tuple[int, str]]  # key of a header -> index of its line, and value
@@ -118,8 +120,10 @@ class TextFile:
                              "complete file")
 
     def filled(self, start: int) -> Sequence[int]:
-        """Return the indices of the lines from `start` on that are not blank."""
-        return [index for index in range(start, len(self.lines)) if self.lines[index].strip()]
+        """Return the indices of the lines from `start` on that are not blank, up to a line '*** End data ***'."""
+        end = next((index for index in range(start, len(self.lines)) if _END_DATA.match(self.heads[index])),
+                   len(self.lines))
+        return [index for index in range(start, end) if self.lines[index].strip()]
 
     def series(self, start: int) -> tuple[list[float], list[int]]:
         """Return all values on the lines from `start` on, row after row, and the index of the line of each.
@@ -129,6 +133,7 @@ class TextFile:
         lines = self.filled(start)
         rows = list(self.rows(lines))
         self.refuse_uneven_rows(lines, rows)
+        self.refuse_misaligned(lines)
         return [value for row in rows for value in row], [index for index, row in zip(lines, rows, strict=True)
                                                           for _ in row]
 
@@ -140,6 +145,20 @@ class TextFile:
             if length != usual and not (k == len(lengths) - 1 and length < usual):
                 raise InputError(f"{self.at(lines[k])}: the row has {length} values and other rows have {usual}; a "
                                  "value is missing or too many, get the complete file")
+
+    def refuse_misaligned(self, lines: Sequence[int]) -> None:
+        """Raise InputError for a row that is shorter than the others where nine of ten rows have numbers that end at
+        the same places: a character was lost. A longer row holds a number that is too wide for its columns."""
+        if len(lines) < 5:
+            return
+        ends = [tuple(match.end() for match in _NUMBER.finditer(self.lines[index])) for index in lines]
+        usual, often = Counter(ends[:-1]).most_common(1)[0]
+        if len(usual) < 2 or often < 0.9 * (len(lines) - 1):
+            return
+        for index, found in zip(lines, ends, strict=True):
+            if found != usual[:len(found)] and found[-1] < usual[len(found) - 1]:
+                raise InputError(f"{self.at(index)}: the row is shorter than the others, whose numbers end at the same "
+                                 "places, so that a character is missing; get the complete file")
 
     def rows(self, indices: Sequence[int]) -> Iterator[list[float]]:
         """Return the values on each of these lines, all the data of the file: see ``numbers``."""
@@ -225,7 +244,8 @@ class TextFile:
             return
         last = words[-1][-1]
         place = len(words[-1]) - 1
-        column = [row[place] for row in words[:-1] if len(row) > place]
+        first = 1 if len(words) > 4 else 0  # the first row may be one of a header
+        column = [row[place] for row in words[first:-1] if len(row) > place]
         styles = {_style(word) for word in column}
         if len(column) < 3 or len(styles) != 1 or not _NUMBER.fullmatch(last.replace(",", ".")):
             return

@@ -65,7 +65,8 @@ def interpolated(times: Array, samples: Array, step: float) -> Array:
 
 def _rounding(times: Array, decimals: int | None) -> float:
     """Return the largest error of times that are printed to `decimals`, or were held in single precision."""
-    single = 0.5 * float(np.spacing(np.float32(np.max(np.abs(times)))))
+    # held in single precision, and computed in it: a start and a multiple of the step, each rounded once
+    single = float(np.spacing(np.float32(np.max(np.abs(times)))))
     return max(single, 0.0 if decimals is None else 0.5 * 10.0**-decimals)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from ...core.algebra import Array
 from ...core.errors import InputError
 from ..record import Record
+from .cosmos import begins_blocks
 from .text import NUMBER, TextFile
 from .times import interpolated, time_step
 
@@ -41,9 +42,10 @@ class _Part:
 
 
 def recognises(text: TextFile) -> bool:
-    """Tell whether a header of Volume I stands at the beginning: points and duration, and units in seconds and g/10."""
+    """Tell whether a header of Volume I stands at the beginning: points and duration, and units in seconds and g/10,
+    and no line that announces a block of samples as in later volumes."""
     head = text.heads[:20]
-    return any(map(_POINTS.search, head)) and any(map(_UNITS.search, head))
+    return any(map(_POINTS.search, head)) and any(map(_UNITS.search, head)) and not begins_blocks(text)
 
 
 def read(text: TextFile) -> Record:
@@ -77,7 +79,8 @@ def read(text: TextFile) -> Record:
         if uneven:
             samples, sample_lines = interpolated(times, samples, step), []
             notes.append(f"uneven times interpolated linearly to a step of {step:g} s")
-        elif text.dt is not None and abs(text.dt - step) <= rounding * step:
+        step = float(f"{step:.12g}")
+        if text.dt is not None and not uneven and abs(text.dt - step) <= rounding * step:
             step = text.dt
     words = [" ".join(text.heads[index].split()) for index in part.header]
     origin = next((name for sign, name in _ORIGIN if any(sign in word.upper() for word in words)), "CSMIP")
