@@ -20,14 +20,19 @@ from vi_contact.ground_motion import read_record
 pytestmark = pytest.mark.serial
 SAMPLES = 43  # of a mutated record: the last row of ten, eight, five and four is short
 PLACES = 12  # that each mutation is tried at
-LOST = r"announced|follow|the row has|values instead of|columns instead of|header values|complete file"
+LOST = (
+    r"announced|follow|the row has|values instead of|columns instead of|header values|complete file"
+)
 TIMES = r"step to time|does not come after|announced|count up by|complete file"
 
 
 def values_of(layout: Layout, random: Random, count: int = SAMPLES) -> list[float]:
     """Smooth numbers with some noise, which fit the cells: two before the point."""
-    return [round(40.0 * np.sin(0.7 * k) * random.random() + random.uniform(-9.0, 9.0), layout.decimals) + 0.0
-            for k in range(count)]
+    return [
+        round(40.0 * np.sin(0.7 * k) * random.random() + random.uniform(-9.0, 9.0), layout.decimals)
+        + 0.0
+        for k in range(count)
+    ]
 
 
 def outcome(path: Path, layout: Layout, text: str) -> np.ndarray | str:
@@ -62,8 +67,13 @@ def test_random_records_are_read_back(name: str, tmp_path: Path) -> None:
     layout = LAYOUTS[name]
     numbers = strategies.integers(-99_000, 99_000).map(lambda whole: whole / 1000.0)
 
-    @hypothesis.settings(derandomize=True, max_examples=25, deadline=None, database=None,
-                         suppress_health_check=list(hypothesis.HealthCheck))
+    @hypothesis.settings(
+        derandomize=True,
+        max_examples=25,
+        deadline=None,
+        database=None,
+        suppress_health_check=list(hypothesis.HealthCheck),
+    )
     @hypothesis.given(strategies.lists(numbers, min_size=12, max_size=60))
     def check(values: list[float]) -> None:
         grid = layout.grid(values)
@@ -73,7 +83,9 @@ def test_random_records_are_read_back(name: str, tmp_path: Path) -> None:
     check()
 
 
-def mutations(layout: Layout, grid: Grid, random: Random) -> list[tuple[str, Grid, int, np.ndarray | None, str | None]]:
+def mutations(
+    layout: Layout, grid: Grid, random: Random
+) -> list[tuple[str, Grid, int, np.ndarray | None, str | None]]:
     """What was done, the new grid, the count in the header, the right samples, and words of the right refusal."""
     found: list[tuple[str, Grid, int, np.ndarray | None, str | None]] = []
 
@@ -88,26 +100,49 @@ def mutations(layout: Layout, grid: Grid, random: Random) -> list[tuple[str, Gri
     for k in {0, 1, last - 1, last, *(random.randrange(len(grid)) for _ in range(PLACES))}:
         free = not layout.counted and not layout.timed  # nothing can tell rows from one another
         ends = not layout.counted and k in (0, last)
-        add(f"row {k} deleted", grid[:k] + grid[k + 1:], free or ends, None if free or ends else f"{LOST}|{TIMES}")
-        add(f"row {k} doubled", grid[:k + 1] + grid[k:], free and (k < last or layout.per_row == 1),
-            None if free and (k < last or layout.per_row == 1) else f"{LOST}|{TIMES}")
+        add(
+            f"row {k} deleted",
+            grid[:k] + grid[k + 1 :],
+            free or ends,
+            None if free or ends else f"{LOST}|{TIMES}",
+        )
+        add(
+            f"row {k} doubled",
+            grid[: k + 1] + grid[k:],
+            free and (k < last or layout.per_row == 1),
+            None if free and (k < last or layout.per_row == 1) else f"{LOST}|{TIMES}",
+        )
         j = random.randrange(len(grid[k]))
-        row = grid[k][:j] + grid[k][j + 1:]
+        row = grid[k][:j] + grid[k][j + 1 :]
         single = len(grid[k]) == 1
-        lost = grid[:k] + ([] if single else [row]) + grid[k + 1:]
+        lost = grid[:k] + ([] if single else [row]) + grid[k + 1 :]
         hidden = free and (single or k == last)
-        add(f"value {j} of row {k} deleted", lost, hidden, None if hidden else f"{LOST}|{TIMES}|not a number|no row")
+        add(
+            f"value {j} of row {k} deleted",
+            lost,
+            hidden,
+            None if hidden else f"{LOST}|{TIMES}|not a number|no row",
+        )
         other = random.randrange(last)  # not the last one, which may be short
         if other != k < last and grid[k] != grid[other]:
             swapped = list(grid)
             swapped[k], swapped[other] = grid[other], grid[k]
-            add(f"rows {k} and {other} swapped", swapped, not layout.timed, TIMES if layout.timed else None)
+            add(
+                f"rows {k} and {other} swapped",
+                swapped,
+                not layout.timed,
+                TIMES if layout.timed else None,
+            )
         cell = grid[k][-1]
         digits = [place for place, letter in enumerate(cell) if letter.isdigit()]
         place = random.choice(digits)
-        shorter = [*grid[k][:-1], cell[:place] + cell[place + 1:]]
-        add(f"digit {place} of row {k} deleted", grid[:k] + [shorter] + grid[k + 1:], not layout.fixed,
-            "is not a number|does not end where|digit was lost|is cut off|complete file")
+        shorter = [*grid[k][:-1], cell[:place] + cell[place + 1 :]]
+        add(
+            f"digit {place} of row {k} deleted",
+            grid[:k] + [shorter] + grid[k + 1 :],
+            not layout.fixed,
+            "is not a number|does not end where|digit was lost|is cut off|complete file",
+        )
     for count in (SAMPLES - 1, SAMPLES + 1, 2 * SAMPLES) if layout.counted else ():
         add(f"{count} samples announced", grid, False, LOST, count)
     return found
@@ -117,11 +152,21 @@ def mutations(layout: Layout, grid: Grid, random: Random) -> list[tuple[str, Gri
 def test_mutated_records_are_right_or_refused_for_their_fault(name: str, tmp_path: Path) -> None:
     layout, random = LAYOUTS[name], Random(name)
     grid = layout.grid(values_of(layout, random))
-    expect(outcome(tmp_path / "r.txt", layout, layout.text(grid, SAMPLES)), layout.samples(grid), None, "as written")
+    expect(
+        outcome(tmp_path / "r.txt", layout, layout.text(grid, SAMPLES)),
+        layout.samples(grid),
+        None,
+        "as written",
+    )
     tried = mutations(layout, grid, random)
     assert len(tried) > 20
     for what, new, count, right, words in tried:
-        expect(outcome(tmp_path / "r.txt", layout, layout.text(new, count)), right, words, f"{name}: {what}")
+        expect(
+            outcome(tmp_path / "r.txt", layout, layout.text(new, count)),
+            right,
+            words,
+            f"{name}: {what}",
+        )
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
@@ -131,21 +176,40 @@ def test_a_record_that_is_cut_anywhere_is_right_or_refused(name: str, tmp_path: 
     layout, random = LAYOUTS[name], Random(name)
     grid = layout.grid(values_of(layout, random))
     head, text = layout.head(SAMPLES), layout.text(grid, SAMPLES)
-    whole = len(text[:len(text) - len(layout.tail)].rstrip())
-    words = rf"{LOST}|not a number|is cut off|does not end|digit was lost|two or more|does not state|not a unit|holds a|{TIMES}"
-    for end in sorted({random.randrange(len(head) if layout.counted else len(text) // 2, len(text)) for _ in range(8 * PLACES)} | {whole, whole - 1}):
+    whole = len(text[: len(text) - len(layout.tail)].rstrip())
+    words = (
+        rf"{LOST}|{TIMES}|not a number|is cut off|does not end|digit was lost|two or more|"
+        "does not state|not a unit|holds a"
+    )
+    for end in sorted(
+        {
+            random.randrange(len(head) if layout.counted else len(text) // 2, len(text))
+            for _ in range(8 * PLACES)
+        }
+        | {whole, whole - 1}
+    ):
         found = outcome(tmp_path / "r.txt", layout, text[:end])
         if end >= whole:
-            expect(found, layout.samples(grid), words if layout.tail else None, f"{name}: cut at {end}, all data left")
+            expect(
+                found,
+                layout.samples(grid),
+                words if layout.tail else None,
+                f"{name}: cut at {end}, all data left",
+            )
             continue
         right = None
         if not layout.counted and end > len(head):
-            rows = [row for row in text[len(head):end].split("\n") if row.strip()]
+            rows = [row for row in text[len(head) : end].split("\n") if row.strip()]
             cut = [cells(layout, row) for row in rows]
-            complete = cut == grid[:len(cut) - 1] + [grid[len(cut) - 1][:len(cut[-1])]]
+            complete = cut == grid[: len(cut) - 1] + [grid[len(cut) - 1][: len(cut[-1])]]
             full = complete and (len(cut[-1]) == len(grid[len(cut) - 1]) or not layout.components)
             right = layout.samples(cut) if full else None
-        expect(found, right, None if right is not None and right.size > 4 else words, f"{name}: cut at {end}")
+        expect(
+            found,
+            right,
+            None if right is not None and right.size > 4 else words,
+            f"{name}: cut at {end}",
+        )
 
 
 def cells(layout: Layout, row: str) -> list[str]:

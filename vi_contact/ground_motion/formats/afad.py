@@ -34,6 +34,7 @@ def read(text: TextFile) -> Record:
     text.refuse_other_count(text.entry(header, "NUMBER OF DATA")[0], text.entry_number(header, "NUMBER OF DATA"),
                             len(samples))
     station, date = (header.get(key, (0, ""))[1] for key in ("STATION ID", "EARTHQUAKE DATE"))
-    return text.record(samples, lines=data, units="gal", dt=text.entry_number(header, "SAMPLING INTERVAL (SEC)"), format="AFAD",
+    step = text.entry_number(header, "SAMPLING INTERVAL (SEC)")
+    return text.record(samples, lines=data, units="gal", dt=step, format="AFAD",
                        title=f"{date} {station} {COMPONENTS[channel]}".strip(), station=station,
                        notes=tuple(filter(None, notes)), component=COMPONENTS[channel])

@@ -45,7 +45,11 @@ def recognises(text: TextFile) -> bool:
         pairs = all(len(row) == 2 for row in rows)
         return not (pairs and all(after[0] > before[0] >= 0.0 for before, after in pairwise(rows)))
     header = [line for line in text.heads[:HEADER_LINES] if not line.startswith("#")]
-    return any(_NPTS.search(line) or _VALUES_FIRST.search(line) for line in header)
+    if not any(_NPTS.search(line) or _VALUES_FIRST.search(line) for line in header):
+        return False
+    last = max(k for k, line in enumerate(text.heads[:HEADER_LINES]) if _states(line))
+    after = next((line.strip() for line in text.heads[last + 1:] if line.strip()), "")
+    return not after[:1].isalpha()  # a heading of columns follows
 
 
 def read(text: TextFile) -> Record:

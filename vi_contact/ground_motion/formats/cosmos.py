@@ -17,7 +17,8 @@ from .text import NUMBER, TextFile
 
 STEP = 33  # place of the time step among the real header values of COSMOS, from 0
 
-_FIRST = re.compile(r"^\s*+(?:un)?corrected\s++accelerogram\b|\(\s*+format\s++v[\d.]++ with \d++ text lines", re.IGNORECASE)
+_FIRST = re.compile(r"^\s*+(?:un)?corrected\s++accelerogram\b|\(\s*+format\s++v[\d.]++ with \d++ text lines",
+                    re.IGNORECASE)
 _COUNT = re.compile(r"^\s*+(\d++)\s")
 _QUANTITY = re.compile(r"\b(acc|vel|dis)\w*+", re.IGNORECASE)
 _SAMPLES = re.compile(r"\b(?:pts|spaced|data)\b", re.IGNORECASE)
@@ -63,17 +64,17 @@ def recognises(text: TextFile) -> bool:
 
 def begins_blocks(text: TextFile) -> bool:
     """Tell whether one of the first lines announces a block of samples with its format or its step."""
-    return any(_announced(text, index) and (_FORMAT.search(line) or _SPACED.search(line)) and "header" not in line.lower()
-               for index, line in enumerate(text.heads[:400]))
+    lines = [(index, line) for index, line in enumerate(text.heads[:400]) if "header" not in line.lower()]
+    return any(_announced(text, index) and (_FORMAT.search(line) or _SPACED.search(line)) for index, line in lines)
 
 
 def read(text: TextFile) -> Record:
     """Return the record of one channel; channel: 1 for the first of the file, required where it holds several."""
     blocks = _blocks(text)
     if not blocks:
-        raise InputError(f"{text.at(0)}: no block of accelerations follows, which a line such as '7500 points of accel data "
-                         "equally spaced at .010 sec, in cm/sec2. (8f10.6)' begins; other layouts are not read, write "
-                         "columns of time and acceleration")
+        raise InputError(f"{text.at(0)}: no block of accelerations follows, which a line such as '7500 points of accel "
+                         "data equally spaced at .010 sec, in cm/sec2. (8f10.6)' begins; other layouts are not read, "
+                         "write columns of time and acceleration")
     block = blocks[text.chosen([_component(text, block) for block in blocks])]
     line = text.heads[block.line]
     if _UNEVEN.search(line):

@@ -28,12 +28,16 @@ def refuse_fill_values(samples: Sequence[float] | Array, place: Callable[[int], 
     beside_marks = marks[:-1] | marks[1:]
     usual_jump = float(np.max(jumps[~beside_marks], initial=0.0))
     for k in np.flatnonzero(marks):
-        neighbours = [jumps[j] for j in (k - 1, k) if 0 <= j < jumps.size and not marks[[j, j + 1]].all()]
+        neighbours = [
+            jumps[j] for j in (k - 1, k) if 0 <= j < jumps.size and not marks[[j, j + 1]].all()
+        ]
         apart = bool(neighbours) and min(neighbours) > usual_jump
         whole = values[k] == round(values[k])
         if abs(values[k]) > (1.0 if whole else 1.5) * most or apart:
-            raise InputError(f"{place(int(k))}: the sample {values[k]:.10g} stands for a missing value; fill the gap "
-                             "or use another record")
+            raise InputError(
+                f"{place(int(k))}: the sample {values[k]:.10g} stands for a missing value; fill the gap "
+                "or use another record"
+            )
 
 
 def _is_mark(size: float) -> bool:

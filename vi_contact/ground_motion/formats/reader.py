@@ -21,14 +21,15 @@ STEPS = 1e-6, 100.0  # shortest and longest time step [s] of a file; that of sei
 
 
 def read_record(path: str | os.PathLike[str], units: str | None = None, *, dt: float | None = None,
-                resample_dt: float | None = None, channel: int | str | None = None, largest: float = LARGEST_PEAK) -> Record:
+                resample_dt: float | None = None, channel: int | str | None = None,
+                largest: float = LARGEST_PEAK) -> Record:
     """Read one component of ground motion from a file of any format listed in docs/guide/records.md.
 
-    units: a key of UNITS ("m/s2", "cm/s2", "gal", "g", ...); required where the file does not state them, elsewhere only
-    checked against what the file states. dt: time step [s], for files that do not state one. resample_dt: time step [s]
-    the record is brought to by `resampled`; it also allows uneven times. channel: which component of a file that
-    holds several: its number, from 1, times not counted, or its name in the file ("N00E", "north"). largest: the greatest peak acceleration [m/s²] that is believed; give more
-    where the motion is that strong.
+    units: a key of UNITS ("m/s2", "cm/s2", "gal", "g", ...); required where the file does not state them, elsewhere
+    only checked against what the file states. dt: time step [s], for files that do not state one. resample_dt: time
+    step [s] the record is brought to by `resampled`; it also allows uneven times. channel: which component of a file
+    that holds several: its number, from 1, times not counted, or its name in the file ("N00E", "north"). largest: the
+    greatest peak acceleration [m/s²] that is believed; give more where the motion is that strong.
     Raises InputError with one sentence that names the file and, where there is one, the line: for a velocity or
     displacement, no or another number of samples than announced, entries of the header or samples that are missing,
     unknown or no numbers, units or a step that nobody states or that contradict each other."""
@@ -45,8 +46,8 @@ def read_record(path: str | os.PathLike[str], units: str | None = None, *, dt: f
                          f"if the unit is {record.units}; give the right units=, or largest= in m/s2 where the motion "
                          "is that strong")
     if 0.0 < peak < DOUBTED[0] or peak > DOUBTED[1]:
-        doubt = (f"the peak is {peak / STANDARD_GRAVITY:.4g} g if the unit is {record.units}; check the unit, which comes "
-                 f"from: {record.units_from}")
+        doubt = (f"the peak is {peak / STANDARD_GRAVITY:.4g} g if the unit is {record.units}; check the unit, which "
+                 f"comes from: {record.units_from}")
         record = replace(record, doubts=(*record.doubts, doubt))
     if not STEPS[0] <= record.dt <= STEPS[1]:
         raise InputError(f"{record.source}: a time step of {record.dt:g} s is not usual for ground motions; give "

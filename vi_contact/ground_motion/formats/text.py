@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -106,8 +107,8 @@ class TextFile:
             if len(same) == 1:
                 return same[0]
             wanted = int(wanted) if wanted.strip().isdecimal() and len(wanted) < 9 else wanted
-        if not isinstance(wanted, bool) and wanted in range(1, len(components) + 1):
-            return int(wanted) - 1
+        if isinstance(wanted, int) and not isinstance(wanted, bool) and 0 < wanted <= len(components):
+            return wanted - 1
         names = ", ".join(f"{k}: {name or 'unnamed'}" for k, name in enumerate(components, 1))
         wrong = "" if self.channel is None else f"there is no channel {self.channel}: "
         count = "1 channel" if len(components) == 1 else f"{len(components)} channels"
@@ -134,6 +135,7 @@ class TextFile:
         rows = list(self.rows(lines))
         self.refuse_uneven_rows(lines, rows)
         self.refuse_misaligned(lines)
+        self.refuse_empty_lines(lines, rows)
         return [value for row in rows for value in row], [index for index, row in zip(lines, rows, strict=True)
                                                           for _ in row]
 
@@ -145,6 +147,16 @@ class TextFile:
             if length != usual and not (k == len(lengths) - 1 and length < usual):
                 raise InputError(f"{self.at(lines[k])}: the row has {length} values and other rows have {usual}; a "
                                  "value is missing or too many, get the complete file")
+
+    def refuse_empty_lines(self, lines: Sequence[int], rows: Sequence[Sequence[float]]) -> None:
+        """Raise InputError for an empty line among values that stand one a line: a value is missing there.
+
+        Empty lines between all of them are line ends that were doubled."""
+        gaps = [before for before, after in pairwise(lines)
+                if after > before + 1 and not self.lines[before + 1].strip()]
+        if gaps and len(gaps) < len(lines) - 1 and all(len(row) == 1 for row in rows):
+            raise InputError(f"{self.at(gaps[0] + 1)}: the line is empty among values that stand one a line, so that a "
+                             "value is missing; get the complete file, or take the line out where none is")
 
     def refuse_misaligned(self, lines: Sequence[int]) -> None:
         """Raise InputError for a row that is shorter than the others where nine of ten rows have numbers that end at

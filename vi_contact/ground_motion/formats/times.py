@@ -10,7 +10,9 @@ from ...core.checks import counted, number
 from ...core.errors import InputError
 from .text import SAME_STEP, TextFile
 
-COARSE = 0.2  # part of a step that rounding may take: above it a row that was lost could hide behind it
+COARSE = (
+    0.2  # part of a step that rounding may take: above it a row that was lost could hide behind it
+)
 
 
 def rises_evenly(times: Array, *, decimals: int | None = None) -> bool:
@@ -19,11 +21,19 @@ def rises_evenly(times: Array, *, decimals: int | None = None) -> bool:
         return False
     steps = np.diff(times)
     usual = float(np.median(steps))
-    return bool(np.all(np.abs(steps - usual) <= SAME_STEP * usual)) or _is_rounded(times, _rounding(times, decimals))
+    return bool(np.all(np.abs(steps - usual) <= SAME_STEP * usual)) or _is_rounded(
+        times, _rounding(times, decimals)
+    )
 
 
-def time_step(text: TextFile, lines: Sequence[int], times: Array, *, decimals: int | None = None,
-              unit: float = 1.0) -> tuple[float, float, bool]:
+def time_step(
+    text: TextFile,
+    lines: Sequence[int],
+    times: Array,
+    *,
+    decimals: int | None = None,
+    unit: float = 1.0,
+) -> tuple[float, float, bool]:
     """Return the step of times, the relative error that their rounding leaves, and whether they are uneven.
 
     times and the step are in s. lines: index of the line of each. decimals: of the times as they are printed in their
@@ -35,8 +45,10 @@ def time_step(text: TextFile, lines: Sequence[int], times: Array, *, decimals: i
     backward = steps <= 0.0
     if np.any(backward):
         k = int(np.argmax(backward)) + 1
-        raise InputError(f"{text.at(lines[k])}: time {times[k]:g} s does not come after {times[k - 1]:g} s; "
-                         "sort the rows and remove repeated times")
+        raise InputError(
+            f"{text.at(lines[k])}: time {times[k]:g} s does not come after {times[k - 1]:g} s; "
+            "sort the rows and remove repeated times"
+        )
     odd = np.abs(steps - usual) > SAME_STEP * usual
     if not np.any(odd):
         return (times[-1] - times[0]) / (times.size - 1), SAME_STEP, False
@@ -46,8 +58,10 @@ def time_step(text: TextFile, lines: Sequence[int], times: Array, *, decimals: i
         return step, error, False
     if text.resample_dt is None:
         k = int(np.argmax(odd)) + 1
-        raise InputError(f"{text.at(lines[k])}: the step to time {times[k]:.9g} s is {steps[k - 1]:.9g} s, others "
-                         f"{usual:.9g} s; pass resample_dt= to interpolate, or correct the time")
+        raise InputError(
+            f"{text.at(lines[k])}: the step to time {times[k]:.9g} s is {steps[k - 1]:.9g} s, others "
+            f"{usual:.9g} s; pass resample_dt= to interpolate, or correct the time"
+        )
     wanted = number("read_record", "resample_dt", text.resample_dt, positive=True, unit="seconds")
     step = wanted / math.ceil(wanted / usual * (1.0 - SAME_STEP))
     counted("read_record", f"resample_dt = {wanted!r} s", (times[-1] - times[0]) / step)
