@@ -148,7 +148,7 @@ def test_knet_counts_become_accelerations_without_offset(direction, tmp_path):
 @pytest.mark.parametrize("text, words", [
     (knet(COUNTS[:199]), ["line 12", "2 s at 100 Hz", "199 samples"]),
     (knet(seconds=4), ["line 12", "4 s at 100 Hz", "200 samples"]),
-    (knet().replace("Scale Factor", "Scale Farce "), ["line 1", "'Origin Time", "is no row of numbers"]),
+    (knet().replace("Scale Factor", "Scale Farce "), ["no line 'Scale Factor'"]),
     (knet().replace("Dir. ", "Dor. "), ["no line 'Dir.'"]),
     (knet(scale="3920/6182761"), ["line 14", "scale factor"]),
     (knet(scale="3920(counts)/6182761"), ["line 14", "'counts' is not a unit"]),

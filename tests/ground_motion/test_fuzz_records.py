@@ -1,208 +1,217 @@
-"""Mutated records of every format: refused in one sentence, or read with the numbers that the file holds.
+"""Random records of every format are read back, and mutated ones give the right numbers or the right refusal.
 
-The second opinion knows nothing of the readers: it takes the last numbers of the file, as many as the record has, and
-the count and the step that a simple pattern finds in the header.
-"""
+The record is made from a grid of cells (``record_layouts``). A mutation changes the grid, the header or the end of the
+text, so that the right answer is known: the samples of the new grid where the file cannot tell, and else a refusal
+with a word of its fault."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
 from random import Random
-from typing import Any
 
 import numpy as np
 import pytest
-from record_files import AFAD, VALUES, cosmos, csmip, esm, knet, smc
+from record_layouts import LAYOUTS, STEP, Grid, Layout
 
 from vi_contact.core.errors import InputError
-from vi_contact.ground_motion import UNITS, Record, read_record
+from vi_contact.ground_motion import read_record
 
 pytestmark = pytest.mark.serial
-COUNT = 1200
-G10 = 98.0665
-TABLE = "".join(f"{0.02 * k:.2f};{v:.4f}\n" for k, v in enumerate(VALUES))
-AT2 = "PEER NGA\nA TITLE, 5/19/40\nACCELERATION TIME SERIES IN UNITS OF CM/S2\nNPTS=    11, DT=   .0200 SEC\n"
-SEEDS: dict[str, tuple[str, dict[str, Any]]] = {
-    "at2": (AT2 + "".join(f"{v:15.7E}" + "\n" * (k % 5 == 4) for k, v in enumerate(VALUES)), {}),
-    "csmip": (csmip(), {}),
-    "csmip, two channels": (csmip() + csmip(2), {"channel": 2}),
-    "cosmos": (cosmos(), {}),
-    "smc": (smc(), {}),
-    "knet": (knet(), {}),
-    "esm": (esm(), {}),
-    "afad": (AFAD, {"channel": 2}),
-    "columns": ("# a title\n" + TABLE.replace(";", " "), {"units": "gal"}),
-    "semicolons": (TABLE, {"units": "gal"}),
-    "decimal commas": (TABLE.replace(".", ","), {"units": "gal"}),
-    "path series": ("".join(f"{v:.6e}\n" for v in VALUES), {"units": "gal", "dt": 0.02}),
-    "path in rows": ("".join(f"{v:12.5e}" + "\n" * (k % 4 == 3) for k, v in enumerate(VALUES)),
-                     {"units": "gal", "dt": 0.02}),
-}
-NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?"
-PIECES = ["NaN", "inf", "1e400", "1" * 400, "1e305", ",", ";", "0,5", "-", ".", " ", "\t", "\n", "*", "E", "\0", "\xe9",
-          "(", "1.2.3"]
+SAMPLES = 43  # of a mutated record: the last row of ten, eight, five and four is short
+PLACES = 12  # that each mutation is tried at
+LOST = (
+    r"announced|follow|the row has|values instead of|columns instead of|header values|complete file"
+)
+TIMES = r"step to time|does not come after|announced|count up by|complete file"
 
 
-def mutated(text: str, random: Random) -> str:
-    """One to three accidents: bits flipped; lines lost, doubled, cut, exchanged; fields swapped; odd pieces; blocks."""
-    for _ in range(random.choice((1, 1, 1, 2, 3))):
-        lines = text.split("\n")
-        at, other = random.randrange(len(lines)), random.randrange(len(lines))
-        line = lines[at]
-        place = random.randrange(len(line) + 1)
-        kind = random.randrange(11)
-        if kind == 0 and line:
-            place = random.randrange(len(line))
-            lines[at] = line[:place] + chr(ord(line[place]) ^ 1 << random.randrange(7)) + line[place + 1:]
-        elif kind == 1:
-            del lines[at]
-        elif kind == 2:
-            lines.insert(at, line)
-        elif kind == 3:
-            lines[at] = line[:place]
-        elif kind == 4:
-            lines[at], lines[other] = lines[other], lines[at]
-        elif kind == 5:
-            words = re.split(r"(\s+)", line)
-            random.shuffle(words)
-            lines[at] = "".join(words)
-        elif kind == 6:
-            lines[at] = line[:place] + random.choice(PIECES) + line[place:]
-        elif kind == 7:
-            lines[at] = re.sub(NUMBER, lambda _: random.choice(PIECES), line, count=1)
-        elif kind == 8:
-            lines = lines[:max(at, other)] + lines[min(at, other):]
-        elif kind == 9:
-            lines = lines[:at] + lines[other:]
-        else:
-            lines = lines[:at]
-        text = "\n".join(lines)
-    return text
+def values_of(layout: Layout, random: Random, count: int = SAMPLES) -> list[float]:
+    """Smooth numbers with some noise, which fit the cells: two before the point."""
+    return [
+        round(40.0 * np.sin(0.7 * k) * random.random() + random.uniform(-9.0, 9.0), layout.decimals)
+        + 0.0
+        for k in range(count)
+    ]
 
 
-def numbers(text: str, *, decimal: bool = False) -> list[float]:
-    """All that looks like a number, in order."""
-    found = re.findall(NUMBER, text.replace(",", ".") if decimal else text)
-    return [float(word.upper().replace("D", "E")) for word in found]
-
-
-def fixed(lines: list[str], width: int) -> list[float]:
-    """Numbers in columns."""
-    return [float(line.rstrip()[k:k + width].upper().replace("D", "E")) for line in lines
-            for k in range(0, len(line.rstrip()), width)]
-
-
-def said(pattern: str, text: str) -> float | None:
-    """The last number that a header states so."""
-    found = re.findall(pattern, text, re.IGNORECASE | re.MULTILINE)
-    return float(found[-1].upper().replace("D", "E")) if found else None
-
-
-Opinion = tuple[list[float], float | None, float | None]  # samples in the file's units, count, step
-
-
-def of_at2(text: str, record: Record, options: dict[str, Any]) -> Opinion:
-    values = numbers(text)[-record.acceleration.size:]
-    start = text.split("*** Begin data")[0][:2000]
-    dt = rf"\bDT[^\S\n]*[=:][^\S\n]*({NUMBER})"
-    return values, said(r"\bNPTS[^\S\n]*[=:][^\S\n]*(\d+)", start), said(dt, start)
-
-
-def of_blocks(text: str, record: Record, options: dict[str, Any]) -> Opinion:
-    """The lines after the one that announces accelerations, the last of the channel chosen."""
-    lines = text.split("\n")
-    announced = re.compile(r"\s*\d+\s.*\baccel.*\(\d*(?:1P)?[FE]\d+", re.IGNORECASE)
-    found = [k for k, line in enumerate(lines) if announced.match(line)]
-    at = [k for k in found if int(lines[k].split()[0]) == record.acceleration.size and close(
-        column_values(lines, k, record.acceleration.size), record)]
-    assert at, found
-    step = said(rf"equally[- ]spaced\s+at\s+({NUMBER})", lines[at[0]])
-    return column_values(lines, at[0], record.acceleration.size), record.acceleration.size, step
-
-
-def column_values(lines: list[str], at: int, count: int) -> list[float]:
-    stated = re.findall(r"\((\d*)(?:1P)?[FEfe](\d+)[^()]*\)", lines[at])
-    per_line, width = (int(part or 1) for part in stated[0]) if stated else (8, 10)
+def outcome(path: Path, layout: Layout, text: str) -> np.ndarray | str:
+    """The samples that are read, or the sentence of the refusal."""
+    path.write_bytes(text.encode("latin-1"))
     try:
-        return fixed(lines[at + 1:at + 1 - (-count // per_line)], width)
-    except ValueError:
-        return []
+        record = read_record(path, **layout.options, largest=1e4)
+    except InputError as error:
+        sentence = str(error)
+        assert str(path) in sentence and "\n" not in sentence and len(sentence) < 700
+        return sentence
+    assert np.isclose(record.dt, STEP, rtol=1e-9)
+    return record.acceleration
 
 
-def close(values: list[float], record: Record) -> bool:
-    return len(values) == record.acceleration.size and np.allclose(
-        record.acceleration, UNITS[record.units] * np.array(values), rtol=1e-12, atol=0.0)
+def expect(found: np.ndarray | str, right: np.ndarray | None, words: str | None, what: str) -> None:
+    """Right numbers where `right` is given, a refusal with one of the words where `words` is; either where both are."""
+    if isinstance(found, str):
+        assert words is not None, f"{what}: refused: {found}"
+        assert re.search(words, found), f"{what}: {found}"
+        return
+    assert right is not None, f"{what}: {found.size} samples were read, and a refusal is right"
+    assert found.shape == right.shape and np.allclose(found, right, rtol=1e-12, atol=1e-15), what
 
 
-def of_smc(text: str, record: Record, options: dict[str, Any]) -> Opinion:
-    lines = text.split("\n")
-    comments, count = int(float(lines[12][70:80])), int(float(lines[13][0:10]))
-    return fixed(lines[27 + comments:], 10), count, 1.0 / float(lines[17][15:30])
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_random_records_are_read_back(name: str, tmp_path: Path) -> None:
+    """Any numbers that fit the cells, in records of any length."""
+    hypothesis = pytest.importorskip("hypothesis")
+    from hypothesis import strategies
+
+    layout = LAYOUTS[name]
+    numbers = strategies.integers(-99_000, 99_000).map(lambda whole: whole / 1000.0)
+
+    @hypothesis.settings(
+        derandomize=True,
+        max_examples=25,
+        deadline=None,
+        database=None,
+        suppress_health_check=list(hypothesis.HealthCheck),
+    )
+    @hypothesis.given(strategies.lists(numbers, min_size=12, max_size=60))
+    def check(values: list[float]) -> None:
+        grid = layout.grid(values)
+        found = outcome(tmp_path / "record.txt", layout, layout.text(grid, len(values)))
+        expect(found, layout.samples(grid), None, name)
+
+    check()
 
 
-def of_knet(text: str, record: Record, options: dict[str, Any]) -> Opinion:
-    top, bottom = re.findall(rf"^Scale Factor.*?({NUMBER})\s*\([^()]*\)\s*/\s*({NUMBER})", text, re.MULTILINE)[-1]
-    counts = np.array(numbers(text.rpartition("Memo.")[2].partition("\n")[2]))
-    rate = said(rf"^Sampling Freq\(Hz\)\s*({NUMBER})", text)
-    seconds = said(rf"^Duration Time\(s\)\s*({NUMBER})", text)
-    assert rate and seconds
-    samples = float(top) / float(bottom) * (counts - np.mean(counts))
-    return list(samples), round(rate * seconds), 1.0 / rate
+def mutations(
+    layout: Layout, grid: Grid, random: Random
+) -> list[tuple[str, Grid, int, np.ndarray | None, str | None]]:
+    """What was done, the new grid, the count in the header, the right samples, and words of the right refusal."""
+    found: list[tuple[str, Grid, int, np.ndarray | None, str | None]] = []
 
-
-def of_esm(text: str, record: Record, options: dict[str, Any]) -> Opinion:
-    values = numbers(text)[-record.acceleration.size:]
-    return values, said(rf"^\s*NDATA\s*:\s*({NUMBER})", text), said(rf"^\s*SAMPLING_INTERVAL_S\s*:\s*({NUMBER})", text)
-
-
-def of_afad(text: str, record: Record, options: dict[str, Any]) -> Opinion:
-    values = numbers(text)[-3 * record.acceleration.size:][options["channel"] - 1::3]
-    count = said(rf"NUMBER\s+OF\s+DATA\s*:\s*({NUMBER})", text)
-    return values, count, said(rf"INTERVAL\s+\(SEC\)\s*:\s*({NUMBER})", text)
-
-
-def of_columns(text: str, record: Record, options: dict[str, Any]) -> Opinion:
-    lines = [line for line in text.split("\n") if line.strip() and not line.lstrip().startswith("#")]
-    data = "\n".join(lines)
-    decimal = ";" in data and "." not in data
-    if "dt" in options:
-        return numbers(data, decimal=decimal)[-record.acceleration.size:], None, options["dt"]
-    pairs = np.array(numbers(data, decimal=decimal)).reshape(-1, 2)
-    return list(pairs[:, 1]), None, float(np.median(np.diff(pairs[:, 0])))
-
-
-OPINIONS: dict[str, Callable[[str, Record, dict[str, Any]], Opinion]] = {
-    "PEER AT2": of_at2, "CSMIP": of_blocks, "COSMOS": of_blocks, "USGS SMC": of_smc, "K-NET": of_knet, "ESM": of_esm,
-    "AFAD": of_afad, "columns": of_columns,
-}
-
-
-def check(text: str, record: Record, options: dict[str, Any]) -> None:
-    """Finite numbers, plausible, and those of the file."""
-    values, count, step = OPINIONS[record.format](text, record, options)
-    samples = UNITS[record.units] * np.array(values, dtype=float)
-    assert np.all(np.isfinite(record.acceleration)) and np.max(np.abs(record.acceleration)) <= G10
-    assert record.acceleration.shape == samples.shape
-    assert np.allclose(record.acceleration, samples, rtol=1e-12, atol=1e-14)
-    assert count is None or count == record.acceleration.size
-    assert step is None or np.isclose(step, record.dt, rtol=2e-6)
-
-
-@pytest.mark.parametrize("name", SEEDS)
-def test_mutated_records(name: str, tmp_path: Path) -> None:
-    seed, options = SEEDS[name]
-    random, read, path = Random(name), 0, tmp_path / "record.txt"
-    for number in range(COUNT // len(SEEDS)):
-        text = seed if number == 0 else mutated(seed, random)
-        path.write_bytes(text.encode("latin-1", "replace"))
+    def add(what: str, new: Grid, right: bool, words: str | None, count: int = SAMPLES) -> None:
         try:
-            record = read_record(path, **options)
-        except InputError as error:
-            assert str(path) in str(error) and "\n" not in str(error) and len(str(error)) < 700
-            assert number, error
+            samples = layout.samples(new) if right else None
+        except ValueError:
+            samples, words = None, words or "is not a number"
+        found.append((what, new, count, samples, words))
+
+    last = len(grid) - 1
+    for k in {0, 1, last - 1, last, *(random.randrange(len(grid)) for _ in range(PLACES))}:
+        free = not layout.counted and not layout.timed  # nothing can tell rows from one another
+        ends = not layout.counted and k in (0, last)
+        add(
+            f"row {k} deleted",
+            grid[:k] + grid[k + 1 :],
+            free or ends,
+            None if free or ends else f"{LOST}|{TIMES}",
+        )
+        add(
+            f"row {k} doubled",
+            grid[: k + 1] + grid[k:],
+            free and (k < last or layout.per_row == 1),
+            None if free and (k < last or layout.per_row == 1) else f"{LOST}|{TIMES}",
+        )
+        j = random.randrange(len(grid[k]))
+        row = grid[k][:j] + grid[k][j + 1 :]
+        single = len(grid[k]) == 1
+        lost = grid[:k] + ([] if single else [row]) + grid[k + 1 :]
+        hidden = free and (single or k == last)
+        add(
+            f"value {j} of row {k} deleted",
+            lost,
+            hidden,
+            None if hidden else f"{LOST}|{TIMES}|not a number|no row",
+        )
+        other = random.randrange(last)  # not the last one, which may be short
+        if other != k < last and grid[k] != grid[other]:
+            swapped = list(grid)
+            swapped[k], swapped[other] = grid[other], grid[k]
+            add(
+                f"rows {k} and {other} swapped",
+                swapped,
+                not layout.timed,
+                TIMES if layout.timed else None,
+            )
+        cell = grid[k][-1]
+        digits = [place for place, letter in enumerate(cell) if letter.isdigit()]
+        place = random.choice(digits)
+        shorter = [*grid[k][:-1], cell[:place] + cell[place + 1 :]]
+        add(
+            f"digit {place} of row {k} deleted",
+            grid[:k] + [shorter] + grid[k + 1 :],
+            not layout.fixed,
+            "is not a number|does not end where|digit was lost|is cut off|complete file",
+        )
+    for count in (SAMPLES - 1, SAMPLES + 1, 2 * SAMPLES) if layout.counted else ():
+        add(f"{count} samples announced", grid, False, LOST, count)
+    return found
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_mutated_records_are_right_or_refused_for_their_fault(name: str, tmp_path: Path) -> None:
+    layout, random = LAYOUTS[name], Random(name)
+    grid = layout.grid(values_of(layout, random))
+    expect(
+        outcome(tmp_path / "r.txt", layout, layout.text(grid, SAMPLES)),
+        layout.samples(grid),
+        None,
+        "as written",
+    )
+    tried = mutations(layout, grid, random)
+    assert len(tried) > 20
+    for what, new, count, right, words in tried:
+        expect(
+            outcome(tmp_path / "r.txt", layout, layout.text(new, count)),
+            right,
+            words,
+            f"{name}: {what}",
+        )
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_a_record_that_is_cut_anywhere_is_right_or_refused(name: str, tmp_path: Path) -> None:
+    """The right answer is all samples where only the end mark is lost, and where nothing tells their number those that
+    are whole; a number that is cut is refused."""
+    layout, random = LAYOUTS[name], Random(name)
+    grid = layout.grid(values_of(layout, random))
+    head, text = layout.head(SAMPLES), layout.text(grid, SAMPLES)
+    whole = len(text[: len(text) - len(layout.tail)].rstrip())
+    words = (
+        rf"{LOST}|{TIMES}|not a number|is cut off|does not end|digit was lost|two or more|"
+        "does not state|not a unit|holds a"
+    )
+    for end in sorted(
+        {
+            random.randrange(len(head) if layout.counted else len(text) // 2, len(text))
+            for _ in range(8 * PLACES)
+        }
+        | {whole, whole - 1}
+    ):
+        found = outcome(tmp_path / "r.txt", layout, text[:end])
+        if end >= whole:
+            expect(
+                found,
+                layout.samples(grid),
+                words if layout.tail else None,
+                f"{name}: cut at {end}, all data left",
+            )
             continue
-        check(text, record, options)
-        read += 1
-    assert 5 < read < COUNT // len(SEEDS) - 5
+        right = None
+        if not layout.counted and end > len(head):
+            rows = [row for row in text[len(head) : end].split("\n") if row.strip()]
+            cut = [cells(layout, row) for row in rows]
+            complete = cut == grid[: len(cut) - 1] + [grid[len(cut) - 1][: len(cut[-1])]]
+            full = complete and (len(cut[-1]) == len(grid[len(cut) - 1]) or not layout.components)
+            right = layout.samples(cut) if full else None
+        expect(
+            found,
+            right,
+            None if right is not None and right.size > 4 else words,
+            f"{name}: cut at {end}",
+        )
+
+
+def cells(layout: Layout, row: str) -> list[str]:
+    """The cells of an uncounted layout's row, with the blanks and commas before them."""
+    return re.findall(r"[ ,]*[^ ,]+", row)

@@ -219,9 +219,12 @@ def test_units_of_columns_are_never_guessed(tmp_path):
         read_record(write(tmp_path, columns(TIMES, VALUES)))
 
 
-def test_an_unknown_format_is_refused_at_its_first_line(tmp_path):
-    with pytest.raises(InputError, match="line 1: 'RECORD of X' is no row of numbers"):
-        read_record(write(tmp_path, "RECORD of X\nUNITS cm/s^2\n1.0\n2.0\n"), "g")
+def test_a_header_of_words_is_read_and_believed(tmp_path):
+    path = write(tmp_path, "RECORD of X\nUNITS cm/s^2\n1.0\n2.0\n")
+    with pytest.raises(InputError, match="line 2: the file states its units as cm/s2 but units='g' was passed"):
+        read_record(path, "g", dt=0.01)
+    record = read_record(path, dt=0.01)
+    assert record.acceleration.tolist() == [0.01, 0.02] and record.title == "RECORD of X"
 
 
 def test_one_column_needs_the_time_step(tmp_path):
@@ -273,8 +276,8 @@ def test_even_records_are_resampled_on_request(tmp_path):
 
 @pytest.mark.parametrize("text, options, words", [
     ("0.0 1.0\n0.1 2.0\n0.2 x\n", {}, ["line 3", "'x' is not a number"]),
-    ("time acc\n0.0 1.0\n0.1 2.0\n", {}, ["line 1", "'time acc' is no row of numbers; begin a heading with #"]),
-    ('"t [s]";"a [cm/s/s]"\n0.0;1.0\n0.1;2.0\n', {}, ["line 1", "is no row of numbers; begin a heading with #"]),
+    ("time vel\n0.0 1.0\n0.1 2.0\n", {}, ["line 1", "names no acceleration (time: time, vel: velocity)"]),
+    ('"t [s]";"a [cm/s/s]"\n0.0;1.0\n0.1;2.0\n', {}, ["line 1", "states its units as cm/s2", "'m/s2' was passed"]),
     ("nan 0.0\n0.1 2.0\n", {}, ["line 1", "'nan' is not a number"]),
     ("0.0 1.0\n0.1 2.0\n0.2\n", {}, ["line 3", "1 columns instead of 2"]),
     ("0.0 1.0 5.0\n0.1 2.0 5.0\n", {}, ["line 1", "3 columns instead of 2"]),

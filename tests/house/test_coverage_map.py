@@ -50,10 +50,16 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "fem/test_space.py": "fem.nodal_space",
     "fem/test_surface.py": "fem.contact.faces",
     "fem/test_ties.py": "soil.soil_column",
+    "ground_motion/test_columns.py":
+        "ground_motion.formats.columns ground_motion.formats.gaps ground_motion.formats.headings "
+        "ground_motion.formats.statements ground_motion.formats.times",
     "ground_motion/test_formats.py": "ground_motion.formats.at2 ground_motion.formats.writer",
+    "ground_motion/test_networks.py":
+        "ground_motion.formats.cwa ground_motion.formats.geonet ground_motion.formats.unam "
+        "ground_motion.formats.unread ground_motion.formats.volume1",
     "ground_motion/test_processing.py": "ground_motion.chain",
     "ground_motion/test_readers.py":
-        "ground_motion.formats.afad ground_motion.formats.columns "
+        "ground_motion.formats.afad "
         "ground_motion.formats.cosmos ground_motion.formats.esm ground_motion.formats.knet "
         "ground_motion.formats.reader ground_motion.formats.smc "
         "ground_motion.formats.text",

@@ -65,7 +65,17 @@ def _read(options: argparse.Namespace, path: str) -> Record:
 
 
 def _info(options: argparse.Namespace) -> str:
-    return "\n\n".join(record_info(_read(options, path)) for path in options.file)
+    return "\n\n".join(_told(_read(options, path)) for path in options.file)
+
+
+def _told(record: Record) -> str:
+    """Return the table of a record, and where its units, its time step and its number of samples come from."""
+    spelled = {"units": record.units_from.replace("option", "--units"), "dt": record.dt_from.replace("option", "--dt"),
+               "samples": record.samples_from}
+    rows = [f"{f'{name} from':<20}{origin}" for name, origin in spelled.items()]
+    table = record_info(record).split("\n")
+    notes = next(k for k, row in enumerate(table) if row.startswith("sha256")) + 1
+    return "\n".join([*table[:notes], *rows, *table[notes:]])
 
 
 def _convert(options: argparse.Namespace) -> str:
@@ -79,6 +89,7 @@ def _convert(options: argparse.Namespace) -> str:
     if form == "path":
         lines.append(f"OpenSees: timeSeries Path 1 -dt {record.dt:.10g} -filePath {options.out} -factor 1.0  "
                      f"# -factor: your unit of acceleration per {units}")
+    lines += [f"doubt: {doubt}" for doubt in record.doubts]
     return "\n".join(lines + [f"note: {note}" for note in record.notes])
 
 

@@ -129,7 +129,8 @@ def mean_period(record: Record) -> float:
 
 @checked
 def record_info(record: Record) -> str:
-    """Return the table of a record: where it comes from, peaks, intensities, what is left at its end, notes."""
+    """Return the table of a record: where it comes from, peaks, intensities, what is left at its end,
+    what is doubted, notes."""
     measures = (pga, pga_time, pgv, pgd, arias, d5_95, cav, rms, housner_intensity)
     found: dict[str, Any] = {one.__name__: one(record) for one in measures}
     for one in (predominant_period, mean_period):
@@ -139,4 +140,5 @@ def record_info(record: Record) -> str:
         **found, record=record, title=record.title or "(none)", station=record.station or "(not stated)",
         component=record.component or "(not stated)", unit=UNITS[record.units], velocity=velocity,
         displacement=displacement, in_g=found["pga"] / STANDARD_GRAVITY)
-    return "\n".join([text, *(f"{'note':<20}{note}" for note in record.notes)])
+    doubts = (f"{'doubt':<20}{doubt}" for doubt in record.doubts)
+    return "\n".join([text, *doubts, *(f"{'note':<20}{note}" for note in record.notes)])

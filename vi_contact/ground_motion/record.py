@@ -25,7 +25,9 @@ class Record:
     acceleration: shape (n,), n >= 2 [m/s²], copied and made read-only; dt: time step [s] > 0; title; source: path of
     the file; format: name of its format; units: of the file, before conversion to m/s²; sha256: of the file's bytes;
     notes: what the file says about station and processing, then every change made since, one line each; station and
-    component (direction): as the file names them, empty where it does not.
+    component (direction): as the file names them, empty where it does not; units_from, dt_from, samples_from: where the
+    units, the time step and the number of samples come from ("header, line 4", "option", "counted"); doubts: what was
+    read in one of several ways that were possible, one sentence each.
     Between samples the acceleration is a straight line. Two records are equal only if they are the same object.
     Raises InputError for NaN or infinite samples, fewer than two of them, or a time step that is not positive."""
 
@@ -39,6 +41,10 @@ class Record:
     notes: tuple[str, ...] = ()
     station: str = ""
     component: str = ""
+    units_from: str = ""
+    dt_from: str = ""
+    samples_from: str = ""
+    doubts: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("title", "source", "format", "units", "sha256", "station", "component"):
@@ -53,7 +59,10 @@ class Record:
 
     def changed(self, acceleration: Array, note: str, *, dt: float | None = None) -> "Record":
         """Return a record with these samples, and a note of what was done."""
-        return replace(self, acceleration=acceleration, dt=dt or self.dt, notes=(*self.notes, note))
+        return replace(self, acceleration=acceleration, dt=dt or self.dt, notes=(*self.notes, note),
+                       dt_from="resampled" if dt else self.dt_from,
+                       samples_from="changed after reading" if acceleration.size != self.acceleration.size
+                       else self.samples_from)
 
     @property
     def times(self) -> Array:
@@ -66,12 +75,26 @@ class Record:
         return (self.acceleration.size - 1) * self.dt
 
 
+_SPELLINGS = {
+    "gals": "gal", "cms/s2": "cm/s2", "cm/ss": "cm/s2", "cms-2": "cm/s2", "ms-2": "m/s2", "mms-2": "mm/s2",
+    "m/s/s": "m/s2", "g's": "g", "gn": "g", "gal(cm/s2)": "gal", "gal=cm/s2": "gal", "cm/s2(gal)": "cm/s2",
+}
+"""Other spellings of units, after blanks, dots, powers and "sec" have been unified."""
+
+
+def known_units(units: str) -> str | None:
+    """Return the key of UNITS that `units` spells ("CM/SEC/SEC", "(g)", "cm/s^2"), or None."""
+    text = units.lower().strip(" ()[].,;:'\"").replace("²", "2").replace("^", "").replace("**", "").replace("*", "")
+    text = "".join(text.split()).replace("sec", "s").replace("/s/s", "/s2")
+    text = _SPELLINGS.get(text, text)
+    return text if text in UNITS else None
+
+
 @checked
 def canonical_units(source: str, units: str) -> str:
     """Return the key of UNITS that `units` spells ("CM/SEC/SEC", "(g)", "cm/s^2"); InputError if there is none."""
-    text = units.lower().strip(" ()[].,;").replace("²", "2").replace("^", "").replace("**", "")
-    text = "".join(text.split()).replace("sec", "s").replace("/s/s", "/s2")
-    if text not in UNITS:
+    text = known_units(units) if isinstance(units, str) else None
+    if text is None:
         raise InputError(f"{source}: {units!r} is not a unit of acceleration known here; use a file of accelerations "
                          f"in one of {', '.join(UNITS)}")
     return text

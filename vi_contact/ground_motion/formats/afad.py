@@ -8,8 +8,11 @@ COMPONENTS = ("N-S", "E-W", "U-D")
 
 
 def recognises(text: TextFile) -> bool:
-    """Tell whether the first line is one of the national network."""
-    return text.lines[0].strip().upper().startswith("STRONG GROUND MOTION RECORDS OF TURK")
+    """Tell whether the title of the national network, or its columns and their count, stand in the header."""
+    head = [line.strip().upper() for line in text.heads[:60]]
+    titled = any(line.startswith("STRONG GROUND MOTION RECORDS OF TURK") for line in head)
+    columns = any(tuple(line.split()) == COMPONENTS for line in head)
+    return titled or columns and any(line.startswith("SAMPLING INTERVAL (SEC)") for line in head)
 
 
 def read(text: TextFile) -> Record:
@@ -23,6 +26,7 @@ def read(text: TextFile) -> Record:
     header = {key.strip().upper(): (index, value.strip()) for index, (key, colon, value) in parts if colon}
     data = text.filled(start)
     samples = []
+    text.refuse_misaligned(data)
     for index, row in zip(data, text.rows(data), strict=True):
         if len(row) != 3:
             raise InputError(f"{text.at(index)}: {len(row)} values instead of N-S, E-W and U-D; get the file again")
@@ -30,6 +34,7 @@ def read(text: TextFile) -> Record:
     text.refuse_other_count(text.entry(header, "NUMBER OF DATA")[0], text.entry_number(header, "NUMBER OF DATA"),
                             len(samples))
     station, date = (header.get(key, (0, ""))[1] for key in ("STATION ID", "EARTHQUAKE DATE"))
-    return text.record(samples, units="gal", dt=text.entry_number(header, "SAMPLING INTERVAL (SEC)"), format="AFAD",
+    step = text.entry_number(header, "SAMPLING INTERVAL (SEC)")
+    return text.record(samples, lines=data, units="gal", dt=step, format="AFAD",
                        title=f"{date} {station} {COMPONENTS[channel]}".strip(), station=station,
                        notes=tuple(filter(None, notes)), component=COMPONENTS[channel])

@@ -12,27 +12,31 @@ from dataclasses import dataclass
 
 from ...core.errors import InputError
 from ..record import Record
+from .statements import agreed
 from .text import NUMBER, TextFile
 
 STEP = 33  # place of the time step among the real header values of COSMOS, from 0
 
-_FIRST = re.compile(r"^\s*+(?:un)?corrected accelerogram|\(\s*+format\s++v[\d.]++ with \d++ text lines", re.IGNORECASE)
+_FIRST = re.compile(r"^\s*+(?:un)?corrected\s++accelerogram\b|\(\s*+format\s++v[\d.]++ with \d++ text lines",
+                    re.IGNORECASE)
 _COUNT = re.compile(r"^\s*+(\d++)\s")
-_QUANTITY = re.compile(r"\b(accel|veloc|displ)\w*+", re.IGNORECASE)
+_QUANTITY = re.compile(r"\b(acc|vel|dis)\w*+", re.IGNORECASE)
 _SAMPLES = re.compile(r"\b(?:pts|spaced|data)\b", re.IGNORECASE)
 _FORMAT = re.compile(r"\(\s*+(\d*+)\s*+(?:1P)?[FEIDG](\d++)[^()]*+\)", re.IGNORECASE)
 _UNITS = (re.compile(r"units?\s*+(?:[=:]|\bof\b)\s*+(g/10|[^,()\s]++)", re.IGNORECASE),
-          re.compile(r"\bin\s++(g/10|cm/s(?:ec)?[*^]*+2|cm/s(?:ec)?/s(?:ec)?|g)\b", re.IGNORECASE))
+          re.compile(r"\bin\s++(?:units\s++)?(g/10|cms?/s(?:ec)?[*^]*+2|cms?/s(?:ec)?/s(?:ec)?|g)\b", re.IGNORECASE))
 _SPACED = re.compile(rf"equally[- ]spaced\s++(?:at|intervals\s++of)\s++({NUMBER})\s*+sec", re.IGNORECASE)
 _UNEVEN = re.compile(r"unequally", re.IGNORECASE)
 _RATE = re.compile(rf"\bat\s++({NUMBER})\s*+pts/sec", re.IGNORECASE)
 _REALS = re.compile(r"^\s*+(\d++)\s++real-header values follow on\s++(\d++)\s++lines", re.IGNORECASE)
 _CHANNEL = re.compile(r"\bchan?:?\s++([\w?]++):([^(]*+)", re.IGNORECASE)
+_COMPONENT = re.compile(r"^\s*+COMP\s++(\S++)")
 _FROM = re.compile(r"\bfrom\b", re.IGNORECASE)
 _STATION = re.compile(r"\bstat(?:io)?n\s*+(?:no|id)[.:](.*+)", re.IGNORECASE)
 _CODE = re.compile(r"\bcode:(.*+)", re.IGNORECASE)
 _EVENT = re.compile(r"re?co?rd of", re.IGNORECASE)
 _END = re.compile(r"^\s*+(?:end-of-data|/&)", re.IGNORECASE)
+_ROW = re.compile(rf"(?:\s*+{NUMBER})++\s*+")
 _NUMBERS = re.compile(r"[\s\d-]++")
 _UNKNOWN = re.compile(rf"unknown/unspecified:\s*+{NUMBER}[,\s]++({NUMBER})", re.IGNORECASE)
 
@@ -54,15 +58,23 @@ class Block:
 
 
 def recognises(text: TextFile) -> bool:
-    """Tell whether the first line is one of a COSMOS or CSMIP file of any volume."""
-    return _FIRST.search(text.heads[0]) is not None
+    """Tell whether the first line is one of a COSMOS or CSMIP file of any volume, or a line begins its samples."""
+    return _FIRST.search(text.heads[0]) is not None or begins_blocks(text)
+
+
+def begins_blocks(text: TextFile) -> bool:
+    """Tell whether one of the first lines announces a block of samples with its format or its step."""
+    lines = [(index, line) for index, line in enumerate(text.heads[:400]) if "header" not in line.lower()]
+    return any(_announced(text, index) and (_FORMAT.search(line) or _SPACED.search(line)) for index, line in lines)
 
 
 def read(text: TextFile) -> Record:
     """Return the record of one channel; channel: 1 for the first of the file, required where it holds several."""
     blocks = _blocks(text)
     if not blocks:
-        raise InputError(f"{text.at(0)}: no block of accelerations follows; get the corrected accelerations (V2)")
+        raise InputError(f"{text.at(0)}: no block of accelerations follows, which a line such as '7500 points of accel "
+                         "data equally spaced at .010 sec, in cm/sec2. (8f10.6)' begins; other layouts are not read, "
+                         "write columns of time and acceleration")
     block = blocks[text.chosen([_component(text, block) for block in blocks])]
     line = text.heads[block.line]
     if _UNEVEN.search(line):
@@ -71,7 +83,8 @@ def read(text: TextFile) -> Record:
     words, comments = _words(text, block)
     cosmos = "format v" in text.heads[0].lower()
     event = next(filter(_EVENT.match, words), " ".join(words[1:2] if cosmos else words[2:3]))
-    return text.record(_samples(text, block), units=stated, dt=_step(text, block), line=block.line, title=event,
+    samples, lines = _samples(text, block)
+    return text.record(samples, lines=lines, units=stated, dt=_step(text, block), line=block.line, title=event,
                        format="COSMOS" if cosmos else "CSMIP", notes=(*words, *comments),
                        station=_station(text, block), component=_component(text, block))
 
@@ -86,7 +99,7 @@ def _blocks(text: TextFile) -> list[Block]:
             count, quantity = announced
             per_line, width = (int(text.number(index, part or "1")) for part in form.groups()) if form else (8, 10)
             block = Block(index, range(start, index), count, max(per_line, 1), max(width, 1))
-            if quantity == "accel":
+            if quantity == "acc":
                 found.append(block)
             index = start = block.end
         elif _END.match(text.heads[index]):
@@ -97,7 +110,7 @@ def _blocks(text: TextFile) -> list[Block]:
 
 
 def _announced(text: TextFile, index: int) -> tuple[int, str] | None:
-    """Number of points and quantity ("accel", "veloc", "displ") of the line that begins a block, None for another."""
+    """Number of points and quantity ("acc", "vel", "dis") of the line that begins a block, None for another."""
     line = text.heads[index]
     count = _COUNT.match(line)
     quantity = _QUANTITY.search(line, count.end()) if count else None
@@ -114,20 +127,27 @@ def _words(text: TextFile, block: Block) -> tuple[list[str], list[str]]:
     return [entry for entry in header[:next(numbers, len(header))] if entry], [entry for entry in comments if entry]
 
 
-def _samples(text: TextFile, block: Block) -> list[float]:
-    """Return the samples in the file's units."""
+def _samples(text: TextFile, block: Block) -> tuple[list[float], list[int]]:
+    """Return the samples in the file's units, and the index of the line of each."""
     unknown = next((text.number(index, mark[1]) for index, mark in _found(text, block.header, _UNKNOWN)), None)
     values: list[float] = []
+    lines: list[int] = []
     for index in range(block.line + 1, block.end):
-        row = text.fixed(index, block.width) if index < len(text.lines) else []
-        wanted = min(block.per_line, block.count - len(values))
-        if len(row) != wanted:
+        line = text.lines[index].rstrip() if index < len(text.lines) else ""
+        fields, wanted = -(-len(line) // block.width), min(block.per_line, block.count - len(values))
+        if fields != wanted:
             raise InputError(f"{text.at(block.line)}: {block.count:.12g} samples are announced but line {index + 1} "
-                             f"holds {len(row)} of them instead of {wanted:g}; get the complete file")
+                             f"holds {fields} of them instead of {wanted:g}; get the complete file")
+        row = text.fixed(index, block.width)
         if unknown in row:
             raise InputError(f"{text.at(index)}: a sample is marked as unknown ({unknown:g}); use another record")
         values += row
-    return values
+        lines += [index] * len(row)
+    after = text.lines[block.end] if block.end < len(text.lines) else ""
+    if after.strip() and _ROW.fullmatch(after) and len(after.rstrip()) % block.width == 0:
+        raise InputError(f"{text.at(block.line)}: {block.count:.12g} samples are announced but line {block.end + 1} "
+                         "holds more of them; get the complete file")
+    return values, lines
 
 
 def _step(text: TextFile, block: Block) -> float | None:
@@ -135,21 +155,23 @@ def _step(text: TextFile, block: Block) -> float | None:
     rate = _RATE.search(text.heads[block.line])
     if rate and text.number(block.line, rate[1]) > 0.0:
         return 1.0 / text.number(block.line, rate[1])
-    for index, spaced in _found(text, (block.line, *block.header), _SPACED):
-        return text.number(index, spaced[1])
-    for index, reals in _found(text, block.header, _REALS):
+    found = [(index, text.number(index, spaced[1]))
+             for index, spaced in _found(text, (block.line, *block.header), _SPACED)]
+    for index, reals in _found(text, block.header, _REALS) if not found else ():
         if form := _FORMAT.search(text.heads[index]):
             rows = range(index + 1, min(index + 1 + int(text.number(index, reals[2])), block.line))
             width = max(int(text.number(index, form[2])), 1)
             values = [value for row in rows for value in text.fixed(row, width)]
             return values[STEP] if len(values) > STEP and values[STEP] > 0.0 else None
-    return None
+    stated = agreed(text, "the time step", found)
+    return stated[1] if stated else None
 
 
 def _component(text: TextFile, block: Block) -> str:
     """Return the direction of the channel, such as "90 Deg" or "UP", from the text of its header."""
     named = (_FROM.split(match[2], maxsplit=1)[0].split() for _, match in _found(text, block.header, _CHANNEL))
-    return " ".join(next(filter(None, named), []))
+    older = (match[1] for _, match in _found(text, block.header, _COMPONENT))
+    return " ".join(next(filter(None, named), [])) or next(older, "")
 
 
 def _station(text: TextFile, block: Block) -> str:

@@ -26,7 +26,7 @@ def read(text: TextFile) -> Record:
     index, kind = header.get("DATA_TYPE", (0, "ACCELERATION"))
     if kind and "ACCELERATION" not in kind.upper():
         raise InputError(f"{text.at(index)}: the file holds {kind.lower()}; get the file of accelerations (.ACC.ASC)")
-    values = text.values(len(entries))
+    values, lines = text.series(len(entries))
     text.refuse_other_count(text.entry(header, "NDATA")[0], text.entry_number(header, "NDATA"), len(values))
     line, units = text.entry(header, "UNITS")
     value = {key: content for key, (_, content) in header.items()}
@@ -34,7 +34,7 @@ def read(text: TextFile) -> Record:
     title = " ".join(filter(None, (value.get("EVENT_NAME"), value.get("EVENT_DATE_YYYYMMDD"),
                                    value.get("EVENT_TIME_HHMMSS"), station, value.get("STREAM"))))
     notes = tuple(f"{key}: {content}" for key, content in value.items() if content and not key.startswith("USER"))
-    return text.record(values, units=units, line=line, dt=text.entry_number(header, "SAMPLING_INTERVAL_S"),
+    return text.record(values, units=units, line=line, lines=lines, dt=text.entry_number(header, "SAMPLING_INTERVAL_S"),
                        format="ESM", title=title, notes=notes, station=station, component=value.get("STREAM", ""))
 
 

@@ -19,8 +19,8 @@ _FREQUENCY = re.compile(rf"({NUMBER})\s*+(?:Hz)?\s*+$", re.IGNORECASE)
 
 
 def recognises(text: TextFile) -> bool:
-    """Tell whether the first line is the origin time and a scale factor follows."""
-    return text.lines[0].startswith("Origin Time") and any(line.startswith("Scale Factor") for line in text.heads[:20])
+    """Tell whether five of the entries of a header, in any line, are there."""
+    return sum(any(line.startswith(key) for line in text.heads[:30]) for key in KEYS) >= 5
 
 
 def read(text: TextFile) -> Record:
@@ -31,7 +31,7 @@ def read(text: TextFile) -> Record:
         raise InputError(f"{text.path}: the header has no line {missing[0]!r}; get the complete file")
     scale, name = _scale(text, header["Scale Factor"])
     frequency = _number(text, header["Sampling Freq(Hz)"], "Sampling Freq(Hz)")
-    counts = text.values(header["Memo."] + 1)
+    counts, _ = text.series(header["Memo."] + 1)
     seconds = _number(text, header["Duration Time(s)"], "Duration Time(s)")
     if not abs(len(counts) - seconds * frequency) <= 0.5:
         raise InputError(f"{text.at(header['Duration Time(s)'])}: {seconds:g} s at {frequency:g} Hz are announced but "

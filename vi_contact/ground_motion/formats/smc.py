@@ -50,7 +50,8 @@ def read(text: TextFile) -> Record:
     notes += ["the file carries the agency's problem flag: read its comments"] if integers[PROBLEM] == 1.0 else []
     notes += [line[1:].strip() for line in comments if line[1:].strip()]
     title = "; ".join(" ".join(text.heads[index].split()) for index in (3, 5) if text.heads[index].strip(" *"))
-    return text.record(_samples(text, start, integers[SAMPLES]), units="cm/s2", dt=stated, format="USGS SMC",
+    samples, lines = _samples(text, start, integers[SAMPLES])
+    return text.record(samples, lines=lines, units="cm/s2", dt=stated, format="USGS SMC",
                        title=title, notes=tuple(notes), station=_station(text), component=direction)
 
 
@@ -65,16 +66,20 @@ def _fields(text: TextFile, start: int, lines: int, width: int, per_line: int) -
     return values
 
 
-def _samples(text: TextFile, start: int, count: float) -> list[float]:
-    """Return the samples in cm/s²."""
+def _samples(text: TextFile, start: int, count: float) -> tuple[list[float], list[int]]:
+    """Return the samples in cm/s², and the index of the line of each."""
     values: list[float] = []
-    for index in range(start, len(text.lines)):
-        row = text.fixed(index, SAMPLE_WIDTH)
+    lines = list(range(start, len(text.lines)))
+    rows = [text.fixed(index, SAMPLE_WIDTH) for index in lines]
+    while rows and not rows[-1]:
+        del lines[-1], rows[-1]
+    for index, row in zip(lines, rows, strict=True):
         if any(abs(value) >= UNDEFINED for value in row):
             raise InputError(f"{text.at(index)}: a sample is marked as undefined; fill the gap or use another record")
         values += row
     text.refuse_other_count(TEXT_LINES + 2, count, len(values))
-    return values
+    text.refuse_uneven_rows(lines, rows)
+    return values, [index for index, row in zip(lines, rows, strict=True) for _ in row]
 
 
 def _direction(integers: list[float]) -> str:

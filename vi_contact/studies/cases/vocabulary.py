@@ -60,7 +60,7 @@ class MeshFile:
 
 
 def record(path: Path, units: str | None = None, *, dt: float | None = None, resample_dt: float | None = None,
-           channel: int | None = None, largest: float = LARGEST_PEAK,
+           channel: int | str | None = None, largest: float = LARGEST_PEAK,
            processing: "ground_motion.Processing | None" = None) -> Record:
     """Read a record, ``read_record``, then apply ``processing``."""
     found = ground_motion.read_record(path, units, dt=dt, resample_dt=resample_dt, channel=channel, largest=largest)
