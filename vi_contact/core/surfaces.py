@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .algebra import Array, Comm, Indices, Mask, Matrix, SerialComm, largest, on_first, total
+from .census import Census
 from .checks import function, number, shown
 from .contact_last import at
 from .errors import InputError
@@ -48,7 +49,9 @@ class ContactSurface:
         space: of the systems that it was made for; None when it was made by hand.
         companions: motions of the obstacle that are marched beside the run, with its scheme and time steps.
         nodes: (m,) numbers of the nodes, to be told apart only: several conditions may be of one. None: one each.
-        frictionless_corners: True when nodes with several conditions are allowed beside friction."""
+        frictionless_corners: True when nodes with several conditions are allowed beside friction.
+        censuses: what became of the nodes of each contact boundary, in the order in which surfaces were joined; empty
+            where nothing is known of facets."""
 
     comm: Comm
     points: Array
@@ -69,6 +72,7 @@ class ContactSurface:
     dual: Matrix | None = None
     nodes: Indices | None = None
     frictionless_corners: bool = False
+    censuses: tuple[Census, ...] = field(default=(), repr=False)
 
     def __repr__(self) -> str:
         """Return how many conditions this rank has, and of which kind: not the arrays."""

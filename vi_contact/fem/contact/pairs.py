@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
-from ...core.algebra import Array, Mask
+from ...core.algebra import Array, Indices, Mask
 from ...core.checks import at, optional, provides
 from ...core.corners import FEATURE_ANGLE
 from ...core.errors import InputError
@@ -27,6 +27,7 @@ from ...meshes.rows import number_alike
 from ..mesh import Facets
 from ..space import FemSpace
 from .bubbles import averaged
+from .counting import census_of_all
 from .faces import Boundary, boundary, checked_angle, split, tell_corners
 from .frames import Facing, NodalConditions, snapped, surface_of
 from .matching import Matched, Matching, NodeToNode, Side
@@ -74,24 +75,31 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
     faces = _faces(space, one, boundary(space, facets1) if len(around.vertices) else around, angle)
     nodes, matched = _by_face(faces, two, NodeToNode() if matching is None else matching, space.size)
     kept = ~np.isin(nodes.numbers, two.nodes.numbers)
+    opposite = nodes.numbers
     nodes, matched = nodes.pick(kept), matched.pick(kept)
     free = _unclamped(space, one.name, nodes, two, matched)
+    kinds = _kinds(one, shared, opposite, nodes.numbers[~free])
     nodes, matched = nodes.pick(free), matched.pick(free)
     if points is not None:
         chosen = listed(space, nodes, points, one.name)
         rows = np.concatenate([np.flatnonzero(nodes.numbers == number) for number in chosen])
+        kinds["not listed"] = np.isin(one.nodes.numbers, np.setdiff1d(nodes.numbers, chosen))
         nodes, matched = nodes.pick(rows), matched.pick(rows)
+    alone = nodes.numbers
     directions = snapped(nodes.normals)
     gap, P = _gap(space, one.name, two, nodes, directions, matched), matched.P
     if len(space.tied_nodes):
         nodes, directions, shares = merged(space, one.name, nodes, directions, angle)
         gap, P = shares @ gap, sp.csr_matrix(shares @ P)
+        kinds["tied to another"] = np.isin(one.nodes.numbers, np.setdiff1d(alone, nodes.numbers))
+    census = census_of_all(one.name, one.nodes, kinds, len(nodes.numbers))
     slots = np.flatnonzero(space.blocks_of(nodes.numbers) >= 0)  # from here on every rank has its own nodes of side 1
     nodes = nodes.pick(slots)
     tell_corners(space, one.name, nodes, slots, angle)
     bubbles = averaged(space, facets1, nodes) + averaged(space, facets2, two.nodes, P[slots])
     conditions = NodalConditions(nodes, directions[slots], slots, Facing(two.nodes, P[slots]), bubbles)
-    surface = surface_of(space, [conditions], gap0=gap[slots], weights=nodes.weights * space.forms.section.thickness)
+    weights = nodes.weights * space.forms.section.thickness
+    surface = surface_of(space, [conditions], gap0=gap[slots], weights=weights, censuses=(census,))
     return replace(surface, **prescribed_motion(space, conditions))
 
 
@@ -101,6 +109,17 @@ def side_of(space: FemSpace, facets: Facets) -> Side:
     rows = np.concatenate(space.comm.bcast(space.comm.gather(space.corners_of_facets(facets.indices))))
     _, first = np.unique(np.sort(rows, axis=1), axis=0, return_index=True)
     return Side(facets.name, nodes, np.searchsorted(nodes.numbers, rows[first]))
+
+
+def _kinds(one: Side, shared: Mask, opposite: Indices, clamped: Indices) -> dict[str, Mask]:
+    """Kind -> mask of the nodes of side 1 without a condition; ``opposite``, ``clamped``: numbers of those in front of
+    side 2, and of those that are clamped."""
+    numbers = one.nodes.numbers
+    return {
+        "shared by both sides": shared,
+        "clamped": np.isin(numbers, clamped),
+        "faces nothing": ~(shared | np.isin(numbers, opposite)),
+    }
 
 
 def _refuse_common(one: Side, two: Side) -> None:

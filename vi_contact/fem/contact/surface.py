@@ -20,6 +20,7 @@ from ..groups import facets_of
 from ..mesh import Facets
 from ..space import FemSpace, space_of
 from .bubbles import averaged
+from .counting import census_on_ranks
 from .faces import boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
 from .frames import NodalConditions, NodalFrames, given, snapped, surface_of
 from .nodes import Nodes, asked, everywhere, joined_nodes, slots_of
@@ -53,7 +54,8 @@ def contact_surface(system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obs
     space = contact_space("contact_surface", system, {"facets": facets}, points)
     optional(provides, "contact_surface", "obstacle", obstacle, ("directions", "gap"), "give HalfSpace(…) or another")
     angle = checked_angle("contact_surface", feature_angle)
-    comm, whole = space.comm, nodes_on(space, facets)
+    comm, every = space.comm, nodes_on(space, facets)
+    whole = every
     chosen = None if points is None else listed(space, everywhere(comm, whole), points, facets.name)
     whole = free_nodes(space, whole, facets.name) if chosen is None else whole.pick(_rows_of(whole, chosen))
     nodes, _ = split(space, boundary(space, facets, beyond=angle), whole, angle)
@@ -67,7 +69,11 @@ def contact_surface(system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obs
     weights = nodes.weights * space.forms.section.thickness
     tell_corners(space, facets.name, nodes, slots, angle)
     conditions = NodalConditions(nodes, directions, slots, bubbles=averaged(space, facets, nodes))
-    surface = surface_of(space, [conditions], gap0=gap, weights=weights)
+    clamped = every.held.all(axis=1)
+    kinds = {"clamped": clamped, "not listed": ~(clamped | np.isin(every.numbers, whole.numbers))}
+    kinds["tied to another"] = np.isin(every.numbers, whole.numbers) & ~np.isin(every.numbers, nodes.numbers)
+    census = census_on_ranks(comm, facets.name, every, kinds, len(slots))
+    surface = surface_of(space, [conditions], gap0=gap, weights=weights, censuses=(census,))
     return replace(surface, **prescribed_motion(space, conditions))
 
 
