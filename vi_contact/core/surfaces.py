@@ -50,6 +50,8 @@ class ContactSurface:
         companions: motions of the obstacle that are marched beside the run, with its scheme and time steps.
         nodes: (m,) numbers of the nodes, to be told apart only: several conditions may be of one. None: one each.
         frictionless_corners: True when nodes with several conditions are allowed beside friction.
+        uncovered: (m,) True where the other side lies in front of so little around the node that r_n / weight is no
+            pressure; None: nowhere. Such points are left out of largest pressures.
         censuses: what became of the nodes of each contact boundary, in the order in which surfaces were joined; empty
             where nothing is known of facets."""
 
@@ -73,6 +75,7 @@ class ContactSurface:
     nodes: Indices | None = None
     frictionless_corners: bool = False
     censuses: tuple[Census, ...] = field(default=(), repr=False)
+    uncovered: Mask | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         """Return how many conditions this rank has, and of which kind: not the arrays."""
