@@ -177,6 +177,7 @@ class Contact:
         closed, count, resultant, *vectors = sums
         force, place = [0.0 - one for one in vectors[:d]], vectors[d:]  # not -one: no negative zeros
         depth, highest, *farthest = self._largest(gap, pressure, *rubbing[1:])
+        depth = max([depth, *(-one.smallest(state.t) for one in surface.watched)])
         values = [1.0 - closed / self._weight if self._weight else 1.0, int(count), resultant, *force,
                   *[one / resultant if resultant else np.nan for one in place], -depth, highest]
         values += [*self._friction_force(state), *farthest] if self._frictional else []

@@ -64,6 +64,7 @@ class Equilibria:
     def after(self, old: State, t: float) -> State:
         """Return the equilibrium at time t of a body that rubs and slides from where ``old`` was; its number too."""
         problem = self._problem
+        problem.surface.refuse_driven(t)
         step = StepProblem(A=self._K, b=problem.static_load.load.at_rest(t), bound=problem.surface.gap(t), scale=1.0,
                            surface=problem.surface, guess=old.u, active=old.active, t=t, k=old.k,
                            friction=problem.friction, slip0=problem.slip_origin(old.u, old.t, t))

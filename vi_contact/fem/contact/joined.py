@@ -39,6 +39,7 @@ def joined_surfaces(*surfaces: ContactSurface) -> ContactSurface:
     parts = [part for surface in made for part in surface.parts]
     joined = surface_of(made[0].space, parts, motion=_joined([(surface.motion, (surface.count,)) for surface in made]),
                         companions=tuple(one for surface in made for one in surface.companions),
+                        watched=tuple(one for surface in made for one in surface.watched),
                         censuses=tuple(one for surface in made for one in surface.censuses), **data)
     joined = replace(joined, slide=_slide(made))
     return joined.with_frictionless_corners() if all(one.frictionless_corners for one in made) else joined

@@ -34,6 +34,7 @@ from .frames import Facing, NodalConditions, snapped, surface_of
 from .matching import Matched, Matching, NodeToNode, Side
 from .nodes import Nodes, everywhere, joined_nodes
 from .surface import contact_space, listed, merged, nodes_on, prescribed_motion
+from .watching import Watched, clamped_or_prescribed, watched_nodes
 
 log = logging.getLogger(__name__)
 
@@ -85,6 +86,8 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
     nodes, matched = nodes.pick(kept), matched.pick(kept)
     free = _unclamped(space, one.name, nodes, two, matched)
     kinds = _kinds(one, shared, opposite, nodes.numbers[~free])
+    kinds |= _sorted_out(space, one, kinds["clamped"])
+    watched = _watched(space, one, two, nodes.pick(~free), matched.pick(~free)) if points is None else ()
     kinds["partly covered"] = np.isin(one.nodes.numbers, carried)
     little = nodes.numbers[free & (matched.shares < LEAST_SHARE)]
     kinds["hardly covered"] = np.isin(one.nodes.numbers, little)
@@ -110,7 +113,7 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
     bubbles = averaged(space, facets1, nodes) + averaged(space, facets2, two.nodes, P[slots])
     conditions = NodalConditions(nodes, directions[slots], slots, Facing(two.nodes, P[slots]), bubbles)
     weights = nodes.weights * space.forms.section.thickness
-    surface = surface_of(space, [conditions], gap0=gap[slots], weights=weights, censuses=(census,))
+    surface = surface_of(space, [conditions], gap0=gap[slots], weights=weights, censuses=(census,), watched=watched)
     if uncovered.any():
         surface = replace(surface, uncovered=uncovered[slots])
     return replace(surface, **prescribed_motion(space, conditions))
@@ -142,6 +145,27 @@ def _warn_of_coarse(space: FemSpace, one: Side, two: Side, little: Indices) -> N
         log.warning("%d contact nodes of '%s', the first at %s, have hardly anything of '%s' in front of their facets, "
                     "and no whole facet is near: their pressures are left out of the largest ones; make '%s' the first "
                     "side, or mesh '%s' finer", len(little), one.name, where, two.name, two.name, one.name)
+
+
+def _sorted_out(space: FemSpace, one: Side, clamped: Mask) -> dict[str, Mask]:
+    """Kind -> mask of the nodes of side 1 that are held in every component, at rest or moved. Collective."""
+    sorted_out = clamped_or_prescribed(space, one.nodes, clamped)
+    moved = space.comm.max(sorted_out["prescribed"].astype(float)) > 0.0
+    return {"clamped": clamped & ~moved, "prescribed": clamped & moved}
+
+
+def _watched(space: FemSpace, one: Side, two: Side, nodes: Nodes, matched: Matched) -> tuple[Watched, ...]:
+    """What watches nodes of side 1, given of all ranks, that are held in every component in front of others that are.
+    Collective."""
+    known = np.asarray(matched.P @ (~two.nodes.held.all(axis=1)).astype(float)) == 0.0
+    nodes, matched = nodes.pick(known), matched.pick(np.flatnonzero(known))
+    if not len(nodes.numbers):
+        return ()
+    directions = snapped(nodes.normals)
+    gap = _gap(space, one.name, two, nodes, directions, matched)
+    own = np.flatnonzero(space.blocks_of(nodes.numbers) >= 0)
+    opposite = Facing(two.nodes, sp.csr_matrix(matched.P[own]))
+    return watched_nodes(space, one.name, nodes.pick(own), directions[own], gap[own], opposite, two.name)
 
 
 def _refuse_common(one: Side, two: Side) -> None:
