@@ -26,6 +26,7 @@ from ...core.system import SemiDiscreteSystem
 from ...meshes.rows import number_alike
 from ..mesh import Facets
 from ..space import FemSpace
+from .borrowing import Borrowed, borrowed
 from .bubbles import averaged
 from .counting import census_of_all
 from .covering import LEAST_SHARE
@@ -111,7 +112,8 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
     nodes = nodes.pick(slots)
     tell_corners(space, one.name, nodes, slots, angle)
     bubbles = averaged(space, facets1, nodes) + averaged(space, facets2, two.nodes, P[slots])
-    conditions = NodalConditions(nodes, directions[slots], slots, Facing(two.nodes, P[slots]), bubbles)
+    beside = _borrowed(space, facets1, one, kinds, nodes.numbers[~uncovered[slots]])
+    conditions = NodalConditions(nodes, directions[slots], slots, Facing(two.nodes, P[slots]), bubbles, beside)
     weights = nodes.weights * space.forms.section.thickness
     surface = surface_of(space, [conditions], gap0=gap[slots], weights=weights, censuses=(census,), watched=watched)
     if uncovered.any():
@@ -166,6 +168,12 @@ def _watched(space: FemSpace, one: Side, two: Side, nodes: Nodes, matched: Match
     own = np.flatnonzero(space.blocks_of(nodes.numbers) >= 0)
     opposite = Facing(two.nodes, sp.csr_matrix(matched.P[own]))
     return watched_nodes(space, one.name, nodes.pick(own), directions[own], gap[own], opposite, two.name)
+
+
+def _borrowed(space: FemSpace, facets: Facets, one: Side, kinds: dict[str, Mask], having: Indices) -> Borrowed | None:
+    """What nodes of side 1 without a pressure of their own take of neighbours, not those in front of nothing."""
+    nothing = [mask for kind, mask in kinds.items() if kind not in ("faces nothing", "not listed")]
+    return borrowed(space, facets, one.nodes.numbers[np.any(nothing, axis=0)], having)
 
 
 def _refuse_common(one: Side, two: Side) -> None:

@@ -19,6 +19,7 @@ from ...core.system import SemiDiscreteSystem
 from ..groups import facets_of
 from ..mesh import Facets
 from ..space import FemSpace, space_of
+from .borrowing import borrowed
 from .bubbles import averaged
 from .counting import census_on_ranks
 from .faces import boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
@@ -72,7 +73,10 @@ def contact_surface(system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obs
     slots = slots_of(comm, _places(nodes, chosen))
     weights = nodes.weights * space.forms.section.thickness
     tell_corners(space, facets.name, nodes, slots, angle)
-    conditions = NodalConditions(nodes, directions, slots, bubbles=averaged(space, facets, nodes))
+    beside = borrowed(space, facets, every.numbers if chosen is None else every.numbers[:0], nodes.numbers)
+    conditions = NodalConditions(
+        nodes, directions, slots, bubbles=averaged(space, facets, nodes), borrowed=beside
+    )
     held, kept = every.held.all(axis=1), np.isin(every.numbers, whole.numbers)
     kinds = dict(clamped_or_prescribed(space, every, held))
     kinds |= {"not listed": ~(held | kept), "tied to another": kept & ~np.isin(every.numbers, nodes.numbers)}
