@@ -33,7 +33,7 @@ def test_nodes_that_face_nothing_are_told(width):
     surface = fem.contact_pair(system, tags["lower_top"], tags["upper_bottom"], matching=fem.DualMortar())
     (census,) = surface.censuses
     assert (census.name, census.nodes, census.points) == ("lower_top", 21, surface.total)
-    alone = census.places.get("faces nothing", np.zeros((0, 2)))
+    alone = census.places.get("in front of nothing", np.zeros((0, 2)))
     carried = census.places.get("partly covered", np.zeros((0, 2)))
     assert len(alone) + len(carried) == 21 - surface.total
     assert np.all(carried[:, 0] < 1.1)

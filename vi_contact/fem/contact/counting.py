@@ -1,5 +1,6 @@
 """Count the nodes of a contact boundary by what became of them: the `Census` of a contact surface."""
 
+import logging
 from collections.abc import Mapping
 from typing import Any
 
@@ -8,6 +9,8 @@ import numpy as np
 from ...core.algebra import Array, Comm, Mask, from_each, total
 from ...core.census import Census
 from .nodes import Nodes
+
+log = logging.getLogger(__name__)
 
 
 def census_on_ranks(
@@ -36,6 +39,12 @@ def census_of_all(name: str, nodes: Nodes, kinds: Mapping[str, Mask], points: in
     """
     places = {kind: nodes.points[mask] for kind, mask in kinds.items()}
     return Census(name, len(nodes.numbers), points, _filled(places))
+
+
+def tell(comm: Comm, census: Census) -> None:
+    """Log, on rank 0, what became of the nodes of a boundary, where not all are plain contact points."""
+    if census.places and comm.rank == 0:
+        log.info("contact on '%s': %s", census.name, census.in_words())
 
 
 def _gathered(comm: Comm, nodes: Nodes) -> Array:

@@ -28,7 +28,7 @@ from ..mesh import Facets
 from ..space import FemSpace
 from .borrowing import Borrowed, borrowed
 from .bubbles import averaged
-from .counting import census_of_all
+from .counting import census_of_all, tell
 from .covering import LEAST_SHARE
 from .faces import Boundary, boundary, checked_angle, split, tell_corners
 from .frames import Facing, NodalConditions, snapped, surface_of
@@ -108,6 +108,7 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
         kinds["tied to another"] = np.isin(one.nodes.numbers, np.setdiff1d(alone, nodes.numbers))
     uncovered = np.isin(nodes.numbers, little)
     census = census_of_all(one.name, one.nodes, kinds, len(nodes.numbers))
+    tell(space.comm, census)
     slots = np.flatnonzero(space.blocks_of(nodes.numbers) >= 0)  # from here on every rank has its own nodes of side 1
     nodes = nodes.pick(slots)
     tell_corners(space, one.name, nodes, slots, angle)
@@ -136,7 +137,7 @@ def _kinds(one: Side, shared: Mask, opposite: Indices, clamped: Indices) -> dict
     return {
         "shared by both sides": shared,
         "clamped": np.isin(numbers, clamped),
-        "faces nothing": ~(shared | np.isin(numbers, opposite)),
+        "in front of nothing": ~(shared | np.isin(numbers, opposite)),
     }
 
 
@@ -172,7 +173,7 @@ def _watched(space: FemSpace, one: Side, two: Side, nodes: Nodes, matched: Match
 
 def _borrowed(space: FemSpace, facets: Facets, one: Side, kinds: dict[str, Mask], having: Indices) -> Borrowed | None:
     """What nodes of side 1 without a pressure of their own take of neighbours, not those in front of nothing."""
-    nothing = [mask for kind, mask in kinds.items() if kind not in ("faces nothing", "not listed")]
+    nothing = [mask for kind, mask in kinds.items() if kind not in ("in front of nothing", "not listed")]
     return borrowed(space, facets, one.nodes.numbers[np.any(nothing, axis=0)], having)
 
 

@@ -21,7 +21,7 @@ from ..mesh import Facets
 from ..space import FemSpace, space_of
 from .borrowing import borrowed
 from .bubbles import averaged
-from .counting import census_on_ranks
+from .counting import census_on_ranks, tell
 from .faces import boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
 from .frames import NodalConditions, NodalFrames, given, snapped, surface_of
 from .matching import EDGE_ON
@@ -85,6 +85,7 @@ def contact_surface(system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obs
         lost, _ = split(space, around, every.pick(held), angle)
         watched = _watched(space, facets.name, lost, obstacle)
     census = census_on_ranks(comm, facets.name, every, kinds, len(slots))
+    tell(comm, census)
     surface = surface_of(space, [conditions], gap0=gap, weights=weights, censuses=(census,), watched=watched)
     return replace(surface, **prescribed_motion(space, conditions))
 
