@@ -65,7 +65,8 @@ def contact_surface(system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obs
     around = boundary(space, facets, beyond=angle)
     nodes, _ = split(space, around, whole, angle)
     slots = slots_of(comm, _places(nodes, chosen))
-    directions, gap = asked(comm, slots, _obstacle(obstacle, space.size), nodes.points, nodes.normals)
+    ask = _obstacle(obstacle, space.size, facets.name, angle, round(total(comm, len(slots))))
+    directions, gap = asked(comm, slots, ask, nodes.points, nodes.normals)
     nodes, directions, gap = one_per_direction(whole, nodes, directions, gap)
     nodes, directions, gap = with_ties(space, facets.name, nodes, directions, gap, angle)
     order = np.argsort(_places(nodes, chosen), kind="stable")
@@ -123,12 +124,15 @@ def moved_by_held(space: FemSpace, conditions: Sequence[NodalConditions]) -> Cal
     return moved
 
 
-def _obstacle(obstacle: Obstacle | None, size: float) -> Callable[[Array, Array], tuple[Array, Array]]:
-    """What an obstacle answers: directions and initial gaps at points with these normals."""
+def _obstacle(obstacle: Obstacle | None, size: float, name: str, angle: float,
+              count: int) -> Callable[[Array, Array], tuple[Array, Array]]:
+    """What an obstacle answers: directions and initial gaps at points with these normals, of all ``count`` of a
+    boundary or of those of a rank."""
     def ask(points: Array, normals: Array) -> tuple[Array, Array]:
         if not len(points):  # users' functions need not cope with none
             return np.zeros_like(points), np.zeros(0)
-        directions, gap = facing(Touching() if obstacle is None else obstacle, points, normals)
+        way = Touching() if obstacle is None else obstacle
+        directions, gap = facing(way, points, normals, name=name, angle=angle, alone=len(points) == count)
         return snapped(directions), admissible_gap(gap, points, size)
 
     return ask
