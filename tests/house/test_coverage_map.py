@@ -50,7 +50,6 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "fem/test_own_matrices.py": "fem.contact.points",
     "fem/test_space.py": "fem.nodal_space",
     "fem/test_surface.py": "fem.contact.faces",
-    "fem/test_obstacle_directions.py": "core.obstacles",
     "fem/test_ties.py": "soil.soil_column",
     "ground_motion/test_formats.py": "ground_motion.formats.at2 ground_motion.formats.writer",
     "ground_motion/test_processing.py": "ground_motion.chain",

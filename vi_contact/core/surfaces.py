@@ -27,7 +27,7 @@ Motion = Callable[[float], float | Array]
 
 
 class WatchedNodes(Protocol):
-    """Tell of nodes of a contact boundary that move as they are prescribed, and have no condition."""
+    """Say where nodes of a contact boundary are that move as they are prescribed, and have no condition."""
 
     def smallest(self, t: float) -> float:
         """Return their smallest gap at time t [m]. Collective."""

@@ -10,7 +10,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, from_each
-from ..mesh import Facets
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +26,7 @@ class Borrowed:
         return np.asarray(self.shares @ space.at_nodes(self.lenders, nodal))
 
 
-def borrowed(space: Any, facets: Facets, without: Indices, having: Indices) -> Borrowed | None:
+def borrowed(space: Any, facets: Any, without: Indices, having: Indices) -> Borrowed | None:
     """Return what nodes ``without`` a pressure of their own borrow of those ``having`` one; None where there are none
     of either. Both are numbers of nodes of any rank, as this rank knows them. Collective."""
     asking, lending = (np.unique(np.concatenate(from_each(space.comm, one))) for one in (without, having))
