@@ -39,6 +39,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "fem/test_assembly.py": "fem.assembly_checks",
     "fem/test_bubbles.py": "fem.hierarchical",
     "fem/test_corners.py": "core.corners laws.mass_transfer",
+    "fem/test_counting.py": "core.census",
     "fem/test_forces_in_space.py": "fem.output.cut_cells",
     "fem/test_forms.py": "fem.form_checks fem.own_forms",
     "fem/test_mortar_in_space.py": "fem.contact.clipping fem.contact.sight",

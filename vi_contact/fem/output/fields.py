@@ -240,14 +240,20 @@ class FrameWriter:
 def nodal_contact(problem: ContactProblem, state: State, status: Array) -> tuple[Array, Array]:
     """Return (contact pressure, status), (k, 1) at the owned nodes, of those of the conditions: of several faces of a
     node the pressure of the one that is pressed most, and the highest status. Collective."""
-    space, surface = cast(NodalSpace, problem.system.space), problem.surface
-    blocks = space.blocks_of(space.ids[surface.owned] // space.dimension)
+    space, blocks = cast(NodalSpace, problem.system.space), blocks_of_conditions(problem)
+    surface = problem.surface
     pressure, highest = np.zeros((2, len(space.nodes), 1))
     each = state.r_n / surface.weights
     order = np.argsort(np.abs(each), kind="stable")
     pressure[blocks[order], 0] = each[order]
     np.maximum.at(highest[:, 0], blocks, status)
     return between(problem, pressure), between(problem, highest, np.min)
+
+
+def blocks_of_conditions(problem: ContactProblem) -> Indices:
+    """Return the owned nodes (m,), by their places, of this rank's conditions."""
+    space = cast(NodalSpace, problem.system.space)
+    return np.asarray(space.blocks_of(space.ids[problem.surface.owned] // space.dimension))
 
 
 def between(problem: ContactProblem, nodal: Array, mean: Any = np.mean) -> Array:

@@ -2,7 +2,7 @@
 
 import json
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
@@ -14,8 +14,8 @@ from ...core.files import on_root, to_json, write_atomically
 from ...core.problem import ContactProblem
 from ...core.step import AXES
 from ...engineering.damping import NOT_COMPUTED, damping_in_words, first_modes
-from ...fem.mesh import Cells
-from ...fem.output.outline import cell_volumes, longest_edge, outline
+from ...fem.mesh import Cells, Facets
+from ...fem.output.outline import cell_volumes, facets_with_cells, longest_edge, outline
 from ...fem.space import space_of
 from ...ground_motion.excitation import GroundMotion
 from ...ground_motion.record import Record
@@ -26,6 +26,7 @@ from .vocabulary import Parts
 
 ELEMENTS = 8.0  # of first order in a wave length: Kuhlemeyer and Lysmer (1973); the cautious take 10
 STEPS = 20.0  # in a period
+COARSER = 1.2  # edges of side 2 over those of side 1: more points than a softer side can follow (CHOSEN)
 ENERGY = 0.95  # of a record, the integral of |A(f)|², below the frequency that is told
 ROUNDED = 1e-9  # of a time step
 FEW = 10_000  # unknowns: up to so many a run tells its periods, which take two seconds; more when it is checked
@@ -38,7 +39,8 @@ def describe(case: Any, comm: Any, parts: Parts | None = None, *, most: int = 50
     """Return what the model of a ``Case`` is, plain values in SI units; computes no step.
 
     Keys: title, dimension, unknowns, degree, mass; groups (name, kind); bodies (name, cells, mass, material);
-    supports (kind, groups, components); contact (name, points, size [m²], friction, places); periods, damping_ratios
+    supports (kind, groups, components); contact (name, points, size [m²], friction, nodes: a sentence, places, others:
+    kind -> places, sides: name, h and G of both); periods, damping_ratios
     of their modes and rigid_motions with the contact closed where it touches at the start, and sticking where there is
     friction; damping: in words, "none" without; waves
     (body, c_s, h: the longest edge over the degree, f_max = c_s / (8 h), dt_ratio = dt c_s / h); records (file, scale,
@@ -58,7 +60,7 @@ def describe(case: Any, comm: Any, parts: Parts | None = None, *, most: int = 50
         "degree": space.degree, "mass": sum(one["mass"] for one in bodies),
         "groups": [{"name": name, "kind": type(one).__name__.lower()} for name, one in tags.items()],
         "bodies": [{key: one[key] for key in ("name", "cells", "mass", "material")} for one in bodies],
-        "supports": list(_supports(space)), "contact": list(_contact(case, problem)),
+        "supports": list(_supports(space)), "contact": list(_contact(case, problem, tags)),
         "waves": [{"body": one["name"], "c_s": one["c_s"], "h": one["h"], "f_max": one["c_s"] / (ELEMENTS * one["h"]),
                    "dt_ratio": run["dt"] * one["c_s"] / one["h"]} for one in bodies],
         "records": _records(case, parts.system),
@@ -116,16 +118,44 @@ def _supports(space: Any) -> Iterator[dict[str, Any]]:
         yield {"kind": kind, "groups": groups, "components": [AXES[one] for one in chosen]}
 
 
-def _contact(case: Any, problem: ContactProblem) -> Iterator[dict[str, Any]]:
+def _contact(case: Any, problem: ContactProblem, tags: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """Yield the parts of the contact, one for each table: by its name, or by those of its groups."""
     surface, tables = problem.surface, case.nodes.get("contact", ())
-    names = [node.arguments.get("name") or " on ".join(one.name for one in nodes_in(node) if isinstance(one, Group))
-             for node in (tables if isinstance(tables, tuple) else (tables,))]
+    nodes = tables if isinstance(tables, tuple) else (tables,)
+    grouped = [[one for one in nodes_in(node) if isinstance(one, Group)] for node in nodes]
+    names = [node.arguments.get("name") or " on ".join(one.name for one in groups)
+             for node, groups in zip(nodes, grouped, strict=True)]
     whole, parts = surface.whole(), getattr(surface, "parts", ())
     ends = np.cumsum([0, *(round(total(surface.comm, len(part.slots))) for part in parts)])
-    for name, (a, b) in zip(names, pairwise(ends), strict=True):
-        yield {"name": name, "points": int(b - a), "size": float(whole.weights[a:b].sum()),
-               "friction": repr(problem.friction), "places": whole.points[a:b]}
+    for number, (name, groups, (a, b)) in enumerate(zip(names, grouped, pairwise(ends), strict=True)):
+        census = surface.censuses[number] if len(surface.censuses) == len(parts) else None
+        yield {
+            "name": name,
+            "points": int(b - a),
+            "size": float(whole.weights[a:b].sum()),
+            "friction": repr(problem.friction),
+            "nodes": "" if census is None else census.in_words(),
+            "places": whole.points[a:b],
+            "others": {} if census is None else census.places,
+            "sides": _sides(problem.system.space, tags, [one.name for one in groups], whole.points[a:b]),
+        }
+
+
+def _sides(space: Any, tags: Mapping[str, Any], names: Sequence[str], points: Array) -> list[dict[str, Any]]:
+    """Return (name, mean edge h [m], shear modulus G [Pa]) of both sides of a pair, of their facets that are no further
+    from the box of the contact points than an edge; none where a table has no two groups of facets."""
+    sides = [tags[name] for name in names if isinstance(tags.get(name), Facets)]
+    if len(sides) != 2 or len(names) != 2 or not len(points):
+        return []
+    found: list[dict[str, Any]] = []
+    for side in sides:
+        middles, edges, cells = facets_with_cells(space.mesh, side.indices)
+        slack = largest(space.comm, edges.max(initial=0.0))
+        near = np.all((middles >= points.min(axis=0) - slack) & (middles <= points.max(axis=0) + slack), axis=1)
+        shear = space.forms.cellwise("shear")[cells[near]]
+        count, h, G = space.comm.sum(np.array([near.sum(), edges[near].sum(), shear.sum()]))
+        found.append({"name": side.name, "h": h / max(count, 1.0), "G": G / max(count, 1.0)})
+    return found
 
 
 def _records(case: Any, system: Any) -> list[dict[str, Any]]:
@@ -178,6 +208,9 @@ def _warnings(model: Mapping[str, Any]) -> Iterator[str]:
     for one in sorted(model["records"], key=lambda one: float(one["f_95"]))[-1:]:
         coarse = (wave for wave in model["waves"] if one["f_95"] > wave["f_max"])
         yield from (WORDS["coarse"].format(wave=wave, one=one) for wave in coarse)
+    for sides in (one["sides"] for one in model["contact"] if one["sides"]):
+        if sides[1]["h"] > COARSER * sides[0]["h"] and sides[1]["G"] < sides[0]["G"]:
+            yield WORDS["unlike"].format(one=sides[0], two=sides[1])
     if model["run"]["dt"] > next(iter(model.get("periods", ())), np.inf) / STEPS:
         yield WORDS["slow"].format(**model)
 
