@@ -17,7 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask
-from ...core.checks import at, optional, provides
+from ...core.checks import at, flag, optional, provides
 from ...core.corners import FEATURE_ANGLE
 from ...core.errors import InputError
 from ...core.stages import stage
@@ -31,6 +31,8 @@ from .counting import census_of_all
 from .covering import LEAST_SHARE
 from .faces import Boundary, boundary, checked_angle, split, tell_corners
 from .frames import Facing, NodalConditions, snapped, surface_of
+from .hinges import hinges as hinge_numbers
+from .hinges import refuse_hinges
 from .matching import Matched, Matching, NodeToNode, Side
 from .nodes import Nodes, everywhere, joined_nodes
 from .surface import contact_space, listed, merged, nodes_on, prescribed_motion
@@ -41,8 +43,8 @@ log = logging.getLogger(__name__)
 
 @stage("contact")
 def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *, matching: Matching | None = None,
-                 points: Sequence[Sequence[float]] | None = None,
-                 feature_angle: float = FEATURE_ANGLE) -> ContactSurface:
+                 points: Sequence[Sequence[float]] | None = None, feature_angle: float = FEATURE_ANGLE,
+                 hinges: bool = False) -> ContactSurface:
     """Make the contact conditions between two boundaries of deformable bodies, or two faces of a crack.
 
     Each node of side 1 has a condition, with the normals, weights (times the section's thickness) and forces of side 1;
@@ -52,8 +54,9 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
     the ground's node next to this edge. With ``DualMortar`` nodes of side 1 beyond the edge of side 2 have no condition
     where less than half of their share is covered: the nodes inside carry it. Initial gaps are measured along the
     normals of side 1. Nodes that both sides share, at the tip of a crack, have no condition, and
-    nodes that are clamped on both sides have none either. Nodes that are tied to one another share one. Prescribed
-    nodes of side 2 move as they are prescribed, like a moving obstacle.
+    nodes that are clamped on both sides have none either. Shared nodes round which the material does not go on, at the
+    rim of a contact between bodies that are drawn between the same points, are refused unless ``hinges``. Nodes that
+    are tied to one another share one. Prescribed nodes of side 2 move as they are prescribed, like a moving obstacle.
 
     Where side 1 turns by more than the feature angle its faces are matched one by one, and a node on several of them
     has one condition for each, as if every face were a pair of its own, joined by ``joined_surfaces``.
@@ -62,12 +65,14 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
         matching: NodeToNode() by default, for sides meshed alike; DualMortar() for others.
         points: (k, d) coordinates; only the nodes of side 1 nearest to them have conditions, in this order.
         feature_angle: angle [rad]; facets around a node that turn by less from one another are one smooth face.
+        hinges: True where bodies may hang together by nodes of these boundaries, as by a pin.
     Raises:
-        InputError: sides that do not pair or do not face each other, bodies that overlap, sides of one and the same
+        InputError: nodes that only glue two bodies together, sides that do not pair or do not face each other, bodies that overlap, sides of one and the same
             boundary, contact directions that are partly prescribed, clamped nodes that face free ones."""
     space = contact_space("contact_pair", system, {"facets1": facets1, "facets2": facets2}, points)
     optional(provides, "contact_pair", "matching", matching, ("match",), "give NodeToNode() or DualMortar(), or None")
     angle = checked_angle("contact_pair", feature_angle)
+    flag("contact_pair", "hinges", hinges)
     if space.hierarchy is not None and not isinstance(matching or NodeToNode(), NodeToNode):
         raise InputError("contact_pair: sides of P2 tetrahedra are matched by matching=NodeToNode() only: mesh both "
                          "sides alike, or use degree=1")
@@ -77,6 +82,7 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
         raise InputError(f"'{one.name}' and '{two.name}' are the same nodes, so that nothing can part there: mesh the "
                          "bodies one by one, or cut the mesh open (meshes.cut.CutOpen)")
     _refuse_common(one, two)
+    hinge = _hinges(space, one, two, shared, allowed=hinges)
     around = boundary(space, facets1, beyond=angle)
     faces = _faces(space, one, boundary(space, facets1) if len(around.vertices) else around, angle)
     nodes, matched = _by_face(faces, two, NodeToNode() if matching is None else matching, space.size)
@@ -92,6 +98,7 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
     little = nodes.numbers[free & (matched.shares < LEAST_SHARE)]
     kinds["hardly covered"] = np.isin(one.nodes.numbers, little)
     _warn_of_coarse(space, one, two, little)
+    kinds["shared with another body"] = hinge & ~shared
     nodes, matched = nodes.pick(free), matched.pick(free)
     if points is not None:
         chosen = listed(space, nodes, points, one.name)
@@ -166,6 +173,19 @@ def _watched(space: FemSpace, one: Side, two: Side, nodes: Nodes, matched: Match
     own = np.flatnonzero(space.blocks_of(nodes.numbers) >= 0)
     opposite = Facing(two.nodes, sp.csr_matrix(matched.P[own]))
     return watched_nodes(space, one.name, nodes.pick(own), directions[own], gap[own], opposite, two.name)
+
+
+def _hinges(space: FemSpace, one: Side, two: Side, shared: Mask, *, allowed: bool) -> Mask:
+    """Return which nodes of side 1 only glue bodies together; InputError unless they are ``allowed``. Collective."""
+    numbers = np.union1d(one.nodes.numbers, two.nodes.numbers)
+    clamped = [side.nodes.numbers[side.nodes.held.all(axis=1)] for side in (one, two)]
+    found = hinge_numbers(space, np.setdiff1d(numbers, np.concatenate(clamped)))
+    here = np.isin(one.nodes.numbers, found)
+    if not allowed:
+        refuse_hinges("contact_pair", (one.name, two.name), one.nodes.points[here & shared])
+        for side in (one, two):
+            refuse_hinges("contact_pair", (side.name,), side.nodes.points[np.isin(side.nodes.numbers, found)])
+    return np.asarray(here)
 
 
 def _refuse_common(one: Side, two: Side) -> None:
