@@ -146,7 +146,11 @@ RIM = """
 [mesh]
 type = "GeoFile"
 path = "rim.geo"
-[material]
+[material.block]
+E = "25 GPa"
+nu = 0.2
+rho = 2400.0
+[material.soil]
 E = "150 MPa"
 nu = 0.3
 rho = 1900.0

@@ -281,8 +281,9 @@ def _gap(space: FemSpace, name: str, two: Side, nodes: Nodes, directions: Array,
     if behind.max() > 0.0:
         worst = int(np.argmax(behind))
         raise InputError(f"'{two.name}' lies {-gap[worst]:.3g} m behind '{name}' at {at(nodes.points[worst])}: the "
-                         "bodies overlap there, or these are not the boundaries between them; move one body, or choose "
-                         "the sides that face")
+                         "bodies overlap there, or these are not the boundaries between them; choose the sides that "
+                         "face, or draw the bodies in touch and make a press fit by fem.InitialStrain, the strain of "
+                         "the body that is too large, or by quasi_static on surface.moving(towards=…), its overlap")
     if gap.min() < -1e-12 * space.size and space.comm.rank == 0:
         log.warning("'%s' and '%s' overlap by up to %.3g m: they count as touching there", name, two.name, -gap.min())
     return np.maximum(gap, 0.0)
