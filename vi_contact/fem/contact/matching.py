@@ -23,16 +23,21 @@ DISTANCES = 2**20  # in a table, where all nodes of side 2 are looked at
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """Hold a boundary that may touch another, the same on every rank: name, nodes, facets as rows of their places."""
+    """Hold a boundary that may touch another, the same on every rank: name, nodes, facets as rows of their places.
+
+    ``tied``: of a side 1, (m,) places on side 2 of the nodes to which nodes are tied in all components, -1 for others.
+    None: there are no such nodes."""
 
     name: str
     nodes: Nodes
     facets: Indices
+    tied: Indices | None = None
 
 
 def common_nodes(one: Side, two: Side) -> Indices:
-    """Return the places (m,) on side 2 of the nodes of side 1 that are nodes of both, at a tip or a weld; else -1."""
-    places = np.full(len(one.nodes.numbers), -1)
+    """Return the places (m,) on side 2 of the nodes of side 1 that are nodes of both, at a tip or a weld, or tied to one
+    of side 2, which is the same; -1 for others."""
+    places = np.full(len(one.nodes.numbers), -1) if one.tied is None else one.tied.copy()
     _, own, others = np.intersect1d(one.nodes.numbers, two.nodes.numbers, return_indices=True)
     places[own] = others
     return places

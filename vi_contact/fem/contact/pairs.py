@@ -54,7 +54,7 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
     the ground's node next to this edge. With ``DualMortar`` nodes of side 1 beyond the edge of side 2 have no condition
     where less than half of their share is covered: the nodes inside carry it. Initial gaps are measured along the
     normals of side 1. Nodes that both sides share, at the tip of a crack, have no condition, and
-    nodes that are clamped on both sides have none either. Shared nodes round which the material does not go on, at the
+    nodes that are clamped on both sides, or tied to the other side, have none either. Shared nodes round which the material does not go on, at the
     rim of a contact between bodies that are drawn between the same points, are refused unless ``hinges``. Nodes that
     are tied to one another share one. Prescribed nodes of side 2 move as they are prescribed, like a moving obstacle.
 
@@ -83,12 +83,14 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
                          "bodies one by one, or cut the mesh open (meshes.cut.CutOpen)")
     _refuse_common(one, two)
     hinge = _hinges(space, one, two, shared, allowed=hinges)
+    one = replace(one, tied=_tied_over(space, one, two))
+    tied = one.nodes.numbers[one.tied >= 0]
     around = boundary(space, facets1, beyond=angle)
     faces = _faces(space, one, boundary(space, facets1) if len(around.vertices) else around, angle)
     nodes, matched = _by_face(faces, two, NodeToNode() if matching is None else matching, space.size)
     opposite = np.concatenate([nodes.numbers, matched.carried])
     carried = np.setdiff1d(matched.carried, nodes.numbers)
-    kept = ~np.isin(nodes.numbers, two.nodes.numbers)
+    kept = ~np.isin(nodes.numbers, np.union1d(two.nodes.numbers, tied))
     nodes, matched = nodes.pick(kept), matched.pick(kept)
     free = _unclamped(space, one.name, nodes, two, matched)
     kinds = _kinds(one, shared, opposite, nodes.numbers[~free])
@@ -99,6 +101,8 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
     kinds["hardly covered"] = np.isin(one.nodes.numbers, little)
     _warn_of_coarse(space, one, two, little)
     kinds["shared with another body"] = hinge & ~shared
+    kinds["tied to the other side"] = np.isin(one.nodes.numbers, tied)
+    kinds["faces nothing"] &= ~kinds["tied to the other side"]
     nodes, matched = nodes.pick(free), matched.pick(free)
     if points is not None:
         chosen = listed(space, nodes, points, one.name)
@@ -188,6 +192,20 @@ def _hinges(space: FemSpace, one: Side, two: Side, shared: Mask, *, allowed: boo
     return np.asarray(here)
 
 
+def _tied_over(space: FemSpace, one: Side, two: Side) -> Indices:
+    """Return the places (m,) on side 2 of the nodes to which those of side 1 are tied in all components; of several, as
+    where ties meet, the nearest; -1 for others. They cannot part, as the two sides of a weld."""
+    places = np.full(len(one.nodes.numbers), -1)
+    if not len(space.tied_nodes):
+        return places
+    own, others = space.leaders(one.nodes.numbers), space.leaders(two.nodes.numbers)
+    for row in np.flatnonzero(np.isin(one.nodes.numbers, space.tied_nodes) & (own >= 0) & np.isin(own, others)):
+        alike = np.flatnonzero(others == own[row])
+        apart = np.linalg.norm(two.nodes.points[alike] - one.nodes.points[row], axis=1)
+        places[row] = alike[np.argmin(apart)]
+    return places
+
+
 def _refuse_common(one: Side, two: Side) -> None:
     """Raise InputError for a facet that is listed on both sides."""
     own, others = number_alike(*(side.nodes.numbers[side.facets] for side in (one, two)))
@@ -212,7 +230,8 @@ def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[t
             again = own.points[1:][np.diff(own.numbers) == 0][0]
             raise InputError(f"'{one.name}' turns round and meets itself at {at(again)}: give it as two boundaries "
                              "(fem.joined_surfaces), or treat the corner as smooth (a larger feature_angle=)")
-        found.append((Side(one.name, own, np.searchsorted(used, facets)), one.nodes.normals[used]))
+        tied = None if one.tied is None else one.tied[used]
+        found.append((Side(one.name, own, np.searchsorted(used, facets), tied), one.nodes.normals[used]))
     return found
 
 
@@ -267,8 +286,8 @@ def _unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Mat
         raise InputError(f"contact node {at(nodes.points[lost[0]])} of '{name}' is clamped but faces a free node of "
                          f"'{two.name}': make '{two.name}' the first side, or clamp less")
     if clamped.all():
-        raise InputError(f"no contact nodes: every node of '{name}' that faces '{two.name}' is clamped or on both "
-                         "sides; clamp less")
+        raise InputError(f"no contact nodes: every node of '{name}' that faces '{two.name}' is clamped, on both "
+                         "sides or tied to the other side; clamp or tie less")
     if clamped.any() and space.comm.rank == 0:
         log.info("%d clamped nodes of '%s' are left out of the contact", clamped.sum(), name)
     return np.asarray(~clamped)

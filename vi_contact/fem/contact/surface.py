@@ -275,8 +275,11 @@ def merged(space: FemSpace, name: str, nodes: Nodes, directions: Array, angle: f
         alike = np.flatnonzero(nodes.numbers == leaders[row])
         turn = directions[alike] @ directions[row]
         if turn.max(initial=-2.0) < np.cos(angle):
-            raise InputError(f"contact node {at(nodes.points[row])} of '{name}' is tied to another in some components "
-                             "only, or to one outside this contact: leave it out (points=), or tie and list all")
+            partly = leaders[row] < 0
+            how = "is tied in some components only" if partly else "is tied to a node outside this contact"
+            remedy = "tie all components" if partly else "add the boundary of that node to the group"
+            raise InputError(f"contact node {at(nodes.points[row])} of '{name}' {how}: leave it out, by listing the "
+                             f"others as points=, or {remedy}")
         target[row] = alike[turn.argmax()]
     kept, place = np.unique(target, return_inverse=True)
     sums = sp.csr_matrix((nodes.weights, (place.ravel(), np.arange(len(target)))))
