@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 from mpi4py import MPI
-from tests.support.merged import Merged
 
 import vi_contact as vc
+from tests.support.merged import Merged
 from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.meshes import BlockMesh, CutOpen, TwoBlocks

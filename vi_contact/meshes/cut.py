@@ -55,8 +55,11 @@ def cut_open(arrays: MeshArrays, group: str | None = None, *, inside: str | None
     give one of them. With `between`, two groups of cells, the boundary is all that lies between them, `group` is
     "<first>_<second>" and side 1 that of the first. Cells around a node of the boundary keep a common node as long as they hang together through
     other facets: a crack that ends inside a body stays closed at its tip, and boundaries cut one after the other may
-    meet and cross. InputError for a group that does not exist or lies on the outside, sides that cannot be told, cell
-    groups without a common facet, and names of sides that the mesh has already."""
+    meet and cross. Where they cross, every arm needs a group of its own, cut `towards` in turn, so that round the
+    crossing every node is on side 1 of both its pairs, or on side 2 of both.
+
+    InputError for a group that does not exist or lies on the outside, sides that cannot be told, cell groups without a
+    common facet, and names of sides that the mesh has already."""
     if (group is None) == (between is None):
         raise InputError("CutOpen: give group=, the name of an inner boundary, or between=, two groups of cells")
     if between is not None:
@@ -111,8 +114,8 @@ def welded(arrays: MeshArrays, first: str, second: str) -> MeshArrays:
     distance, nearest = cKDTree(arrays.points[one]).query(arrays.points[two])
     there = cKDTree(arrays.points[one]).query_ball_point(arrays.points[two], 1e-9 * size, return_length=True)
     for node in two[there > 1][:1]:
-        raise InputError(f"group '{first}' has several nodes at {at(arrays.points[node])}, of bodies that meet there, and "
-                         f"'{second}' can be welded to one only: weld these bodies first, or give '{second}' first")
+        raise InputError(f"group '{first}' has several nodes at {at(arrays.points[node])}, of bodies that meet there, "
+                         f"and '{second}' can be welded to one only: weld these bodies first, or give '{second}' first")
     if distance.max(initial=0.0) > 1e-9 * size:
         where = at(arrays.points[two[np.argmax(distance)]])
         raise InputError(f"group '{second}' has a node at {where}, {distance.max():.3g} m away from every node of "

@@ -1,10 +1,11 @@
 """Say by how much two polygons, or polyhedra, of one curved face may overlap although the face does not.
 
 Facets leave a curve of radius R by up to h²/(8R). Nodes of side 1 lie on the curve, and so do those of side 2; what a
-mean gap may lack is how far the facets of side 2 are from the function that is linear on each facet of side 1 and has the
-values of the curve at its nodes. With the curvature H of side 2, estimated from the turning of its facets, that is
+mean gap may lack is how far the facets of side 2 are from the function that is linear on each facet of side 1 and
+has the values of the curve at its nodes. With the curvature H of side 2, estimated from the turning of its facets, that is
 
-    delta = ½ q(mu, facet of side 2) - ½ q(lambda, facet of side 1),   q(w, X) = sum_i w_i x_i·H x_i - x·H x,  x = sum_i w_i x_i
+    delta = ½ q(mu, facet of side 2) - ½ q(lambda, facet of side 1)
+    q(w, X) = sum_i w_i x_i·H x_i - x·H x,   x = sum_i w_i x_i
 
 with the shape functions lambda and mu at a point. Plane sides have H = 0 and sides with the same facets delta = 0: they
 may overlap by round-off only."""
@@ -14,7 +15,7 @@ import numpy as np
 from ...core.algebra import Array, Indices, Mask
 from ...core.corners import FEATURE_ANGLE
 
-MARGIN = 2.0  # CHOSEN: functions of changing sign take 5/3 of delta at most in a mean; the rest is for curvatures that vary
+MARGIN = 2.0  # CHOSEN: dual functions take 5/3 of delta at most in a mean; the rest is for curvatures that vary
 FARTHER = 4.0  # CHOSEN: times as much where functions are carried on beyond their facet, to twice its length
 FLAT = 1e-2  # least over largest moment of the nodes of a facet: directions in which it has no extent
 
@@ -57,7 +58,7 @@ def may_overlap(H: Array, one: tuple[Array, Array], two: tuple[Array, Array]) ->
 
 
 def _nodal_normals(facets: Indices, normals: Array) -> tuple[Array, Mask]:
-    """Normals (k, v, d) of smooth faces at the nodes of their facets, and which facets (k,) are at a rim of their face."""
+    """Normals (k, v, d) of smooth faces at the nodes of their facets, and which facets (k,) are at a rim of a face."""
     k, v = facets.shape
     node, facet = facets.ravel(), np.repeat(np.arange(k), v)
     sums, alone = normals[facet].copy(), np.ones(k * v, dtype=bool)

@@ -24,7 +24,7 @@ def hinges(space: FemSpace, numbers: Indices) -> Indices:
     """Return those of these numbers of nodes, the same on every rank, that are hinges. Collective.
 
     Things that are connected are pairs of a node and a facet at it: all those of one cell, and so, as a facet is of two
-    cells and may be of two ranks, all those round the node. Mid-points of edges and sides are no hinges of their own."""
+    cells and may be of two ranks, all those round the node. Mid-points of edges and sides are no hinges."""
     mesh, d = space.mesh, space.mesh.topology.dim
     names, vertices = node_numbers(mesh), len(compat.sub_entities(mesh, 0))
     corners = names[compat.geometry_dofmap(mesh)[:, :vertices]]

@@ -35,8 +35,8 @@ class Side:
 
 
 def common_nodes(one: Side, two: Side) -> Indices:
-    """Return the places (m,) on side 2 of the nodes of side 1 that are nodes of both, at a tip or a weld, or tied to one
-    of side 2, which is the same; -1 for others."""
+    """Return the places (m,) on side 2 of the nodes of side 1 that are nodes of both, at a tip or a weld, or tied to
+    one of side 2, which is the same; -1 for others."""
     places = np.full(len(one.nodes.numbers), -1) if one.tied is None else one.tied.copy()
     _, own, others = np.intersect1d(one.nodes.numbers, two.nodes.numbers, return_indices=True)
     places[own] = others
@@ -144,8 +144,9 @@ class NodeToNode:
         return partner
 
 
-Crowds = dict[int, tuple[Indices, Array]]  # row of a node -> several nodes in front of it, the first the one whose normal
-# is the most opposite, and how far along the normal they are [m]
+# row of a node -> several nodes in front of it, the first the one whose normal is the most opposite, and how far along
+# the normal they are [m]
+Crowds = dict[int, tuple[Indices, Array]]
 
 
 def _opposite(one: Nodes, two: Nodes, places: Indices, reach: Array) -> tuple[Indices, Array, Mask, Crowds]:

@@ -1,9 +1,9 @@
 """Choose among several nodes of side 2 that lie at one place in front of a node of side 1.
 
 Nodes of different bodies, or of both faces of a joint, may coincide. Which of them a node faces follows from the facets
-around it: a partner must have facets of side 2 in front of them. If one partner has all of these it is the one, and what
-the others have lies beside it, as in a column of stones beside another column. If each has a part of them, as two stones
-under the middle of a third one have, no single partner is right."""
+around it: a partner must have facets of side 2 in front of them. If one partner has all of these it is the one, and
+what the others have lies beside it, as in a column of stones beside another column. If each has a part of them, as two
+stones under the middle of a third one have, no single partner is right."""
 
 from dataclasses import dataclass
 

@@ -23,8 +23,8 @@ from .bubbles import averaged
 from .counting import census_on_ranks
 from .faces import boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
 from .frames import NodalConditions, NodalFrames, given, snapped, surface_of
-from .matching import EDGE_ON
 from .hinges import gathered_points, hinges_of, refuse_hinges
+from .matching import EDGE_ON
 from .nodes import Nodes, asked, everywhere, joined_nodes, slots_of
 from .watching import Watched, clamped_or_prescribed, watched_nodes
 
