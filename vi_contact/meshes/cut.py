@@ -53,10 +53,12 @@ def cut_open(arrays: MeshArrays, group: str | None = None, *, inside: str | None
 
     Side 1 is that of the cell group `inside`, or the one from which the vector `towards` leads across the boundary:
     give one of them. With `between`, two groups of cells, the boundary is all that lies between them, `group` is
-    "<first>_<second>" and side 1 that of the first. Cells around a node of the boundary keep a common node as long as they hang together through
-    other facets: a crack that ends inside a body stays closed at its tip, and boundaries cut one after the other may
-    meet and cross. Where they cross, every arm needs a group of its own, cut `towards` in turn, so that round the
-    crossing every node is on side 1 of both its pairs, or on side 2 of both.
+    "<first>_<second>" and side 1 that of the first.
+
+    Cells around a node of the boundary keep a common node as long as they hang together through other facets: a crack
+    that ends inside a body stays closed at its tip, and boundaries cut one after the other may meet and cross. Where
+    they cross, every arm needs a group of its own, cut `towards` in turn, so that round the crossing every node is on
+    side 1 of both its pairs, or on side 2 of both.
 
     InputError for a group that does not exist or lies on the outside, sides that cannot be told, cell groups without a
     common facet, and names of sides that the mesh has already."""

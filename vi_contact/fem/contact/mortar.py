@@ -45,8 +45,9 @@ class DualMortar:
     A node of side 1 beyond the edge of side 2 keeps its condition, in the mean over what is covered, where that is at
     least half of its share of the facets around it; else the nodes inside carry it, and it has none (``covering``).
     Initial gaps are means too; where facets of the same curved face overlap by no more than their distance from it,
-    some h²/(8R) on a curve of radius R, the gap is zero (``fem.contact.curves``). Plane sides may overlap by round-off only.
-    InputError for bars, for sides that do not face each other, in space for facets that are slivers or not convex."""
+    some h²/(8R) on a curve of radius R, the gap is zero (``fem.contact.curves``). Plane sides may overlap by round-off
+    only. InputError for bars, for sides that do not face each other, in space for facets that are slivers or not
+    convex."""
 
     partial: ClassVar[bool] = True  # parts of side 1 in front of nothing have no conditions
 

@@ -54,9 +54,10 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
     the ground's node next to this edge. With ``DualMortar`` nodes of side 1 beyond the edge of side 2 have no condition
     where less than half of their share is covered: the nodes inside carry it. Initial gaps are measured along the
     normals of side 1. Nodes that both sides share, at the tip of a crack, have no condition, and
-    nodes that are clamped on both sides, or tied to the other side, have none either. Shared nodes round which the material does not go on, at the
-    rim of a contact between bodies that are drawn between the same points, are refused unless ``hinges``. Nodes that
-    are tied to one another share one. Prescribed nodes of side 2 move as they are prescribed, like a moving obstacle.
+    nodes that are clamped on both sides, or tied to the other side, have none either. Shared nodes round which the
+    material does not go on, at the rim of a contact between bodies that are drawn between the same points, are refused
+    unless ``hinges``. Nodes that are tied to one another share one. Prescribed nodes of side 2 move as they are
+    prescribed, like a moving obstacle.
 
     Where side 1 turns by more than the feature angle its faces are matched one by one, and a node on several of them
     has one condition for each, as if every face were a pair of its own, joined by ``joined_surfaces``.
@@ -67,7 +68,8 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
         feature_angle: angle [rad]; facets around a node that turn by less from one another are one smooth face.
         hinges: True where bodies may hang together by nodes of these boundaries, as by a pin.
     Raises:
-        InputError: nodes that only glue two bodies together, sides that do not pair or do not face each other, bodies that overlap, sides of one and the same
+        InputError: nodes that only glue two bodies together, sides that do not pair or do not face each other, bodies
+            that overlap, sides of one and the same
             boundary, contact directions that are partly prescribed, clamped nodes that face free ones."""
     space = contact_space("contact_pair", system, {"facets1": facets1, "facets2": facets2}, points)
     optional(provides, "contact_pair", "matching", matching, ("match",), "give NodeToNode() or DualMortar(), or None")

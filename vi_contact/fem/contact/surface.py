@@ -54,7 +54,8 @@ def contact_surface(system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obs
         feature_angle: angle [rad]; facets around a node that turn by less from one another are one smooth face.
         hinges: True where the body may hang together with another one by nodes of this boundary, as by a pin.
     Raises:
-        InputError: no contact nodes, nodes that only glue two bodies together, a listed point that is clamped or not on the facets, a contact direction that is
+        InputError: no contact nodes, nodes that only glue two bodies together, a listed point that is clamped or not on
+            the facets, a contact direction that is
             partly prescribed, initial penetration, a node with more faces than the body has dimensions."""
     space = contact_space("contact_surface", system, {"facets": facets}, points)
     optional(provides, "contact_surface", "obstacle", obstacle, ("directions", "gap"), "give HalfSpace(…) or another")
