@@ -2,7 +2,7 @@
 
 Facets leave a curve of radius R by up to h²/(8R). Nodes of side 1 lie on the curve, and so do those of side 2; what a
 mean gap may lack is how far the facets of side 2 are from the function that is linear on each facet of side 1 and
-has the values of the curve at its nodes. With the curvature H of side 2, estimated from the turning of its facets, that is
+has the values of the curve at its nodes. With the curvature H of side 2, estimated from how its facets turn, that is
 
     delta = ½ q(mu, facet of side 2) - ½ q(lambda, facet of side 1)
     q(w, X) = sum_i w_i x_i·H x_i - x·H x,   x = sum_i w_i x_i
