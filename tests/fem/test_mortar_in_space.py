@@ -258,8 +258,9 @@ def placed(number: int, distorted: float = 0.0, bent: float = 0.0) -> Any:
     def deform(x: Array) -> Array:
         a, b = np.pi * x[:, 0] / LENGTHS[0], np.pi * x[:, 2] / LENGTHS[2]
         shift = distorted * np.column_stack([np.sin(2 * a) * np.cos(b), 0.0 * a, np.cos(a) * np.sin(2 * b)])
-        shift[:, 1] = bent * ((x[:, 0] - 0.9) ** 2 + x[:, 0] * x[:, 2])
-        return np.asarray((x + shift) @ rotation(number).T)
+        moved = x + shift
+        moved[:, 1] += bent * ((moved[:, 0] - 0.9) ** 2 + moved[:, 0] * moved[:, 2])  # nodes of both sides on one face
+        return np.asarray(moved @ rotation(number).T)
 
     return deform
 

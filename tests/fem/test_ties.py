@@ -116,11 +116,61 @@ def test_contact_between_tied_sides(comm):
     surface = fem.contact_surface(system, tags["bottom"])
     state = vc.static_equilibrium(vc.ContactProblem(system, surface), solver=vc.Condensed())
     assert surface.total == 4 and surface.everywhere(state.r_n) == pytest.approx(np.full(4, 1e4), rel=1e-9)
-    with pytest.raises(InputError, match=r"\(2, 0\) of 'bottom' is tied .* or to one outside this contact: l"):
+    with pytest.raises(InputError, match=r"\(2, 0\) of 'bottom' is tied to a node outside this contact: leave it"):
         fem.contact_surface(system, tags["bottom"], points=[(2.0, 0.0), (1.0, 0.0)])
     system = fem.assemble(mesh, SOIL, tied=fem.Tied(tags["left"], tags["right"], components=(0,)))
-    with pytest.raises(InputError, match=r"\(0, 0\) of 'bottom' is tied to another in some components only, or"):
+    with pytest.raises(InputError, match=r"\(0, 0\) of 'bottom' is tied in some components only: leave it out"):
         fem.contact_surface(system, tags["bottom"])
+
+
+@pytest.mark.parametrize("graded", [False, True], ids=["alike", "unlike"])
+@pytest.mark.parametrize("whole", [False, True], ids=["half", "whole"])
+def test_a_tie_beside_a_contact_is_a_weld(comm, graded, whole):
+    """The left half of an interface is tied, the right half, or all of it, is a contact: nodes that are tied to the other
+    side have no condition. Pressed by 1 MPa the pressure is 1 MPa; pulled the right half opens like a crack."""
+
+    def right_graded(x):
+        return np.column_stack([np.where(x[:, 0] > 1.0, 1.0 + (x[:, 0] - 1.0) ** 1.5, x[:, 0]), x[:, 1]])
+
+    lower = BlockMesh(lengths=(2.0, 1.0), divisions=(8, 4))
+    upper = BlockMesh(lengths=(2.0, 1.0), divisions=(8, 4), deform=right_graded if graded else None)
+    mesh, tags = fem.build_mesh(TwoBlocks(lower=lower, upper=upper), comm)
+    tops, bottoms = tags["lower_top"], tags["upper_bottom"]
+    halves = {}
+    for name, group in (("top", tops), ("bottom", bottoms)):
+        x = facet_middles(mesh, group)
+        halves[name] = [fem.Facets(f"{name}_{side}", group.indices[mask], mesh)
+                        for side, mask in (("left", x < 1.0), ("right", x > 1.0))]
+    one, two = (bottoms, tops) if whole else (halves["bottom"][1], halves["top"][1])
+    material = vc.LinearElastic(E=1e9, nu=0.0, rho=2000.0)
+    found = {}
+    for load in (-1e6, 1e6):
+        system = fem.assemble(mesh, material, clamped=tags["lower_bottom"], loads=fem.Traction(tags["upper_top"], (0.0, load)),
+                              tied=fem.Tied(halves["top"][0], halves["bottom"][0]))
+        surface = fem.contact_pair(system, one, two, matching=fem.DualMortar() if graded else None)
+        assert surface.total == 4 and len(surface.censuses[0].places["tied to the other side"]) == (5 if whole else 1)
+        problem = vc.ContactProblem(system, surface)
+        state = vc.static_equilibrium(problem)
+        found[load] = surface.everywhere(state.r_n / surface.weights)
+        corner = np.sort(displacements_at(system, problem.cartesian(state.u), (2.0, 1.0)))
+        expected = (-1e-3, -1e-3) if load < 0.0 else (-0.09695e-3, 17.24968e-3)  # of the mesh that is cut open
+        if load < 0.0 or not graded:
+            assert corner == pytest.approx(expected, abs=1e-8)
+    assert found[1e6] == pytest.approx(np.zeros(4), abs=1e-3)
+    assert found[-1e6] == pytest.approx(np.full(4, 1e6), rel=1e-9)
+
+
+def facet_middles(mesh, group):
+    import dolfinx
+
+    mesh.topology.create_connectivity(1, 2)
+    return dolfinx.mesh.compute_midpoints(mesh, 1, group.indices)[:, 0]
+
+
+def displacements_at(system, u, point):
+    """Vertical displacements of all nodes at a point, on every rank."""
+    points, values = field(system, u)
+    return values[np.linalg.norm(points - np.array(point), axis=1) < 1e-9, 1]
 
 
 @pytest.mark.two_ranks

@@ -1,6 +1,8 @@
 """Meshes of two bodies: blocks side by side, joints and cracks cut open, sides welded together."""
 
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -207,3 +209,104 @@ def test_bodies_of_gmsh_geometry():
     cut = arrays_from_script(CutOpen(Dam(True), "joint0", inside="dam"))
     assert len(bodies(cut)) == 2 and {"joint0_1", "joint0_2"} == set(cut.facet_groups)
     assert np.ptp(cut.points[np.unique(cut.facet_groups["joint0_1"])], axis=0) == pytest.approx([1.0, 0.0], abs=1e-12)
+
+
+@shapes
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_joint_between_two_cell_groups_needs_no_boundary_group(d, simplices):
+    """What lies between the groups is cut like a named boundary; side 1 is that of the first group."""
+    mesh = stacked(d, simplices)
+    one, two = mesh.interface
+    joined = welded(arrays_from_script(mesh), two, one)
+    named = cut_open(joined, one, inside="upper")
+    for names, sides in ((("upper", "lower"), ("1", "2")), (("lower", "upper"), ("2", "1"))):
+        cut = cut_open(joined, between=names)
+        group = "_".join(names)
+        assert len(bodies(cut)) == 2
+        for own, other in zip("12", sides, strict=True):
+            assert places(cut, cut.facet_groups[f"{group}_{own}"]) == places(named, named.facet_groups[f"{one}_{other}"])
+        assert np.isin(cut.facet_groups[f"{group}_1"], cut.cells[cut.cell_groups[names[0]]]).all()
+        assert {"upper_top", "lower_bottom"} <= set(cut.facet_groups)
+
+
+def test_what_cannot_be_cut_between_cell_groups():
+    mesh = stacked(2)
+    apart = arrays_from_script(mesh)
+    joined = welded(apart, *mesh.interface[::-1])
+    for arguments, sentence in (
+        ({"between": ("upper", "sea")}, "mesh has no cell group 'sea'; it has lower, upper"),
+        ({"between": ("upper", "upper")}, "between is .*; give the names of two groups of cells"),
+        ({"between": "upper"}, "between is 'upper'; give the names of two groups of cells"),
+        ({"between": ("upper", "lower"), "inside": "upper"}, "has its first side in 'upper': leave out inside and towards"),
+        ({"between": ("upper", "lower"), "group": "upper_bottom"}, "give group=, .*, or between=, two groups of cells"),
+        ({}, "give group=, the name of an inner boundary, or between=, two groups of cells"),
+    ):
+        with pytest.raises(InputError, match=sentence):
+            cut_open(joined, **arguments)
+    with pytest.raises(InputError, match="'upper' and 'lower' have no common facet, so that there is nothing to cut"):
+        cut_open(apart, between=("upper", "lower"))
+    again = cut_open(joined, "upper_bottom", inside="upper")
+    taken = {name.replace("upper_bottom_1", "upper_top_1"): rows for name, rows in again.facet_groups.items()}
+    with pytest.raises(InputError, match="the mesh has a group 'upper_bottom_2' already, the name of a side of the cut"):
+        cut_open(replace(joined, facet_groups=joined.facet_groups | {"upper_bottom_2": taken["upper_bottom_2"]}),
+                 "upper_bottom", inside="upper")
+
+
+def test_welds_to_several_nodes_at_one_place_are_refused():
+    """A stone is welded to two stones, which have a node each at the joint; the stone's side first is no riddle."""
+    block = BlockMesh(lengths=(1.0, 1.0), divisions=(2, 2))
+    stones = Blocks({"a": block, "b": replace(block, corner=(1.0, 0.0)),
+                     "up": BlockMesh(lengths=(2.0, 1.0), divisions=(4, 2), corner=(0.0, 1.0))})
+    arrays = arrays_from_script(stones)
+    tops = np.concatenate([arrays.facet_groups["a_top"], arrays.facet_groups["b_top"]])
+    arrays = replace(arrays, facet_groups=arrays.facet_groups | {"tops": tops})
+    with pytest.raises(InputError, match=r"group 'tops' has several nodes at \(1, 1\), of bodies that meet there"):
+        welded(arrays, "tops", "up_bottom")
+    assert len(bodies(welded(arrays, "up_bottom", "tops"))) == 1
+
+
+DAM = """
+Point(1) = {0,0,0,1}; Point(2) = {2,0,0,1}; Point(3) = {2,1,0,1}; Point(4) = {0,1,0,1}; Point(5) = {0,2,0,1};
+Point(6) = {2,2,0,1};
+Line(1) = {1,2}; Line(2) = {2,3}; Line(3) = {3,4}; Line(4) = {4,1}; Line(5) = {3,6}; Line(6) = {6,5}; Line(7) = {5,4};
+Curve Loop(1) = {1,2,3,4}; Plane Surface(1) = {1}; Curve Loop(2) = {-3,5,6,7}; Plane Surface(2) = {2};
+Physical Surface("rock") = {1}; Physical Surface("dam") = {2}; Physical Curve("bottom") = {1};
+"""
+CASE = """
+[mesh]
+type = "CutOpen"
+between = ["dam", "rock"]
+source = {type = "GeoFile", path = "dam.geo"}
+[material.dam]
+E = 2e10
+nu = 0.2
+rho = 2400.0
+[material.rock]
+E = 4e10
+nu = 0.2
+rho = 2600.0
+[system]
+clamped = "bottom"
+[gravity]
+[[contact]]
+type = "contact_pair"
+facets1 = "dam_rock_1"
+facets2 = "dam_rock_2"
+[run]
+steps = 1
+dt = 0.01
+"""
+
+
+def test_a_case_file_cuts_between_two_cell_groups(tmp_path):
+    """The weight of the dam, 2 m by 1 m, rests on its joint, which no line of the script names."""
+    pytest.importorskip("dolfinx")
+    from mpi4py import MPI
+
+    import vi_contact as vc
+    from vi_contact.studies import read_case
+
+    (tmp_path / "dam.geo").write_text(DAM)
+    (tmp_path / "dam.toml").write_text(CASE)
+    problem = read_case(tmp_path / "dam.toml").problem(MPI.COMM_SELF)
+    assert vc.static_equilibrium(problem).r_n.sum() == pytest.approx(2.0 * 2400.0 * 9.80665, rel=1e-9)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from vi_contact.core.algebra import Array
-from vi_contact.core.checks import at
+from vi_contact.core.checks import at, shown
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.extract import MeshArrays, Source, add_arrays, arrays_of
 from vi_contact.meshes.rows import Mask, Rows, cell_sides, connected, number_alike, vertex_count
@@ -18,16 +18,20 @@ from vi_contact.meshes.rows import Mask, Rows, cell_sides, connected, number_ali
 
 @dataclass(frozen=True)
 class CutOpen:
-    """Describe the mesh of `source`, a script or a file, cut open along its inner boundary group."""
+    """Describe the mesh of `source`, a script or a file, cut open along its inner boundary group, or between two groups
+    of cells, which need no boundary group then: their joint is called "<first>_<second>", side 1 is the first's."""
 
     source: Source
-    group: str
+    group: str | None = None
     inside: str | None = None
     towards: tuple[float, ...] | None = None
+    between: tuple[str, str] | None = None
 
     def build(self, gmsh: Any) -> None:
         """Add the mesh to Gmsh's current model."""
-        add_arrays(gmsh, cut_open(arrays_of(self.source), self.group, inside=self.inside, towards=self.towards))
+        arrays = arrays_of(self.source)
+        cut = cut_open(arrays, self.group, inside=self.inside, towards=self.towards, between=self.between)
+        add_arrays(gmsh, cut)
 
 
 @dataclass(frozen=True)
@@ -43,15 +47,31 @@ class Welded:
         add_arrays(gmsh, welded(arrays_of(self.source), self.first, self.second))
 
 
-def cut_open(arrays: MeshArrays, group: str, *, inside: str | None = None,
-             towards: Sequence[float] | None = None) -> MeshArrays:
+def cut_open(arrays: MeshArrays, group: str | None = None, *, inside: str | None = None,
+             towards: Sequence[float] | None = None, between: Sequence[str] | None = None) -> MeshArrays:
     """Double the nodes along an inner boundary; its two sides become the groups "<group>_1", "<group>_2".
 
     Side 1 is that of the cell group `inside`, or the one from which the vector `towards` leads across the boundary:
-    give one of them. Cells around a node of the boundary keep a common node as long as they hang together through
-    other facets: a crack that ends inside a body stays closed at its tip, and boundaries cut one after the other may
-    meet and cross. InputError for a group that does not exist or lies on the outside, or sides that cannot be told."""
+    give one of them. With `between`, two groups of cells, the boundary is all that lies between them, `group` is
+    "<first>_<second>" and side 1 that of the first.
+
+    Cells around a node of the boundary keep a common node as long as they hang together through other facets: a crack
+    that ends inside a body stays closed at its tip, and boundaries cut one after the other may meet and cross. Where
+    they cross, every arm needs a group of its own, cut `towards` in turn, so that round the crossing every node is on
+    side 1 of both its pairs, or on side 2 of both.
+
+    InputError for a group that does not exist or lies on the outside, sides that cannot be told, cell groups without a
+    common facet, and names of sides that the mesh has already."""
+    if (group is None) == (between is None):
+        raise InputError("CutOpen: give group=, the name of an inner boundary, or between=, two groups of cells")
+    if between is not None:
+        arrays, group, inside = _joint(arrays, between, inside, towards)
+    assert group is not None
     facets = _group(arrays, group)
+    for name in (f"{group}_1", f"{group}_2"):
+        if name in arrays.facet_groups or name in arrays.cell_groups:
+            raise InputError(f"cut of '{group}': the mesh has a group '{name}' already, the name of a side of the cut: "
+                             "give one of them another name")
     if (inside is None) == (towards is None):
         raise InputError(f"cut of '{group}': give its first side, either by inside=a cell group or by towards=a vector")
     sides, owner = cell_sides(arrays.cells, arrays.cell)
@@ -94,6 +114,10 @@ def welded(arrays: MeshArrays, first: str, second: str) -> MeshArrays:
     from scipy.spatial import cKDTree  # late: it takes a while
 
     distance, nearest = cKDTree(arrays.points[one]).query(arrays.points[two])
+    there = cKDTree(arrays.points[one]).query_ball_point(arrays.points[two], 1e-9 * size, return_length=True)
+    for node in two[there > 1][:1]:
+        raise InputError(f"group '{first}' has several nodes at {at(arrays.points[node])}, of bodies that meet there, "
+                         f"and '{second}' can be welded to one only: weld these bodies first, or give '{second}' first")
     if distance.max(initial=0.0) > 1e-9 * size:
         where = at(arrays.points[two[np.argmax(distance)]])
         raise InputError(f"group '{second}' has a node at {where}, {distance.max():.3g} m away from every node of "
@@ -112,6 +136,36 @@ def _group(arrays: MeshArrays, name: str) -> Rows:
         has = ", ".join(arrays.facet_groups) or "none"
         raise InputError(f"mesh has no boundary group '{name}'; it has {has}: name it in Gmsh as a physical group")
     return arrays.facet_groups[name]
+
+
+def _joint(arrays: MeshArrays, between: Sequence[str], inside: str | None,
+           towards: Sequence[float] | None) -> tuple[MeshArrays, str, str]:
+    """Return (the mesh with a boundary group of all facets between two cell groups, its name, the group of side 1)."""
+    names = tuple(between) if not isinstance(between, str) else ()
+    if len(names) != 2 or names[0] == names[1]:
+        raise InputError(f"CutOpen: between is {shown(between)}; give the names of two groups of cells")
+    if inside is not None or towards is not None:
+        raise InputError(f"CutOpen: between={names} has its first side in '{names[0]}': leave out inside and towards")
+    for name in names:
+        if name not in arrays.cell_groups:
+            raise InputError(f"mesh has no cell group '{name}'; it has {', '.join(arrays.cell_groups)}")
+    first, second = (arrays.cell_groups[name] for name in names)
+    if np.any(first & second):
+        raise InputError(f"cell groups '{names[0]}' and '{names[1]}' have common cells, so that nothing lies between "
+                         "them: give groups without common cells")
+    joint = "_".join(names)
+    if joint in arrays.facet_groups or joint in arrays.cell_groups:
+        raise InputError(f"CutOpen: the mesh has a group '{joint}' already: give it as group=, or another name")
+    sides, owner = cell_sides(arrays.cells[:, : vertex_count(arrays.cell)], arrays.cell)
+    (number,) = number_alike(sides)
+    order = np.argsort(number, kind="stable")
+    inner = np.flatnonzero(np.diff(number[order]) == 0)
+    one, other = order[inner], order[inner + 1]
+    across = (first[owner[one]] & second[owner[other]]) | (second[owner[one]] & first[owner[other]])
+    if not across.any():
+        raise InputError(f"cell groups '{names[0]}' and '{names[1]}' have no common facet, so that there is nothing to "
+                         "cut: bodies with nodes of their own touch by their boundaries, contact_pair(…)")
+    return replace(arrays, facet_groups=arrays.facet_groups | {joint: sides[one[across]]}), joint, names[0]
 
 
 def _on_first_side(arrays: MeshArrays, group: str, one: Rows, other: Rows, inside: str | None,

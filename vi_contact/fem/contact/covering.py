@@ -125,12 +125,12 @@ def overloaded(covered: Covered, carried: Carried, weights: Array) -> Mask:
 
 @dataclass(frozen=True, eq=False)
 class Coupled:
-    """Hold D (m,), M (m, n), the size (m,) [m] of the largest facet of each node, the carried nodes (m,), which have
-    no row in either, and the covered share (m,) of the facets of each node."""
+    """Hold D (m,), M (m, n), the overlap (m,) [m] that polygons of one curve may have at each node, the carried
+    nodes (m,), which have no row in either, and the covered share (m,) of the facets of each node."""
 
     D: Array
     M: sp.csr_matrix
-    longest: Array
+    overlap: Array
     carried: Mask
     share: Array
 
@@ -141,8 +141,8 @@ def coupled(covered: Covered, assembled: Callable[[Carried], tuple[Array, sp.csr
     asked = share < LEAST_SHARE
     while True:
         carried = carried_by(covered, asked)
-        D, M, longest = assembled(carried)
+        D, M, overlap = assembled(carried)
         too_much = overloaded(covered, carried, D)
         if not too_much.any():
-            return Coupled(D, M, longest, carried.nodes, share)
+            return Coupled(D, M, overlap, carried.nodes, share)
         asked = carried.nodes & ~too_much

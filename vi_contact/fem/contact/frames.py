@@ -230,5 +230,7 @@ def _refuse_chains(space: NodalSpace, parts: Sequence[NodalConditions]) -> None:
             if space.hierarchy is not None:
                 raise InputError(f"{where} of P2 tetrahedra is on side 2 of a contact pair and of another "
                                  "surface: leave it out of that surface (points=), or exchange the sides")
-            raise InputError(f"{where} is on side 1 of one contact pair and on side 2 of another: exchange the "
-                             "sides of one of them, or give it once if both are the same")
+            raise InputError(f"{where} is on side 1 of one contact pair and on side 2 of another: where cracks cross, "
+                             "give each arm a group and a cut of its own, with matching=NodeToNode() and sides that "
+                             "take turns round the crossing; else exchange the sides of one pair, or give it once if "
+                             "both are the same")

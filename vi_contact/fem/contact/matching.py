@@ -12,24 +12,32 @@ from ...core.algebra import Array, Indices, Mask
 from ...core.checks import at, attributes
 from ...core.errors import InputError
 from .nodes import Nodes
+from .partners import Surface, one_of
 
 NEARBY = 8  # nodes of side 2 that are looked at first
 EDGE_ON = 0.01  # cosine of the angle between a normal and what it is seen from: under less no side faces another
+BESIDE = 0.01  # of the distance to the next node: how far beside a normal a partner may lie
+ONE_PLACE = 1e-6  # of the distance that a partner may lie beside a normal: nodes as close as this coincide
 DISTANCES = 2**20  # in a table, where all nodes of side 2 are looked at
 
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """Hold a boundary that may touch another, the same on every rank: name, nodes, facets as rows of their places."""
+    """Hold a boundary that may touch another, the same on every rank: name, nodes, facets as rows of their places.
+
+    ``tied``: of a side 1, (m,) places on side 2 of the nodes to which nodes are tied in all components, -1 for others.
+    None: there are no such nodes."""
 
     name: str
     nodes: Nodes
     facets: Indices
+    tied: Indices | None = None
 
 
 def common_nodes(one: Side, two: Side) -> Indices:
-    """Return the places (m,) on side 2 of the nodes of side 1 that are nodes of both, at a tip or a weld; else -1."""
-    places = np.full(len(one.nodes.numbers), -1)
+    """Return the places (m,) on side 2 of the nodes of side 1 that are nodes of both, at a tip or a weld, or tied to
+    one of side 2, which is the same; -1 for others."""
+    places = np.full(len(one.nodes.numbers), -1) if one.tied is None else one.tied.copy()
     _, own, others = np.intersect1d(one.nodes.numbers, two.nodes.numbers, return_indices=True)
     places[own] = others
     return places
@@ -83,9 +91,11 @@ class NodeToNode:
     """Match conforming sides: every node of side 1 has one node of side 2 at its place, or opposite along its normal.
 
     ``tolerance``: how far beside the normal the partner may lie, as a share of the distance to the next node of side 1.
-    InputError for nodes without a partner, two nodes with the same one, and sides that do not face each other."""
+    Of several nodes at one place, of bodies that meet there, the partner is the one whose facets lie in front of all
+    facets of the node. InputError where there is none, as for a stone on two stones, for nodes without a partner, two
+    nodes with the same one, and sides that do not face each other."""
 
-    tolerance: float = 0.01
+    tolerance: float = BESIDE
 
     def __post_init__(self) -> None:
         attributes(self, positive=("tolerance",))
@@ -108,36 +118,73 @@ class NodeToNode:
 
     def _partners(self, one: Side, two: Side, size: float) -> Indices:
         """Place of the nearest node opposite among those of side 2, -1 for none."""
-        x, count, reach = one.nodes.points, len(two.nodes.points), self.tolerance * _spacing(one.nodes.points, size)
+        x, count, spacing = one.nodes.points, len(two.nodes.points), _spacing(one.nodes.points, size)
+        reach, together = self.tolerance * spacing, 2.0 * min(self.tolerance, BESIDE) * spacing
         from scipy.spatial import cKDTree  # late: it takes a while
 
         away, nearby = cKDTree(two.nodes.points).query(x, k=np.arange(1, min(NEARBY, count) + 1))
-        partner, along, turned = _opposite(one.nodes, two.nodes, np.sort(nearby, axis=1), reach)
-        # what is nearer along the normal lies in a ball of this size: unless all of it was looked at, all nodes are
-        unsure = np.flatnonzero((1.0 + 1e-9) * np.hypot(along, reach) >= away[:, -1])
+        partner, along, turned, crowds = _opposite(one.nodes, two.nodes, np.sort(nearby, axis=1), reach)
+        # what is as near along the normal, or nearer, lies in a ball of this size: unless all of it was looked at, all
+        # nodes are
+        unsure = np.flatnonzero((1.0 + 1e-9) * np.hypot(along + reach, reach) >= away[:, -1])
         for rows in np.array_split(unsure, -(-len(unsure) * count // DISTANCES)) if len(unsure) else ():
             whole = np.arange(count)[None, :]
-            partner[rows], _, turned[rows] = _opposite(one.nodes.pick(rows), two.nodes, whole, reach[rows])
+            partner[rows], _, turned[rows], more = _opposite(one.nodes.pick(rows), two.nodes, whole, reach[rows])
+            crowds |= {int(rows[row]): crowd for row, crowd in more.items()}
+        surfaces = Surface(x, one.facets), Surface(two.nodes.points, two.facets)
+        for row, (these, apart) in sorted(crowds.items()):
+            at_one_place = np.linalg.norm(two.nodes.points[these] - two.nodes.points[these[0]], axis=1) <= together[row]
+            these, apart = these[at_one_place], apart[at_one_place]
+            chosen = one_of(surfaces[0], row, one.nodes.normals[row], surfaces[1], these, apart, ONE_PLACE * reach[row])
+            if chosen < 0:
+                _refuse_several(one, two, row)
+            partner[row] = chosen
         if turned.any():
             refuse_same_way(one.name, two.name, x[np.argmax(turned)])
         return partner
 
 
-def _opposite(one: Nodes, two: Nodes, places: Indices, reach: Array) -> tuple[Indices, Array, Mask]:
-    """(the first of the nearest nodes opposite each one of side 1 among these ``places`` (m, k) on side 2, -1 for none;
-    how far along the normal, infinite for none; whether all that are there face away)."""
+# row of a node -> several nodes in front of it, the first the one whose normal is the most opposite, and how far along
+# the normal they are [m]
+Crowds = dict[int, tuple[Indices, Array]]
+
+
+def _opposite(one: Nodes, two: Nodes, places: Indices, reach: Array) -> tuple[Indices, Array, Mask, Crowds]:
+    """Find what each node of side 1 faces among these ``places`` (m, k) on side 2.
+
+    Returns (the first of the nearest nodes opposite each one, -1 for none; how far along the normal, infinite for none;
+    whether all that are there face away; where several are about as near)."""
     offset = two.points[places] - one.points[:, None, :]
     along = np.einsum("ijk,ik->ij", offset, one.normals)
     beside = np.linalg.norm(offset - along[:, :, None] * one.normals[:, None, :], axis=2)
     near = beside <= reach[:, None]
     slope = np.einsum("ijk,ik->ij", two.normals[places], one.normals)
     distance = np.where(near & (slope < -EDGE_ON), np.abs(along), np.inf)
-    # where several bodies meet they have a node each at one place, told apart by their normals
-    alike = distance <= distance.min(axis=1)[:, None] + 1e-6 * reach[:, None]
+    least = distance.min(axis=1)
+    # where several bodies meet they have a node each at one place, told apart by their normals first
+    alike = distance <= least[:, None] + ONE_PLACE * reach[:, None]
     rows, nearest = np.arange(len(reach)), np.where(alike, slope, np.inf).argmin(axis=1)
-    found = np.isfinite(distance[rows, nearest])
-    partner = np.where(found, np.broadcast_to(places, distance.shape)[rows, nearest], -1)
-    return partner, distance[rows, nearest], near.any(axis=1) & ~found
+    found = np.isfinite(least)
+    places = np.broadcast_to(places, distance.shape)
+    partner = np.where(found, places[rows, nearest], -1)
+    crowds = {}
+    for row in np.flatnonzero(found & (np.sum(distance <= (least + reach)[:, None], axis=1) > 1)):
+        these = np.flatnonzero(distance[row] <= least[row] + reach[row])
+        these = np.concatenate([[nearest[row]], these[these != nearest[row]]])
+        crowds[int(row)] = places[row, these], distance[row, these]
+    return partner, distance[rows, nearest], near.any(axis=1) & ~found, crowds
+
+
+def _refuse_several(one: Side, two: Side, row: int) -> None:
+    """Raise InputError for a node of side 1 that faces several nodes of side 2, each with a part of what it faces."""
+    where = f"the node of '{one.name}' at {at(one.nodes.points[row])} faces several nodes of '{two.name}' at one place"
+    d = one.nodes.points.shape[1]
+    if d == 1:
+        raise InputError(f"{where}, and can touch one only: list the end of one bar on side 2")
+    mortar = 'matching=DualMortar(), in a case file matching = {type = "DualMortar"}'
+    if max(one.facets.shape[1], two.facets.shape[1]) > (2 if d == 2 else 4):
+        mortar = f"degree=1 and {mortar}"
+    raise InputError(f"{where}, as a stone does on two stones, and no single one is its partner: use {mortar}")
 
 
 def refuse_same_way(one: str, two: str, point: Array) -> None:
@@ -147,9 +194,13 @@ def refuse_same_way(one: str, two: str, point: Array) -> None:
 
 
 def _spacing(points: Array, size: float) -> Array:
-    """Distance of each node to the next one of the same side [m]; the size of the mesh for a single node."""
+    """Distance of each node to the next one of the same side that is not at its place [m]; the size of the mesh for a
+    single node."""
     if len(points) == 1:
         return np.array([size])
     from scipy.spatial import cKDTree
 
-    return np.asarray(cKDTree(points).query(points, k=2)[0][:, 1])
+    apart = cKDTree(points).query(points, k=min(NEARBY, len(points)))[0]
+    elsewhere = apart > 1e-9 * size
+    next_one = np.take_along_axis(apart, elsewhere.argmax(axis=1)[:, None], axis=1)[:, 0]
+    return np.asarray(np.where(elsewhere.any(axis=1), next_one, size))

@@ -30,12 +30,12 @@ import scipy.sparse as sp
 from ...core.algebra import Array, Indices, Mask
 from ...core.errors import InputError
 from .covering import Carried, Coupled, Covered, coupled, extrapolation
+from .curves import FARTHER, curvatures, may_overlap
 from .matching import EDGE_ON, Matched, Side, common_nodes, refuse_same_way
 from .mortar_in_space import ROUND_OFF, handed_over, in_space
 
 POINTS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)  # of Gauss, on [0, 1], weights ½
 AT_NODE = 1e-9  # of a segment: round-off of where its covered part ends
-CURVED = 0.05  # of a facet: what polygons of one curve may overlap
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,10 @@ class DualMortar:
 
     A node of side 1 beyond the edge of side 2 keeps its condition, in the mean over what is covered, where that is at
     least half of its share of the facets around it; else the nodes inside carry it, and it has none (``covering``).
-    Initial gaps are means too; where polygons of the same curve overlap by up to 5 % of a facet the gap is zero.
-    InputError for bars, for sides that do not face each other, in space for facets that are slivers or not convex."""
+    Initial gaps are means too; where facets of the same curved face overlap by no more than their distance from it,
+    some h²/(8R) on a curve of radius R, the gap is zero (``fem.contact.curves``). Plane sides may overlap by round-off
+    only. InputError for bars, for sides that do not face each other, in space for facets that are slivers or not
+    convex."""
 
     partial: ClassVar[bool] = True  # parts of side 1 in front of nothing have no conditions
 
@@ -62,7 +64,7 @@ class DualMortar:
             _refuse(one, two)
         rows, carried = np.flatnonzero(D > 0.0), np.flatnonzero(found.carried)
         P = sp.csr_matrix(sp.diags([1.0 / D[rows]], [0]) @ found.M[rows])
-        return Matched(rows, P, D[rows], CURVED * found.longest[rows], found.share[rows], carried)
+        return Matched(rows, P, D[rows], found.overlap[rows], found.share[rows], carried)
 
 
 def _refuse(one: Side, two: Side) -> None:
@@ -76,14 +78,15 @@ def _refuse(one: Side, two: Side) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Segment:
-    """Hold a segment of side 1 in front of side 2: nodes, ends, pieces, ∫ phi phiᵀ (2, 2), and by segment of side 2
-    ∫ phi_i phi_j (2, 2)."""
+    """Hold a segment of side 1 in front of side 2: nodes, ends, pieces, ∫ phi phiᵀ (2, 2), by segment of side 2
+    ∫ phi_i phi_j (2, 2), and by how much polygons of one curve may overlap on it [m]."""
 
     nodes: Array
     ends: Array
     pieces: list[tuple[float, float, int, Array]]
     own: Array
     mixed: dict[int, Array]
+    overlap: float
 
     @property
     def length(self) -> float:
@@ -99,14 +102,26 @@ def _in_plane(one: Side, two: Side) -> Coupled:
     """Integrate the coupling of sides of plane bodies."""
     ends1, ends2 = one.nodes.points[one.facets], two.nodes.points[two.facets]
     normals1, normals2 = (_normals(side, ends) for side, ends in ((one, ends1), (two, ends2)))
-    segments = []
+    segments, H = [], curvatures(ends2, two.facets, normals2)
     for facet, ends, normal in zip(one.facets, ends1, normals1, strict=True):
         pieces = list(_pieces(ends, normal, ends2, normals2))
         if sum(high - low for low, high, *_ in pieces) > ROUND_OFF:
             length = float(np.linalg.norm(ends[1] - ends[0]))
-            segments.append(_Segment(facet, ends, pieces, *_integrals(pieces, length)))
+            overlap = _overlap(pieces, ends, ends2, H)
+            segments.append(_Segment(facet, ends, pieces, *_integrals(pieces, length), overlap))
     covered = _covered(segments, common_nodes(one, two) >= 0)
     return coupled(covered, lambda carried: _assembled(one, two, segments, carried))
+
+
+def _overlap(pieces: list[tuple[float, float, int, Array]], ends: Array, ends2: Array, H: Array) -> float:
+    """By how much the polygon of side 2, of curvature H at its segments, may overlap a segment of side 1 [m]."""
+    segment = [piece[2] for piece in pieces]
+    share = np.array([0.0, 0.5, 1.0])
+    own = np.array([low + share * (high - low) for low, high, *_ in pieces])
+    other = np.array([across[0] + share * (across[1] - across[0]) for *_, across in pieces])
+    one = np.stack([1.0 - own, own], axis=2), np.repeat(ends[None], len(pieces), axis=0)
+    two = np.stack([1.0 - other, other], axis=2), ends2[segment]
+    return float(may_overlap(H[segment], one, two).max())
 
 
 def _covered(segments: list[_Segment], common: Mask) -> Covered:
@@ -128,15 +143,16 @@ def _covered(segments: list[_Segment], common: Mask) -> Covered:
 
 
 def _assembled(one: Side, two: Side, segments: list[_Segment], carried: Carried) -> tuple[Array, sp.csr_matrix, Array]:
-    """D (m,), M (m, n) and the length (m,) of the longest segment in front of side 2 of each node of side 1."""
+    """D (m,), M (m, n) and by how much polygons of one curve may overlap at each node of side 1 (m,) [m]."""
     m, n = len(one.nodes.points), len(two.nodes.points)
-    D, M, longest, partner = np.zeros(m), sp.lil_matrix((m, n)), np.zeros(m), common_nodes(one, two)
+    D, M, overlap, partner = np.zeros(m), sp.lil_matrix((m, n)), np.zeros(m), common_nodes(one, two)
     for part, by, used in zip(segments, carried.by, carried.used, strict=True):
         if not used:
             continue
         facet, own = part.nodes, part.own
-        longest[facet] = np.maximum(longest[facet], part.length)
+        overlap[facet] = np.maximum(overlap[facet], part.overlap)
         if carried.nodes[facet].any():
+            overlap[by] = np.maximum(overlap[by], FARTHER * part.overlap)
             _carry(D, M, one.nodes.points, two.facets, part, by, carried.nodes)
             continue
         dual = np.diag(own.sum(axis=1)) @ np.linalg.inv(own)
@@ -149,7 +165,7 @@ def _assembled(one: Side, two: Side, segments: list[_Segment], carried: Carried)
                     M[i, j] += value
         for j in np.flatnonzero(common >= 0):
             M[facet[1 - j], common[j]] -= forces[1 - j, j]
-    return D, sp.csr_matrix(M), longest
+    return D, sp.csr_matrix(M), overlap
 
 
 def _carry(D: Array, M: sp.lil_matrix, points: Array, facets2: Indices, part: _Segment, by: Indices,

@@ -19,9 +19,11 @@ import scipy.sparse as sp
 from ...core.algebra import Array, Indices, Mask
 from .clipping import areas, hats, rule, triangles, turns
 from .covering import Carried, Coupled, Covered, coupled, extrapolation
+from .curves import FARTHER, curvatures, may_overlap
 from .matching import Side, common_nodes
 from .sight import WHOLE, Facets, Looks, Pieces, facets_of, looks_of, opposite
 
+PLANE = 1e-12  # turning of a facet's normals in radians: less is round-off
 ROUND_OFF = 1e-6  # of a facet: less of it in front of side 2 is nothing
 BLOCK = 512  # facets that are cut at once
 MOST_POINTS = 20  # of Gauss a way
@@ -186,9 +188,11 @@ def _whole_weights(looks: Looks) -> Array:
 
 def _assembled(one: Side, two: Side, theirs: Facets, blocks: Sequence[_Block],
                carried: Carried) -> tuple[Array, sp.csr_matrix, Array]:
-    """D (m,), M (m, n) and the size (m,) [m] of the largest facet in front of side 2 of each node of side 1."""
+    """D (m,), M (m, n) and by how much facets of one curved face may overlap at each node of side 1 (m,) [m]."""
     m, n, partner = len(one.nodes.points), len(two.nodes.points), common_nodes(one, two)
-    D, longest, parts, start = np.zeros(m), np.zeros(m), [sp.coo_matrix((m, n))], 0
+    D, overlap, parts, start = np.zeros(m), np.zeros(m), [sp.coo_matrix((m, n))], 0
+    points, H = one.nodes.points, curvatures(theirs.corners, theirs.nodes, theirs.normals)
+    curved = bool(np.any(np.linalg.norm(H, axis=(1, 2)) * theirs.reach > PLANE))
     for block in blocks:
         some, pieces, own = block.looks, block.pieces, block.own
         rows = slice(start, start + len(some.nodes))
@@ -203,12 +207,24 @@ def _assembled(one: Side, two: Side, theirs: Facets, blocks: Sequence[_Block],
         if (common >= 0).any():
             parts.append(entries(-forces * asking, some.nodes, common, m, n))
         np.add.at(D, some.nodes, own_D * asking[:, :, 0])
-        reach = np.maximum(some.reach[pieces.look], theirs.reach[pieces.facet])
-        np.maximum.at(longest, some.nodes[pieces.look], 2.0 * reach[:, None] * some.asking[pieces.look])
+        if curved:
+            piece = _overlap(points[some.nodes], theirs, H, block)[:, None]
+            np.maximum.at(overlap, some.nodes[pieces.look], piece * some.asking[pieces.look])
+            np.maximum.at(overlap, by[pieces.look], FARTHER * piece * borne.any(axis=1)[pieces.look, None])
         if borne.any():
             parts.append(_carry(D, one.nodes.points, theirs, block, by, borne, n))
     values, *places = (np.concatenate([getattr(part, name) for part in parts]) for name in ("data", "row", "col"))
-    return D, sp.csr_matrix((values, tuple(places)), shape=(m, n)), longest
+    return D, sp.csr_matrix((values, tuple(places)), shape=(m, n)), overlap
+
+
+def _overlap(corners: Array, theirs: Facets, H: Array, block: _Block) -> Array:
+    """By how much the pieces (k,) of looks with these corners (looks, v, 3) may overlap facets of side 2, of curvature
+    H, that are of one curved face [m]: at the corners and in the middle of each."""
+    looks, pieces = block.looks, block.pieces
+    points = np.concatenate([pieces.polygons, pieces.polygons.mean(axis=1, keepdims=True)], axis=1)
+    one = hats(looks.polygons[pieces.look], points), corners[pieces.look]
+    two = hats(pieces.seen, points), theirs.corners[pieces.facet]
+    return may_overlap(H[pieces.facet], one, two)
 
 
 def _carry(D: Array, points: Array, theirs: Facets, block: _Block, by: Indices, borne: Mask, n: int) -> sp.coo_matrix:

@@ -17,7 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask
-from ...core.checks import at, optional, provides
+from ...core.checks import at, flag, optional, provides
 from ...core.corners import FEATURE_ANGLE
 from ...core.errors import InputError
 from ...core.stages import stage
@@ -32,6 +32,8 @@ from .counting import census_of_all, tell
 from .covering import LEAST_SHARE
 from .faces import Boundary, boundary, checked_angle, split, tell_corners
 from .frames import Facing, NodalConditions, snapped, surface_of
+from .hinges import hinges as hinge_numbers
+from .hinges import refuse_hinges
 from .matching import Matched, Matching, NodeToNode, Side
 from .nodes import Nodes, everywhere, joined_nodes
 from .surface import contact_space, listed, merged, nodes_on, prescribed_motion
@@ -42,8 +44,8 @@ log = logging.getLogger(__name__)
 
 @stage("contact")
 def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *, matching: Matching | None = None,
-                 points: Sequence[Sequence[float]] | None = None,
-                 feature_angle: float = FEATURE_ANGLE) -> ContactSurface:
+                 points: Sequence[Sequence[float]] | None = None, feature_angle: float = FEATURE_ANGLE,
+                 hinges: bool = False) -> ContactSurface:
     """Make the contact conditions between two boundaries of deformable bodies, or two faces of a crack.
 
     Each node of side 1 has a condition, with the normals, weights (times the section's thickness) and forces of side 1;
@@ -53,8 +55,10 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
     the ground's node next to this edge. With ``DualMortar`` nodes of side 1 beyond the edge of side 2 have no condition
     where less than half of their share is covered: the nodes inside carry it. Initial gaps are measured along the
     normals of side 1. Nodes that both sides share, at the tip of a crack, have no condition, and
-    nodes that are clamped on both sides have none either. Nodes that are tied to one another share one. Prescribed
-    nodes of side 2 move as they are prescribed, like a moving obstacle.
+    nodes that are clamped on both sides, or tied to the other side, have none either. Shared nodes round which the
+    material does not go on, at the rim of a contact between bodies that are drawn between the same points, are refused
+    unless ``hinges``. Nodes that are tied to one another share one. Prescribed nodes of side 2 move as they are
+    prescribed, like a moving obstacle.
 
     Where side 1 turns by more than the feature angle its faces are matched one by one, and a node on several of them
     has one condition for each, as if every face were a pair of its own, joined by ``joined_surfaces``.
@@ -63,12 +67,15 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
         matching: NodeToNode() by default, for sides meshed alike; DualMortar() for others.
         points: (k, d) coordinates; only the nodes of side 1 nearest to them have conditions, in this order.
         feature_angle: angle [rad]; facets around a node that turn by less from one another are one smooth face.
+        hinges: True where bodies may hang together by nodes of these boundaries, as by a pin.
     Raises:
-        InputError: sides that do not pair or do not face each other, bodies that overlap, sides of one and the same
+        InputError: nodes that only glue two bodies together, sides that do not pair or do not face each other, bodies
+            that overlap, sides of one and the same
             boundary, contact directions that are partly prescribed, clamped nodes that face free ones."""
     space = contact_space("contact_pair", system, {"facets1": facets1, "facets2": facets2}, points)
     optional(provides, "contact_pair", "matching", matching, ("match",), "give NodeToNode() or DualMortar(), or None")
     angle = checked_angle("contact_pair", feature_angle)
+    flag("contact_pair", "hinges", hinges)
     if space.hierarchy is not None and not isinstance(matching or NodeToNode(), NodeToNode):
         raise InputError("contact_pair: sides of P2 tetrahedra are matched by matching=NodeToNode() only: mesh both "
                          "sides alike, or use degree=1")
@@ -78,12 +85,15 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
         raise InputError(f"'{one.name}' and '{two.name}' are the same nodes, so that nothing can part there: mesh the "
                          "bodies one by one, or cut the mesh open (meshes.cut.CutOpen)")
     _refuse_common(one, two)
+    hinge = _hinges(space, one, two, shared, allowed=hinges)
+    one = replace(one, tied=_tied_over(space, one, two))
+    tied = one.nodes.numbers[one.tied >= 0]
     around = boundary(space, facets1, beyond=angle)
     faces = _faces(space, one, boundary(space, facets1) if len(around.vertices) else around, angle)
     nodes, matched = _by_face(faces, two, NodeToNode() if matching is None else matching, space.size)
     opposite = np.concatenate([nodes.numbers, matched.carried])
     carried = np.setdiff1d(matched.carried, nodes.numbers)
-    kept = ~np.isin(nodes.numbers, two.nodes.numbers)
+    kept = ~np.isin(nodes.numbers, np.union1d(two.nodes.numbers, tied))
     nodes, matched = nodes.pick(kept), matched.pick(kept)
     free = _unclamped(space, one.name, nodes, two, matched)
     kinds = _kinds(one, shared, opposite, nodes.numbers[~free])
@@ -93,6 +103,9 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
     little = nodes.numbers[free & (matched.shares < LEAST_SHARE)]
     kinds["hardly covered"] = np.isin(one.nodes.numbers, little)
     _warn_of_coarse(space, one, two, little)
+    kinds["shared with another body"] = hinge & ~shared
+    kinds["tied to the other side"] = np.isin(one.nodes.numbers, tied)
+    kinds["faces nothing"] &= ~kinds["tied to the other side"]
     nodes, matched = nodes.pick(free), matched.pick(free)
     if points is not None:
         chosen = listed(space, nodes, points, one.name)
@@ -177,6 +190,33 @@ def _borrowed(space: FemSpace, facets: Facets, one: Side, kinds: dict[str, Mask]
     return borrowed(space, facets, one.nodes.numbers[np.any(nothing, axis=0)], having)
 
 
+def _hinges(space: FemSpace, one: Side, two: Side, shared: Mask, *, allowed: bool) -> Mask:
+    """Return which nodes of side 1 only glue bodies together; InputError unless they are ``allowed``. Collective."""
+    numbers = np.union1d(one.nodes.numbers, two.nodes.numbers)
+    clamped = [side.nodes.numbers[side.nodes.held.all(axis=1)] for side in (one, two)]
+    found = hinge_numbers(space, np.setdiff1d(numbers, np.concatenate(clamped)))
+    here = np.isin(one.nodes.numbers, found)
+    if not allowed:
+        refuse_hinges("contact_pair", (one.name, two.name), one.nodes.points[here & shared])
+        for side in (one, two):
+            refuse_hinges("contact_pair", (side.name,), side.nodes.points[np.isin(side.nodes.numbers, found)])
+    return np.asarray(here)
+
+
+def _tied_over(space: FemSpace, one: Side, two: Side) -> Indices:
+    """Return the places (m,) on side 2 of the nodes to which those of side 1 are tied in all components; of several, as
+    where ties meet, the nearest; -1 for others. They cannot part, as the two sides of a weld."""
+    places = np.full(len(one.nodes.numbers), -1)
+    if not len(space.tied_nodes):
+        return places
+    own, others = space.leaders(one.nodes.numbers), space.leaders(two.nodes.numbers)
+    for row in np.flatnonzero(np.isin(one.nodes.numbers, space.tied_nodes) & (own >= 0) & np.isin(own, others)):
+        alike = np.flatnonzero(others == own[row])
+        apart = np.linalg.norm(two.nodes.points[alike] - one.nodes.points[row], axis=1)
+        places[row] = alike[np.argmin(apart)]
+    return places
+
+
 def _refuse_common(one: Side, two: Side) -> None:
     """Raise InputError for a facet that is listed on both sides."""
     own, others = number_alike(*(side.nodes.numbers[side.facets] for side in (one, two)))
@@ -201,7 +241,8 @@ def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[t
             again = own.points[1:][np.diff(own.numbers) == 0][0]
             raise InputError(f"'{one.name}' turns round and meets itself at {at(again)}: give it as two boundaries "
                              "(fem.joined_surfaces), or treat the corner as smooth (a larger feature_angle=)")
-        found.append((Side(one.name, own, np.searchsorted(used, facets)), one.nodes.normals[used]))
+        tied = None if one.tied is None else one.tied[used]
+        found.append((Side(one.name, own, np.searchsorted(used, facets), tied), one.nodes.normals[used]))
     return found
 
 
@@ -256,8 +297,8 @@ def _unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Mat
         raise InputError(f"contact node {at(nodes.points[lost[0]])} of '{name}' is clamped but faces a free node of "
                          f"'{two.name}': make '{two.name}' the first side, or clamp less")
     if clamped.all():
-        raise InputError(f"no contact nodes: every node of '{name}' that faces '{two.name}' is clamped or on both "
-                         "sides; clamp less")
+        raise InputError(f"no contact nodes: every node of '{name}' that faces '{two.name}' is clamped, on both "
+                         "sides or tied to the other side; clamp or tie less")
     if clamped.any() and space.comm.rank == 0:
         log.info("%d clamped nodes of '%s' are left out of the contact", clamped.sum(), name)
     return np.asarray(~clamped)
@@ -270,8 +311,9 @@ def _gap(space: FemSpace, name: str, two: Side, nodes: Nodes, directions: Array,
     if behind.max() > 0.0:
         worst = int(np.argmax(behind))
         raise InputError(f"'{two.name}' lies {-gap[worst]:.3g} m behind '{name}' at {at(nodes.points[worst])}: the "
-                         "bodies overlap there, or these are not the boundaries between them; move one body, or choose "
-                         "the sides that face")
+                         "bodies overlap there, or these are not the boundaries between them; choose the sides that "
+                         "face, or draw the bodies in touch and make a press fit by fem.InitialStrain, the strain of "
+                         "the body that is too large, or by quasi_static on surface.moving(towards=…), its overlap")
     if gap.min() < -1e-12 * space.size and space.comm.rank == 0:
         log.warning("'%s' and '%s' overlap by up to %.3g m: they count as touching there", name, two.name, -gap.min())
     return np.maximum(gap, 0.0)

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, from_each, largest, total
-from ...core.checks import array, at, optional, provides, several
+from ...core.checks import array, at, flag, optional, provides, several
 from ...core.corners import FEATURE_ANGLE, PARALLEL, tangent_vectors
 from ...core.errors import InputError
 from ...core.obstacles import Obstacle, Touching, admissible_gap, facing
@@ -24,6 +24,7 @@ from .bubbles import averaged
 from .counting import census_on_ranks, tell
 from .faces import boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
 from .frames import NodalConditions, NodalFrames, given, snapped, surface_of
+from .hinges import gathered_points, hinges_of, refuse_hinges
 from .matching import EDGE_ON
 from .nodes import Nodes, asked, everywhere, joined_nodes, slots_of
 from .watching import Watched, clamped_or_prescribed, watched_nodes
@@ -33,8 +34,8 @@ log = logging.getLogger(__name__)
 
 @stage("contact")
 def contact_surface(system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obstacle | None = None,
-                    points: Sequence[Sequence[float]] | None = None,
-                    feature_angle: float = FEATURE_ANGLE) -> ContactSurface:
+                    points: Sequence[Sequence[float]] | None = None, feature_angle: float = FEATURE_ANGLE,
+                    hinges: bool = False) -> ContactSurface:
     """Make the contact conditions of a part of the boundary, or of listed points of it only.
 
     Nodal weights are ∫ phi_i times the thickness of the section, so that r_n / weights is in Pa. Nodal normals have the
@@ -52,14 +53,19 @@ def contact_surface(system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obs
         obstacle: Touching() by default, HalfSpace, AnalyticGap or the user's own; it is asked for every face of a node.
         points: (k, d) coordinates; each is replaced by the nearest node of the facets. The order is kept.
         feature_angle: angle [rad]; facets around a node that turn by less from one another are one smooth face.
+        hinges: True where the body may hang together with another one by nodes of this boundary, as by a pin.
     Raises:
-        InputError: no contact nodes, a listed point that is clamped or not on the facets, a contact direction that is
+        InputError: no contact nodes, nodes that only glue two bodies together, a listed point that is clamped or not on
+            the facets, a contact direction that is
             partly prescribed, initial penetration, a node with more faces than the body has dimensions."""
     space = contact_space("contact_surface", system, {"facets": facets}, points)
     optional(provides, "contact_surface", "obstacle", obstacle, ("directions", "gap"), "give HalfSpace(…) or another")
     angle = checked_angle("contact_surface", feature_angle)
+    flag("contact_surface", "hinges", hinges)
     comm, every = space.comm, nodes_on(space, facets)
-    whole = every
+    whole, hinge = every, hinges_of(space, every)
+    if not hinges:
+        refuse_hinges("contact_surface", (facets.name,), gathered_points(comm, every, hinge))
     chosen = None if points is None else listed(space, everywhere(comm, whole), points, facets.name)
     whole = free_nodes(space, whole, facets.name) if chosen is None else whole.pick(_rows_of(whole, chosen))
     around = boundary(space, facets, beyond=angle)
@@ -85,6 +91,7 @@ def contact_surface(system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obs
     if chosen is None:
         lost, _ = split(space, around, every.pick(held), angle)
         watched = _watched(space, facets.name, lost, obstacle)
+    kinds["shared with another body"] = hinge
     census = census_on_ranks(comm, facets.name, every, kinds, len(slots))
     tell(comm, census)
     surface = surface_of(space, [conditions], gap0=gap, weights=weights, censuses=(census,), watched=watched)
@@ -278,8 +285,11 @@ def merged(space: FemSpace, name: str, nodes: Nodes, directions: Array, angle: f
         alike = np.flatnonzero(nodes.numbers == leaders[row])
         turn = directions[alike] @ directions[row]
         if turn.max(initial=-2.0) < np.cos(angle):
-            raise InputError(f"contact node {at(nodes.points[row])} of '{name}' is tied to another in some components "
-                             "only, or to one outside this contact: leave it out (points=), or tie and list all")
+            partly = leaders[row] < 0
+            how = "is tied in some components only" if partly else "is tied to a node outside this contact"
+            remedy = "tie all components" if partly else "add the boundary of that node to the group"
+            raise InputError(f"contact node {at(nodes.points[row])} of '{name}' {how}: leave it out, by listing the "
+                             f"others as points=, or {remedy}")
         target[row] = alike[turn.argmax()]
     kept, place = np.unique(target, return_inverse=True)
     sums = sp.csr_matrix((nodes.weights, (place.ravel(), np.arange(len(target)))))

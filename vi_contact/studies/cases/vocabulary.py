@@ -69,10 +69,12 @@ def record(path: Path, units: str | None = None, *, dt: float | None = None, res
 
 def surface(system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obstacle | None = None,
             points: Sequence[tuple[float, ...]] | None = None, feature_angle: float = FEATURE_ANGLE, held: bool = False,
-            springs: float | None = None, frictionless_corners: bool = False, name: str = "") -> ContactSurface:
-    """Make a ``contact_surface``; held: bilateral everywhere; springs: on these; no friction in corners; name: of it
-    as ``part`` of recorders."""
-    found = fem.contact_surface(system, facets, obstacle=obstacle, points=points, feature_angle=feature_angle)
+            springs: float | None = None, frictionless_corners: bool = False, hinges: bool = False,
+            name: str = "") -> ContactSurface:
+    """Make a ``contact_surface``; held: bilateral everywhere; springs: on these; no friction in corners; hinges: of
+    bodies that share nodes; name: of it as ``part`` of recorders."""
+    found = fem.contact_surface(system, facets, obstacle=obstacle, points=points, feature_angle=feature_angle,
+                                hinges=hinges)
     found = found if springs is None else found.on_springs(springs)
     found = found.with_frictionless_corners() if frictionless_corners else found
     return found.bilateral_everywhere() if held else found
@@ -80,9 +82,10 @@ def surface(system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obstacle | 
 
 def pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *, matching: Matching | None = None,
          points: Sequence[tuple[float, ...]] | None = None, feature_angle: float = FEATURE_ANGLE, held: bool = False,
-         frictionless_corners: bool = False, name: str = "") -> ContactSurface:
+         frictionless_corners: bool = False, hinges: bool = False, name: str = "") -> ContactSurface:
     """Make a ``contact_pair``; held: ``.bilateral_everywhere()``; the others: as of ``surface``."""
-    found = fem.contact_pair(system, facets1, facets2, matching=matching, points=points, feature_angle=feature_angle)
+    found = fem.contact_pair(system, facets1, facets2, matching=matching, points=points, feature_angle=feature_angle,
+                             hinges=hinges)
     found = found.with_frictionless_corners() if frictionless_corners else found
     return found.bilateral_everywhere() if held else found
 

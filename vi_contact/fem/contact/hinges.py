@@ -1,0 +1,97 @@
+"""Find nodes at which two bodies hang together by a point, or by a line in space: a contact is glued there.
+
+Bodies that are drawn between the same corner points share these nodes, although each has sides of its own. The tip of a
+crack is a shared node too, but there the material goes on: its cells hang together through their facets, round the tip.
+So a node is a hinge if its cells do not hang together through facets at the node."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...core.algebra import Array, Comm, Indices, Mask, from_each
+from ...core.checks import at
+from ...core.errors import InputError
+from .. import compat
+from ..mesh import node_numbers
+from ..nodal_space import parts_of
+from ..space import FemSpace
+from .nodes import Nodes
+
+NAMED = 4  # hinges that a message names
+
+
+def hinges(space: FemSpace, numbers: Indices) -> Indices:
+    """Return those of these numbers of nodes, the same on every rank, that are hinges. Collective.
+
+    Things that are connected are pairs of a node and a facet at it: all those of one cell, and so, as a facet is of two
+    cells and may be of two ranks, all those round the node. Mid-points of edges and sides are no hinges."""
+    mesh, d = space.mesh, space.mesh.topology.dim
+    names, vertices = node_numbers(mesh), len(compat.sub_entities(mesh, 0))
+    corners = names[compat.geometry_dofmap(mesh)[:, :vertices]]
+    cells = np.flatnonzero(np.isin(corners, numbers).any(axis=1))
+    mesh.topology.create_entities(d - 1)
+    mesh.topology.create_connectivity(d, d - 1)
+    sides = mesh.topology.connectivity(d, d - 1).array.reshape(len(corners), -1)[cells]
+    facets, side = np.unique(sides, return_inverse=True)
+    nodes = names[compat.entities_to_geometry(mesh, d - 1, facets.astype(np.int32))]
+    local = mesh.topology.index_map(d - 1)
+    known = local.local_to_global(facets.astype(np.int32)) if len(facets) else facets.astype(np.int64)
+    keys = nodes.astype(np.int64) * local.size_global + known[:, None]
+    things, thing = np.unique(keys, return_inverse=True)
+    thing = thing.reshape(keys.shape)
+
+    # link all things of one cell and node
+    side = side.reshape(sides.shape)
+    cell = np.broadcast_to(np.arange(len(cells))[:, None, None], (*sides.shape, nodes.shape[1])).ravel()
+    node, member = nodes[side].ravel(), thing[side].ravel()
+    wanted = np.isin(node, numbers)
+    cell, node, member = cell[wanted], node[wanted], member[wanted]
+    order = np.lexsort((node, cell))
+    same = (np.diff(cell[order]) == 0) & (np.diff(node[order]) == 0)
+    one, other = member[order[:-1][same]], member[order[1:][same]]
+
+    # what ranks share: facets that are ghosts of some
+    ghosts = np.concatenate(from_each(space.comm, known[facets >= local.size_local]))
+    of_ghosts = np.zeros(len(things), dtype=bool)
+    of_ghosts[thing[np.isin(known, ghosts)].ravel()] = True
+    part = parts_of(space.comm, one, other, things, np.flatnonzero(of_ghosts))
+
+    # nodes with several parts
+    members = np.unique(member)
+    pairs = np.column_stack([things[members] // local.size_global, part[members]])
+    pairs = np.unique(np.concatenate(from_each(space.comm, np.unique(pairs, axis=0))), axis=0)
+    found, parts = np.unique(pairs[:, 0], return_counts=True)
+    return np.asarray(found[parts > 1])
+
+
+def hinges_of(space: FemSpace, nodes: Nodes) -> Mask:
+    """Return which of this rank's nodes are hinges, if they are not clamped. Collective."""
+    free = ~nodes.held.all(axis=1)
+    numbers = np.unique(np.concatenate(from_each(space.comm, nodes.numbers[free])))
+    return np.asarray(free & np.isin(nodes.numbers, hinges(space, numbers)))
+
+
+def refuse_hinges(owner: str, names: Sequence[str], points: Array) -> None:
+    """Raise InputError for hinges at these points (k, d), ordered, if there are any; ``names``: of the boundaries."""
+    if not len(points):
+        return
+    places = " and ".join(at(point) for point in points[:NAMED])
+    where = f"at {places}" if len(points) <= NAMED else f"the first at {places}"
+    if len(names) == 2:
+        shared = f"'{names[0]}' and '{names[1]}' share {len(points)} nodes"
+    else:
+        shared = f"'{names[0]}' shares {len(points)} nodes with another body"
+    if len(points) == 1:
+        shared = shared.replace(" 1 nodes", " a node")
+    raise InputError(
+        f"{owner}: {shared}, {where}, where bodies would hang together although they may part beside: give each body "
+        "corner points of its own there, or say hinges=True (in a case file hinges = true in this [[contact]]) where "
+        "a hinge is meant"
+    )
+
+
+def gathered_points(comm: Comm, nodes: Nodes, chosen: Mask) -> Array:
+    """Return the points of the chosen nodes of all ranks, by their numbers. Collective."""
+    parts = from_each(comm, (nodes.numbers[chosen], nodes.points[chosen]))
+    numbers, points = (np.concatenate([part[i] for part in parts]) for i in range(2))
+    return np.asarray(points[np.argsort(numbers)])

@@ -1,0 +1,83 @@
+"""Choose among several nodes of side 2 that lie at one place in front of a node of side 1.
+
+Nodes of different bodies, or of both faces of a joint, may coincide. Which of them a node faces follows from the facets
+around it: a partner must have facets of side 2 in front of them. If one partner has all of these it is the one, and
+what the others have lies beside it, as in a column of stones beside another column. If each has a part of them, as two
+stones under the middle of a third one have, no single partner is right."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...core.algebra import Array, Indices, Mask
+from ...core.surfaces import nodal_frames
+
+FLAT = 1e-6  # of a length: what is shorter when it is seen along a normal has no direction
+BORDER = 1e-6  # radians by which a direction may leave a facet's corner and count as on its border
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Hold points (k, d) of nodes and facets (n, v), rows of their places."""
+
+    points: Array
+    facets: Indices
+
+    def around(self, node: int) -> Array:
+        """Return the nodes' points (m, v, d) of the facets at a node."""
+        return self.points[self.facets[(self.facets == node).any(axis=1)]]
+
+
+def in_front(one: Surface, node: int, normal: Array, two: Surface, partner: int) -> Mask:
+    """Return in front of which facets at a node of side 1 (m,) the facets at its partner lie, seen along the normal."""
+    frame = nodal_frames(normal[None])[0][:, 1:]
+    ways = (one.around(node).mean(axis=1) - one.points[node]) @ frame
+    arms = (two.around(partner) - two.points[partner]) @ frame
+    found = np.zeros(len(ways), dtype=bool)
+    for arm in arms:
+        found |= _within(ways, arm)
+    return found
+
+
+def one_of(
+    one: Surface, node: int, normal: Array, two: Surface, partners: Indices, apart: Array, close: float
+) -> int:
+    """Return which of several partners a node of side 1 faces; -1 where no single one is right.
+
+    Args:
+        partners: (k,) places on side 2, of nodes that face this one. The first is taken where none has a facet in front
+            of one of side 1, as where bodies meet at a corner only.
+        apart: (k,) their distances [m]; partners that differ by up to ``close`` [m] are at one place.
+    """
+    seen = np.array([in_front(one, node, normal, two, partner) for partner in partners])
+    facing = np.flatnonzero(seen.any(axis=1))
+    if len(facing) < 2:
+        return int(partners[facing[0] if len(facing) else 0])
+    nearest = facing[np.argmin(apart[facing])]
+    alone = np.sum(apart[facing] <= apart[nearest] + close) == 1
+    return int(partners[nearest]) if alone and seen[nearest].all() else -1
+
+
+def _within(ways: Array, arm: Array) -> Mask:
+    """Return which directions (m, d - 1) lie in the corner of a facet whose nodes are seen at ``arm`` (v, d - 1)."""
+    length = np.linalg.norm(arm, axis=1)
+    seen = length > FLAT * length.max(initial=0.0)
+    if arm.shape[1] == 0:  # a bar: its end is all there is
+        return np.ones(len(ways), dtype=bool)
+    if not seen.any():
+        return np.zeros(len(ways), dtype=bool)
+    arm = arm[seen] / length[seen, None]
+    if arm.shape[1] == 1:
+        return np.asarray((ways * arm[:, 0] > 0.0).any(axis=1) | ((arm > 0.0).any() and (arm < 0.0).any()))
+    middle = arm.sum(axis=0)
+    if np.linalg.norm(middle) < FLAT:  # the node is in the middle of its facet
+        return np.ones(len(ways), dtype=bool)
+    low, high = np.min(_angles(middle, arm)), np.max(_angles(middle, arm))
+    angles = _angles(middle, ways)
+    return np.asarray((angles >= low - BORDER) & (angles <= high + BORDER) & (high - low > BORDER))
+
+
+def _angles(start: Array, vectors: Array) -> Array:
+    """Return the angles (k,) from the direction ``start`` to plane vectors (k, 2), in (-pi, pi]."""
+    across = start[0] * vectors[:, 1] - start[1] * vectors[:, 0]
+    return np.arctan2(across, vectors @ start)
