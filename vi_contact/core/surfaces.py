@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from .algebra import Array, Comm, Indices, Mask, Matrix, SerialComm, largest, on_first, total
 from .checks import function, number, shown
+from .collective import users
 from .contact_last import at
 from .errors import InputError
 from .system import Companion
@@ -192,7 +193,8 @@ class ContactSurface:
 
         def spread(name: str, way: Motion, shape: tuple[int, ...]) -> Callable[[float], Array]:
             function("moving", name, way, "give a function of the time t [s] that returns metres")
-            return lambda t: _spread(name, way(t), shape, t)
+            place = f"a moving obstacle: {name}"
+            return lambda t: users(f"{place}({t:g} s)", lambda: _spread(name, way(t), shape, t), np.zeros(shape))
 
         return replace(self, motion=None if towards is None else spread("towards", towards, (self.count,)),
                        slide=None if along is None else spread("along", along, (self.count, self.tangents.shape[1])))

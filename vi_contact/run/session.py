@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 from signal import Signals
 from timeit import repeat
 from typing import Any, Protocol, TypeVar
@@ -15,6 +15,7 @@ import numpy as np
 
 from ..core.algebra import Comm, largest
 from ..core.checks import on_all
+from ..core.collective import together, users
 from ..core.errors import InputError, Interrupted, OutOfTime
 from ..core.stages import done
 from ..core.step import Recorder, Report, State, StepResult
@@ -116,7 +117,9 @@ class Session:
         except BaseException as error:
             interrupted = isinstance(error, KeyboardInterrupt | GeneratorExit)
             reason = str(error) or ("interrupted by the user" if interrupted else type(error).__name__)
-            self._rescue(writer, "interrupted" if interrupted else "failed", reason, time.perf_counter() - begin)
+            told = getattr(error, "on_all_ranks", False)
+            status = "interrupted" if interrupted else "failed"
+            self._rescue(writer, status, reason, time.perf_counter() - begin, all_ranks=told)
             if isinstance(error, Interrupted):  # on all ranks: none ends before the first has written
                 self._comm.bcast(None)
             raise
@@ -193,10 +196,13 @@ class Session:
         if report.escalated and self.root:
             log.warning("step %d, t = %.6g s: escalated to %s", state.k, state.t, report.result.method)
         row: dict[str, Any] = {}
-        for recorder in self.recorders:
-            row.update(recorder.row(report))
-        self.table.check(row)
-        refuse_overflow(row)
+        with together(self._comm):  # a recorder of the user's may fail on one rank
+            for recorder in self.recorders:
+                name = f"the recorder {type(recorder).__name__} in step {state.k}, t = {state.t:.6g} s,"
+                row.update(users(name, partial(recorder.row, report), {}))
+        with together(self._comm):  # ranks that record other columns, or numbers too large on one of them
+            self.table.check(row)
+            refuse_overflow(row)
         writer.append(row)
         self.last = report
 
@@ -214,14 +220,17 @@ class Session:
     def _about(self) -> dict[str, Any]:
         """What the run is of, for its checkpoints. Collective."""
         method, start, end = self.method, self.place.t_start, self.place.t_start + self.step_plan.length
-        return {"run": identity(method.problem, method.scheme, method.dt, start=start, end=end), "span": (start, end)}
+        with together(self._comm):  # histories of the user's are asked at other times than those of steps
+            known = identity(method.problem, method.scheme, method.dt, start=start, end=end)
+        return {"run": known, "span": (start, end)}
 
-    def _rescue(self, writer: Writer, status: str, reason: str, seconds: float) -> None:
-        """Save what there is. A checkpoint of the last base step only on one rank: others might not come."""
+    def _rescue(self, writer: Writer, status: str, reason: str, seconds: float, *, all_ranks: bool) -> None:
+        """Save what there is. A checkpoint of the last base step only on one rank, or where ``all_ranks`` raise the
+        same error: others might not come."""
         with suppress(Exception):
             writer.flush(alone=True)
         with suppress(Exception):
-            if self._comm.size == 1:
+            if self._comm.size == 1 or all_ranks:
                 self._checkpoint(writer)
         facts: dict[str, Any] = {"status": status, "reason": reason, "steps": self.place.state.k}
         with suppress(Exception):

@@ -11,6 +11,7 @@ import numpy as np
 from ..core.algebra import EffectiveMatrix, largest, max_abs
 from ..core.certificate import Certificate
 from ..core.checks import on_all
+from ..core.collective import together_if_own
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
 from ..core.products import frozen
@@ -56,7 +57,8 @@ class CertifiedSolver:
         tried = []
         for rank in range(len(self._solvers)):
             try:
-                result = self._get(rank).solve(step)
+                with together_if_own(self._surface.comm, self._solvers[rank]):
+                    result = self._get(rank).solve(step)
             except StepFailure as failure:
                 tried.append(str(failure))
                 continue

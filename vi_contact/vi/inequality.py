@@ -14,17 +14,18 @@ import numpy as np
 from ..core.algebra import Array, EffectiveMatrix, lowest, max_abs, total
 from ..core.certificate import Certificate
 from ..core.checks import instance, whole
+from ..core.collective import agree
 from ..core.errors import StepFailure
 from ..core.matrix_checks import SYMMETRIC, asymmetry
 from ..core.step import StepProblem
 from ..core.surfaces import empty_surface
 from ..core.verify import ROUNDED
 from ..fem import compat
-from ..fem.communicators import MpiComm
+from ..fem.communicators import MpiComm, kept
 from ..fem.form_checks import refuse_complex
 from ..fem.petsc_algebra import PetscAlgebra, PetscMatrix, UnsymmetricAlgebra
 from ..solvers.volume.route import Method, ReducedNewton, SemismoothNewton, TaoTron, Volume
-from .forms import Problem, refused
+from .forms import Problem, given_alike, refused
 
 ARMIJO, HALVINGS = 1e-4, 12
 REFINEMENTS = 5  # of a linear problem, at most
@@ -112,11 +113,16 @@ def solve(form: Any, u: Any, *, lower: Any = None, upper: Any = None, bcs: Seque
     The unknowns must be values at points (Lagrange of any degree, DG0, …): bounds hold there, which for degrees above
     one is not everywhere. InputError for forms, bounds and bcs that do not fit; StepFailure when the certificate stays
     above ``tolerance`` after ``iterations`` Newton steps, with the best u so far kept. Collective."""
-    start, limit = time.process_time(), whole("vi.solve", "iterations", iterations, least=1)
+    start = time.process_time()
     refuse_complex("vi.solve")
     instance("vi.solve", "u", u, compat.fem.Function, "give the DOLFINx Function to solve for")
     if not compat.nodal(u.function_space):
         raise refused("the unknowns of u are not values of one field at points: take Lagrange or DG0, not mixed")
+    agree(MpiComm(kept(u.function_space.mesh.comm)), "vi.solve", {
+        "lower": given_alike(lower), "upper": given_alike(upper), "J": J is None, "method": method,
+        "number of bcs": len(bcs) if isinstance(bcs, list | tuple) else bcs, "petsc_options": petsc_options,
+        "prefix": prefix, "tolerance": tolerance, "iterations": iterations})
+    limit = whole("vi.solve", "iterations", iterations, least=1)
     settings = Volume(method or TaoTron(), {} if petsc_options is None else petsc_options, prefix, tolerance)
     problem = Problem(form, u, bcs, J)
     problem.put(problem.x)
