@@ -32,7 +32,8 @@ def march(problem: ContactProblem, *, scheme: Scheme | None = None, solver: Solv
     InputError is raised at the call: arguments of the wrong kind, a state of another problem or inside the obstacle."""
     method = checked_method("march", problem, scheme, (solver, escalation), dt, steps=steps, t_end=t_end, state=state,
                             tolerance=tolerance)
-    state = initial_state(method.problem) if state is None else state
+    with together(method.problem.surface.comm):
+        state = initial_state(method.problem) if state is None else state
     return iter(March(method, step_plan(dt, steps, t_end, state.t), state))
 
 
@@ -71,8 +72,11 @@ class March:
 
     def _restarted(self, dt: float) -> State:
         """The state, with a past for this dt."""
+        if dt == self.dt:
+            return self.state
         method = self.method
-        return self.state if dt == self.dt else method.scheme.start(method.problem, self.state, dt)
+        with together(method.problem.surface.comm):  # it may ask for loads, which are the user's
+            return method.scheme.start(method.problem, self.state, dt)
 
     def _attempt(self, dt: float, *, final: bool) -> Report | None:
         """A step of dt; None when it closes a point and is to be halved: nothing has happened then.
