@@ -196,11 +196,10 @@ class Session:
         if report.escalated and self.root:
             log.warning("step %d, t = %.6g s: escalated to %s", state.k, state.t, report.result.method)
         row: dict[str, Any] = {}
-        with together(self._comm):  # a recorder of the user's may fail on one rank
+        with together(self._comm):  # one of the user's may fail on one rank, or record what does not fit there
             for recorder in self.recorders:
                 name = f"the recorder {type(recorder).__name__} in step {state.k}, t = {state.t:.6g} s,"
                 row.update(users(name, partial(recorder.row, report), {}))
-        with together(self._comm):  # ranks that record other columns, or numbers too large on one of them
             self.table.check(row)
             refuse_overflow(row)
         writer.append(row)
