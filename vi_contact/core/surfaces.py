@@ -194,7 +194,12 @@ class ContactSurface:
         def spread(name: str, way: Motion, shape: tuple[int, ...]) -> Callable[[float], Array]:
             function("moving", name, way, "give a function of the time t [s] that returns metres")
             place = f"a moving obstacle: {name}"
-            return lambda t: users(f"{place}({t:g} s)", lambda: _spread(name, way(t), shape, t), np.zeros(shape))
+
+            def moved(t: float) -> Array:
+                return users(f"{place}({t:g} s)", lambda: _spread(name, way(t), shape, t), np.zeros(shape))
+
+            moved.given = way  # type: ignore[attr-defined]  # what is asked for its frequency
+            return moved
 
         return replace(self, motion=None if towards is None else spread("towards", towards, (self.count,)),
                        slide=None if along is None else spread("along", along, (self.count, self.tangents.shape[1])))

@@ -28,7 +28,8 @@ from .march import March
 from .memory import in_words, memory
 from .method import Method
 from .recorders import refuse_overflow
-from .solution import Solution, energy_warning, sampling_warning
+from .sampling import sampling_warning
+from .solution import Solution, energy_warning
 from .stop_signals import StopSignals
 from .time_steps import StepPlan, described, pieces_of
 from .wall_time import WallTime
@@ -91,7 +92,7 @@ class Session:
                 "dt": described(method.dt), "tolerance": method.tolerance, "ranks": self._comm.size,
                 "unknowns": problem.system.space.unknowns, "contact_points": problem.surface.total,
                 "boundaries": list(problem.system.notes),
-                "sampling": sampling_warning(problem.excitations, max(pieces_of(method.dt))[0]) or ""}
+                "sampling": sampling_warning(problem, max(pieces_of(method.dt))[0]) or ""}
 
     @property
     def left(self) -> int:

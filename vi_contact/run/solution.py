@@ -87,16 +87,6 @@ def energy_warning(facts: Mapping[str, Any]) -> str | None:
             "ContactStabilisedNewmark(), which creates none; HHT() and HalvedAtImpact do not cure it")
 
 
-def sampling_warning(excitations: Sequence[Excitation], dt: float) -> str | None:
-    """Return a sentence when a time step [s] is longer than that of a record, whose peaks it then misses."""
-    finest = min((one.record.dt for one in excitations if isinstance(one, GroundMotion)), default=dt)
-    if dt <= finest * (1.0 + 1e-6):
-        return None
-    return (f"the time step of {dt:g} s is longer than the {finest:g} s of the record, whose peaks fall between the "
-            "steps: take a shorter dt, or give resampled(record, dt), which filters out frequencies that dt cannot "
-            "represent")
-
-
 def _entries(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     """(name, value) of every line of the summary; those without a name are whole lines."""
     dt, mean, plain = facts["dt"], facts["seconds_per_step"], facts["seconds_per_linear_step"]

@@ -21,6 +21,7 @@ from ...ground_motion.excitation import GroundMotion
 from ...ground_motion.record import Record
 from ...laws.free_motions import free_motions
 from ...run.files.folder import MODEL
+from ...run.sampling import sampling_warning
 from .table_calls import Call, Group, build, nodes_in
 from .vocabulary import Parts
 
@@ -64,6 +65,8 @@ def describe(case: Any, comm: Any, parts: Parts | None = None, *, most: int = 50
         "run": run, "outline": outline(space, tags, [cells for cells, _ in space.forms.materials]),
     } | (_periods(problem, space.size) if space.unknowns <= most else {})
     model |= {"defects": list(_defects(model)), "warnings": list(_warnings(model))}
+    if not any(run["dt"] > one["dt"] * (1.0 + ROUNDED) for one in model["records"]):  # that is a defect
+        model["warnings"] += filter(None, [sampling_warning(problem, max(dt for dt, _ in plan.parts))])
     return dict(json.loads(to_json(model), parse_float=lambda text: float(f"{float(text):.{DIGITS}g}")))
 
 
