@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.algebra import Array, Comm, largest, total
+from ...core.algebra import Array, Comm, Mask, largest, total
 from ...core.files import on_root, to_json, write_atomically
 from ...core.problem import ContactProblem
 from ...core.step import AXES
@@ -40,7 +40,8 @@ def describe(case: Any, comm: Any, parts: Parts | None = None, *, most: int = 50
 
     Keys: title, dimension, unknowns, degree, mass; groups (name, kind); bodies (name, cells, mass, material);
     supports (kind, groups, components); contact (name, points, size [m²], friction, places); periods and
-    rigid_motions with the contact closed where it touches at the start, and sticking where there is friction; waves
+    rigid_motions with the contact closed where it touches at the start, and sticking where there is friction;
+    periods_open, the first one with it open, where it touches; waves
     (body, c_s, h: the longest edge over the degree, f_max = c_s / (8 h), dt_ratio = dt c_s / h); records (file, scale,
     dt, duration, pga, f_95: 95 % of its energy are below); run (dt, t_end, steps); outline (group, lines), on rank 0;
     defects and warnings: sentences.
@@ -149,9 +150,22 @@ def _record(motion: GroundMotion) -> dict[str, Any]:
 
 
 def _periods(problem: ContactProblem, size: float) -> dict[str, Any]:
-    """Undamped natural periods [s] with the contact closed where it is held or has no gap, sticking where it rubs."""
+    """Undamped natural periods [s] with the contact closed where it is held or has no gap, sticking where it rubs; and
+    the longest with it open, where it can open: of a body that has lifted off it may be the shorter one."""
+    surface = problem.surface
+    closed = (surface.gap0 <= TOUCHING * size) | surface.bilateral
+    f, free = _frequencies(problem, closed)
+    found: dict[str, Any] = {"periods": list(1.0 / f), "rigid_motions": free}
+    if surface.some(closed & ~surface.bilateral):
+        f, _ = _frequencies(problem, surface.bilateral)
+        found |= {"periods_open": list(1.0 / f[:1])}
+    return found
+
+
+def _frequencies(problem: ContactProblem, closed: Mask) -> tuple[Array, int]:
+    """(natural frequencies [Hz], number of rigid motions) with these conditions (m,) closed, sticking where it rubs."""
     system, surface = problem.static_load, problem.surface
-    closed, held, springs = (surface.gap0 <= TOUCHING * size) | surface.bilateral, *np.zeros((2, system.rows))
+    held, springs = np.zeros((2, system.rows))
     rigid = closed & surface.rigid
     held[surface.owned[rigid]] = 1.0
     held[surface.tangents[(surface.tangents >= 0) & closed[:, None] & problem.frictional]] = 1.0
@@ -159,8 +173,7 @@ def _periods(problem: ContactProblem, size: float) -> dict[str, Any]:
     algebra, every = system.algebra, np.arange(system.rows)
     K = algebra.combine([(1.0, system.K), (1.0, algebra.local(every, every, springs, system.rows))])
     most = sum(body.motions.shape[1] for body in free_motions(problem.system))
-    f, free = natural_frequencies(algebra, *(algebra.block(one, held == 0.0) for one in (K, system.M)), rigid=most)
-    return {"periods": list(1.0 / f), "rigid_motions": free}
+    return natural_frequencies(algebra, *(algebra.block(one, held == 0.0) for one in (K, system.M)), rigid=most)
 
 
 def _defects(model: Mapping[str, Any]) -> Iterator[str]:
@@ -181,6 +194,8 @@ def _warnings(model: Mapping[str, Any]) -> Iterator[str]:
         yield from (WORDS["coarse"].format(wave=wave, one=one) for wave in coarse)
     if model["run"]["dt"] > next(iter(model.get("periods", ())), np.inf) / STEPS:
         yield WORDS["slow"].format(**model)
+    elif model["run"]["dt"] > next(iter(model.get("periods_open", ())), np.inf) / STEPS:
+        yield WORDS["slow_open"].format(**model)
 
 
 def write_model(comm: Comm, model: Mapping[str, Any], folder: Path) -> None:
