@@ -56,19 +56,25 @@ def test_contact_forces_balance_the_weight(upper: int, lower: int, simplices: bo
     weight, x = WEIGHT * LONG * HIGH, surface.points[:, 0]
     assert np.all(state.r_n >= 0.0)
     assert isclose(state.r_n.sum(), weight, rel_tol=SAME)
-    assert abs(moment(problem, state, middle)) <= SAME * weight * WIDE, x
+    upper_one, both = moments(problem, state, middle)
+    assert abs(upper_one) <= SAME * weight * WIDE, x
+    assert abs(both) <= SAME * weight * WIDE, x  # what the lower block feels is the opposite, at the same place
 
 
-def moment(problem: Any, state: Any, middle: float) -> float:
-    """The moment of contact forces on the upper block about the middle of its foot [N m], by virtual work: a small
-    turn of this block moves its nodes by (x - middle) upwards, and the forces do the work of the moment."""
-    system, surface = problem.static_load, problem.surface
-    space, centre = problem.system.space, middle + 0.5 * LONG
+def moments(problem: Any, state: Any, middle: float) -> tuple[float, float]:
+    """The moments of contact forces on the upper block, and on both, about the middle of its foot [N m], by virtual
+    work: a small turn moves nodes by (x - middle) upwards, and the forces do the work of the moment."""
+    system, surface, space = problem.static_load, problem.surface, problem.system.space
     turn = np.zeros((len(space.nodes), 2))
+    turn[:, 1] = space.points[:, 0] - middle - 0.5 * LONG
+    turn[:, 0] = HIGH - space.points[:, 1]
     over = space.body_of_node == space.body_of_node[np.argmax(space.points[:, 1])]
-    turn[over, 1] = space.points[over, 0] - centre
-    turn[over, 0] = -(space.points[over, 1] - space.points[over, 1].min())
-    free = surface.in_frames(space.restrict(turn))
-    if surface.coupling is not None:
-        free = 2.0 * free - surface.coupling @ free
-    return float(free @ surface.reaction_load(state.r_n, system.rows))
+    load = surface.reaction_load(state.r_n, system.rows)
+
+    def work(moved: Any) -> float:
+        free = surface.in_frames(space.restrict(moved))
+        if surface.coupling is not None:
+            free = 2.0 * free - surface.coupling @ free
+        return float(free @ load)
+
+    return work(np.where(over[:, None], turn, 0.0)), work(turn)
