@@ -253,7 +253,7 @@ def test_an_impact_law_of_the_users_own(comm: Any) -> None:
         list(vc.march(resting(comm, press, impact=Bouncing(0.5)), dt=WALL_DT, steps=3))
 
 
-# Arguments that must agree ---------------------------------------------------------------------------------------------
+# Arguments that must agree
 
 SOLVED = {
     "steps": (3, 4), "dt": (WALL_DT, 2.0 * WALL_DT), "tolerance": (1e-9, 1e-8), "t_end": (None, 1.0),
@@ -323,7 +323,7 @@ def test_bounds_and_settings_of_an_inequality(comm: Any, name: str) -> None:
     _differ(comm, lambda: vi.solve(form, u, **{name: value}), f"vi.solve: {name} is")
 
 
-# The helpers themselves ------------------------------------------------------------------------------------------------
+# The helpers themselves
 
 
 @dataclass
@@ -353,7 +353,8 @@ def test_a_frame_goes_on_and_tells_at_its_end() -> None:
     assert done == [1]
     with pytest.raises(vc.InputError, match="f ended in ZeroDivisionError"):  # without a frame at once
         users("f", lambda: 1 / 0, 3)
-    with pytest.raises(vc.ViContactError, match=r"rank 1: KeyError\('a'\)"), together(Two(0, (False, None, "", "KeyError('a')"))):
+    other = (False, None, "", "KeyError('a')")
+    with pytest.raises(vc.ViContactError, match=r"rank 1: KeyError\('a'\)"), together(Two(0, other)):
         done.append(2)
     with pytest.raises(vc.StepFailure, match="too far"), together(Two(0, (False, 1, "too far", ""))):
         done.append(3)

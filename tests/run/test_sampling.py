@@ -33,7 +33,8 @@ class Engine:
         return value if len(given) == 1 else np.full(given[0].shape, value)
 
 
-def body(comm: Any, load: Any = None, value: Any = None, motion: Any = None, moving: Any = None, **more: Any) -> vc.ContactProblem:
+def body(comm: Any, load: Any = None, value: Any = None, motion: Any = None, moving: Any = None,
+         **more: Any) -> vc.ContactProblem:
     mesh, tags = block(comm, lengths=(2.0, 1.0), divisions=(2, 2))
     loads = [fem.Traction(tags["left"], value or (1.0, 0.0), history=load)] if load or value else []
     held = {"clamped": tags["top"]} if motion is None else {"prescribed": motion(tags)}
@@ -74,7 +75,7 @@ def test_a_multiple_of_half_a_period_sees_nothing(comm: Any, name: str) -> None:
     assert lengthy(comm, name, 0.125) is None and lengthy(comm, name, 0.025) is None
 
 
-MOTIONS = [
+MOTIONS: list[Any] = [
     (vc.Ricker(1.0, 2.0), 0.125), (vc.HalfSine(1.0, 0.4), 0.2), (vc.FullSine(1.0, 0.4), 0.1),
     (vc.Rectangular(1.0, 0.4), 0.4), (vc.Tabulated((0.0, 0.1, 0.2, 0.3), (0.0, 1.0, -1.0, 0.0)), 0.1),
     (vc.GroundMotion(RECORD), 0.01),

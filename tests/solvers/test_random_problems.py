@@ -12,7 +12,7 @@ import pytest
 from fuzz import Fuzz
 
 from vi_contact.core.algebra import Array
-from vi_contact.solvers import ActiveSet, FixedPoint, FrictionNewton, Hildreth, Lemke, NSGS
+from vi_contact.solvers import NSGS, ActiveSet, FixedPoint, FrictionNewton, Hildreth, Lemke
 
 st = pytest.importorskip("hypothesis.strategies")
 

@@ -4,12 +4,12 @@ On several ranks a function of the user's may fail on one of them: at the points
 wait for it for ever in the next collective call. So there are two ways to call such a function:
 
 - ``on_all`` (core.checks) calls it and then asks all ranks: for what is called once.
-- ``together`` opens a frame. Within it ``users`` calls a function, keeps what it raises, and goes on with another value;
-  at the end of the frame all ranks are asked once, however many functions were called. This is for every step.
+- ``together`` opens a frame. Within it ``users`` calls a function, keeps what it raises, and goes on with another
+  value; at the end of the frame all ranks are asked once, however many functions were called. This is for every step.
 
 On one rank a frame does nothing, and errors are raised where they happen."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterator, Mapping, Set
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import fields, is_dataclass
 from enum import Enum
@@ -62,7 +62,7 @@ def together_if_own(comm: Comm, value: Any) -> AbstractContextManager[None]:
 
 def _told(comm: Comm, kept: ViContactError | None, broken: Exception | None) -> Exception:
     """The error that this rank raises when some rank has one. Collective."""
-    own = kept or broken
+    own: Any = kept or broken
     kind = next((number for number, kind in enumerate(KINDS) if isinstance(own, kind)), None)
     every = from_each(comm, None if own is None else (kept is not None, kind, str(own), repr(own)))
     if own is None or (kept is None and any(one is not None and one[0] for one in every)):
@@ -70,8 +70,9 @@ def _told(comm: Comm, kept: ViContactError | None, broken: Exception | None) -> 
                           key=lambda pair: (not pair[1][0], pair[0]))
         told = ViContactError(f"rank {rank}: {found[3]}") if found[1] is None else KINDS[found[1]](found[2])
         told.__cause__, own = own, told
-    own.on_all_ranks = True  # type: ignore[attr-defined]  # all of them raise: what follows may be collective
-    return own
+    own.on_all_ranks = True  # all of them raise: what follows may be collective
+    error: Exception = own
+    return error
 
 
 def users(name: str, call: Callable[[], T], instead: T) -> T:
@@ -144,7 +145,8 @@ def _described(value: Any, depth: int, parts: bool = False) -> str:
     if value is None or isinstance(value, bool | np.bool_ | str | bytes | PurePath):
         return repr(str(value))
     if isinstance(value, int | float | complex | np.number):
-        return repr(complex(value)) if abs(value) < 2.0**53 else repr(value)
+        number: Any = value
+        return repr(complex(number)) if abs(number) < 2.0**53 else repr(number)
     if depth == 0:
         return kind
     if isinstance(value, Mapping):

@@ -33,8 +33,7 @@ def _sources(problem: ContactProblem) -> Iterator[Any]:
     system, surface = problem.system, problem.surface
     for _, history in system.load.separable:
         yield history
-    for function in (*system.load.general, *system.load.viscous, *system.load.inertial):
-        yield function
+    yield from (*system.load.general, *system.load.viscous, *system.load.inertial)
     for condition in getattr(system.space, "prescribed", ()):
         yield from getattr(condition, "motions", ())
     yield from getattr(getattr(system.space, "forms", None), "boundaries", ())
@@ -65,7 +64,7 @@ def _said(source: Any, dt: float, depth: int = DEEP) -> Iterator[str]:
 
 def _frequency(source: Any) -> float | None:
     """The frequency [Hz] that a motion, of the user's too, says that it has."""
-    value = getattr(source, "frequency", None)
+    value: Any = getattr(source, "frequency", None)
     known = isinstance(value, int | float | np.number) and not isinstance(value, bool)
     return float(value) if known and 0.0 < float(value) < np.inf else None
 

@@ -18,7 +18,7 @@ from ..core.checks import on_all
 from ..core.collective import together, users
 from ..core.errors import InputError, Interrupted, OutOfTime
 from ..core.stages import done
-from ..core.step import Recorder, Report, State, StepResult
+from ..core.step import Recorder, Report, Row, State, StepResult
 from .files.checkpoint import RestartPoint
 from .files.identity import identity
 from .files.log import Progress, versions
@@ -197,10 +197,12 @@ class Session:
         if report.escalated and self.root:
             log.warning("step %d, t = %.6g s: escalated to %s", state.k, state.t, report.result.method)
         row: dict[str, Any] = {}
+        nothing: Row = {}
         with together(self._comm):  # one of the user's may fail on one rank, or record what does not fit there
             for recorder in self.recorders:
                 name = f"the recorder {type(recorder).__name__} in step {state.k}, t = {state.t:.6g} s,"
-                row.update(users(name, partial(recorder.row, report), {}))
+                call: Callable[[], Row] = partial(recorder.row, report)
+                row.update(users(name, call, nothing))
             self.table.check(row)
             refuse_overflow(row)
         writer.append(row)

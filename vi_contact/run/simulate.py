@@ -149,12 +149,14 @@ def _started(problem: ContactProblem, recorders: Sequence[Recorder], state: Stat
              resumed: Mapping[str, Any] | None = None) -> tuple[Columns, Row]:
     """Start the recorders: their columns, and the row of the state. InputError when two record the same column."""
     row: dict[str, Any] = {}
+    nothing: Row = {}
     columns: dict[str, tuple[str, str]] = {}
     comm = problem.system.algebra.comm
     with together(comm):  # a recorder of the user's may fail on one rank
         for recorder in recorders:
             name = f"the recorder {type(recorder).__name__} at the start"
-            row |= users(name, partial(recorder.start, problem, state, resumed), {})
+            call: Callable[[], Row] = partial(recorder.start, problem, state, resumed)
+            row |= users(name, call, nothing)
     with together(comm):
         for recorder in recorders:
             twice = sorted(set(columns) & set(recorder.columns()))

@@ -2,7 +2,7 @@
 
 import tomllib
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 from importlib import import_module
@@ -16,9 +16,7 @@ import numpy as np
 from ..core.algebra import Array
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
-from ..core.protocols import Excitation
 from ..core.step import Columns, State
-from ..ground_motion.excitation import GroundMotion
 from .files.table import LEDGER
 
 _LINES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))

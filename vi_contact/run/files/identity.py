@@ -112,7 +112,8 @@ def _loads(system: SemiDiscreteSystem, probes: Sequence[Array], early: Sequence[
     length = float(np.sqrt(system.algebra.dot(probes[0], probes[0])))
     found = [(system.algebra.dot(w, f), size * length) for f in forces for w in probes]
     for vector, history in system.load.separable:
-        found += [_dot(system, probes[0], vector), *_sampled(np.array([float(history_value(history, t)) for t in times]))]
+        values = np.array([float(history_value(history, t)) for t in times])
+        found += [_dot(system, probes[0], vector), *_sampled(values)]
     return found
 
 
