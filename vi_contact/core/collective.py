@@ -70,23 +70,36 @@ def _told(comm: Comm, kept: ViContactError | None, broken: Exception | None) -> 
                           key=lambda pair: (not pair[1][0], pair[0]))
         told = ViContactError(f"rank {rank}: {found[3]}") if found[1] is None else KINDS[found[1]](found[2])
         told.__cause__, own = own, told
+    own = getattr(own, "as_it_is", own)
     own.on_all_ranks = True  # all of them raise: what follows may be collective
     error: Exception = own
     return error
 
 
-def users(name: str, call: Callable[[], T], instead: T) -> T:
+def users(name: str, call: Callable[[], T], instead: T, *, as_it_is: bool = False) -> T:
     """Return what a user's function returns. Where it raises, InputError says so with its name and line: at once, or in
-    a frame of several ranks at its end, and ``instead`` is returned."""
+    a frame of several ranks at its end, and ``instead`` is returned. ``as_it_is``: its own rank raises what it has
+    raised, and the other ranks alone that InputError."""
     try:
         return call()
     except Exception as error:
+        if as_it_is and not _OPEN:
+            raise
+        if as_it_is:
+            told: Any = _input_error(name, error)
+            told.as_it_is = error
+            _OPEN[-1].append(told)
+            return instead
         return kept_error(name, error, instead)
+
+
+def _input_error(name: str, error: Exception) -> ViContactError:
+    return error if isinstance(error, ViContactError) else InputError(ended(name, error))
 
 
 def kept_error(name: str, error: Exception, instead: T) -> T:
     """Raise what a user's function has raised, or keep it for the end of the frame and return ``instead``."""
-    told = error if isinstance(error, ViContactError) else InputError(ended(name, error))
+    told = _input_error(name, error)
     if not _OPEN:
         raise told from (None if told is error else error)
     _OPEN[-1].append(told)

@@ -202,7 +202,7 @@ class Session:
             for recorder in self.recorders:
                 name = f"the recorder {type(recorder).__name__} in step {state.k}, t = {state.t:.6g} s,"
                 call: Callable[[], Row] = partial(recorder.row, report)
-                row.update(users(name, call, nothing))
+                row.update(users(name, call, nothing, as_it_is=True))
             self.table.check(row)
             refuse_overflow(row)
         writer.append(row)

@@ -156,7 +156,7 @@ def _started(problem: ContactProblem, recorders: Sequence[Recorder], state: Stat
         for recorder in recorders:
             name = f"the recorder {type(recorder).__name__} at the start"
             call: Callable[[], Row] = partial(recorder.start, problem, state, resumed)
-            row |= users(name, call, nothing)
+            row |= users(name, call, nothing, as_it_is=True)
     with together(comm):
         for recorder in recorders:
             twice = sorted(set(columns) & set(recorder.columns()))
