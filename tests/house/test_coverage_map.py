@@ -88,6 +88,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "run/test_proximal.py": "laws.free_motions run.rigid_bodies",
     "run/test_restart_refused.py": "run.files.identity",
     "run/test_simulate.py": "core.version run.files.log",
+    "run/test_ranks_fail_together.py": "core.collective",
     "schemes/test_trapezoidal.py": "schemes.base",
     "soil/test_free_field.py": "soil.companion soil.upgoing_wave",
     "solvers/test_condensed_on_finite_elements.py": "core.condensation fem.copied_factor fem.petsc_rows",

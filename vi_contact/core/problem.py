@@ -10,12 +10,13 @@ import numpy as np
 
 from .algebra import Array
 from .checks import array, instance, optional, provides, refuse, shown
+from .collective import Parts, agree
 from .corners import refuse_rubbing
 from .errors import InputError
 from .protocols import EXCITATION, Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
 from .stages import stage
 from .surfaces import ContactSurface
-from .system import Load, SemiDiscreteSystem
+from .system import Load, SemiDiscreteSystem, history_value
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,9 @@ class ContactProblem:
     mass: MassLaw | None = None
 
     def __post_init__(self) -> None:
+        laws = {name: Parts(getattr(self, name)) for name in ("friction", "impact", "mass")}
+        if isinstance(self.surface, ContactSurface):
+            agree(self.surface.comm, "ContactProblem", laws | {"excitation": self.excitation})
         check_parts(self)
         total, slots = self.surface.total, self.surface.slots
         own = with_values(self.friction, self.surface, lambda v: tuple(v[i] for i in slots) if len(v) == total else v)
@@ -124,7 +128,7 @@ class ContactProblem:
         """Return the vector a_g(t) [m/s²] summed over the excitations."""
         found = [0.0] * self.system.influence.shape[1]
         for one in self.excitations:
-            a = float(one.acceleration(t))
+            a = float(history_value(one.acceleration, t))
             found = [so_far + a * way for so_far, way in zip(found, one.direction, strict=True)]
         return np.array(found)
 

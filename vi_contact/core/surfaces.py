@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from .algebra import Array, Comm, Indices, Mask, Matrix, SerialComm, largest, on_first, total
 from .census import Census
 from .checks import function, number, shown
+from .collective import users
 from .contact_last import at
 from .errors import InputError
 from .products import frozen
@@ -230,7 +231,13 @@ class ContactSurface:
 
         def spread(name: str, way: Motion, shape: tuple[int, ...]) -> Callable[[float], Array]:
             function("moving", name, way, "give a function of the time t [s] that returns metres")
-            return lambda t: _spread(name, way(t), shape, t)
+            place = f"a moving obstacle: {name}"
+
+            def moved(t: float) -> Array:
+                return users(f"{place}({t:g} s)", lambda: _spread(name, way(t), shape, t), np.zeros(shape))
+
+            moved.given = way  # type: ignore[attr-defined]  # what is asked for its frequency
+            return moved
 
         watched = tuple(one.before_moving(towards) for one in self.watched)
         return replace(self, watched=watched,

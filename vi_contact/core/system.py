@@ -8,6 +8,7 @@ import numpy as np
 
 from .algebra import Algebra, Array, EffectiveMatrix, Mask, Matrix
 from .checks import array, function, instance, provides, several, shown
+from .collective import kept_error
 from .errors import InputError
 from .products import Remembered
 
@@ -105,12 +106,15 @@ class Load:
 
 def history_value(history: Callable[[float], float], t: float) -> float:
     """Return the value of a history; NaN and infinity are told of the load as a whole."""
-    value = history(t)
+    try:
+        value = history(t)
+    except Exception as error:  # of one rank alone, perhaps
+        return kept_error(f"the history of a load or excitation at t = {t:g} s", error, 0.0)
     if isinstance(value, float):
         return value
     if np.ndim(value) or np.asarray(value).dtype.kind not in "iuf":
         what = f"the history of a load or excitation is {shown(value)} at t = {t:g} s"
-        raise InputError(f"{what}: return one real number")
+        return kept_error(what, InputError(f"{what}: return one real number"), 0.0)
     return value
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from .algebra import Array, max_abs
 from .certificate import Certificate
+from .collective import limit_of
 from .compiled import already
 from .contact_last import at
 from .problem import ContactProblem
@@ -110,7 +111,7 @@ def _friction_residuals(step: StepProblem, result: StepResult, x_ref: float, r_r
     surface = step.surface
     r_t = np.zeros_like(step.slip0) if result.r_t is None else result.r_t
     slip = surface.tangential_values(result.x) - step.slip0
-    limit = step.friction_at(slip).limit(result.r_n, surface.weights, step.scale)
+    limit = limit_of(step.friction_at(slip), result.r_n, surface.weights, step.scale)
     size, way = np.linalg.norm(r_t, axis=1), np.linalg.norm(slip, axis=1)
     missing, beyond = limit * way - np.sum(r_t * slip, axis=1), np.maximum(size - limit, 0.0)
     limit_max, size_max, way_max, outside, lost = _maxima(step, limit, size, way, beyond, missing)

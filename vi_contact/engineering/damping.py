@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.algebra import Array, total
+from ..core.algebra import Array, Mask, total
 from ..core.checks import shown
 from ..core.problem import ContactProblem
 from ..core.system import SemiDiscreteSystem
@@ -67,11 +67,30 @@ def damping_in_words(problem: ContactProblem, *, unknown: str = "") -> str:
     return f"{law}; {unknown}" if unknown else law
 
 
-def _found(problem: ContactProblem) -> FirstModes:
-    # The system in the nodal frames, without excitation; closed conditions become supports or springs.
-    system, surface, space = problem.static_load, problem.surface, problem.system.space
-    size: float = getattr(space, "size", 0.0)  # of the bodies [m]
-    closed = (surface.gap0 <= TOUCHING * size) | surface.bilateral
+def first_open_period(problem: ContactProblem) -> float | None:
+    """Return the first natural period [s] with the contact open; None where none of it touches at the start.
+
+    A body that has lifted off may swing faster than with its contact closed. Collective."""
+    surface = problem.surface
+    if not surface.some(_closed_at_start(problem) & ~surface.bilateral):
+        return None
+    algebra, K, M, _, most = _matrices(problem, surface.bilateral)
+    frequencies, _, _ = natural_modes(algebra, K, M, rigid=most)
+    return float(1.0 / frequencies[0]) if len(frequencies) else None
+
+
+def _closed_at_start(problem: ContactProblem) -> Mask:
+    """Return which conditions (m,) are held, or have no gap at the start."""
+    surface = problem.surface
+    size: float = getattr(problem.system.space, "size", 0.0)  # of the bodies [m]
+    return np.asarray((surface.gap0 <= TOUCHING * size) | surface.bilateral)
+
+
+def _matrices(problem: ContactProblem, closed: Mask) -> tuple[Any, Any, Any, Mask, int]:
+    """Return (algebra, K, M, which unknowns are free, rigid motions at most) with these conditions (m,) closed.
+
+    The system is that of the nodal frames, without excitation; closed conditions become supports or springs."""
+    system, surface = problem.static_load, problem.surface
     held, springs = np.zeros((2, system.rows))
     rigid = closed & surface.rigid
     held[surface.owned[rigid]] = 1.0
@@ -81,6 +100,12 @@ def _found(problem: ContactProblem) -> FirstModes:
     K = algebra.combine([(1.0, system.K), (1.0, algebra.local(every, every, springs, system.rows))])
     K, M = (algebra.block(one, free) for one in (K, system.M))
     most = sum(body.motions.shape[1] for body in free_motions(problem.system))
+    return algebra, K, M, free, most
+
+
+def _found(problem: ContactProblem) -> FirstModes:
+    system = problem.static_load
+    algebra, K, M, free, most = _matrices(problem, _closed_at_start(problem))
     frequencies, modes, rigid_motions = natural_modes(algebra, K, M, rigid=most)
     # The share of each mode in C: phiᵀ C phi / (2 w phiᵀ M phi).
     ratios = np.zeros(len(frequencies))

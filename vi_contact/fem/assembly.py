@@ -13,13 +13,14 @@ import numpy as np
 import ufl
 
 from ..core.algebra import Array, from_each
+from ..core.collective import Parts, agree
 from ..core.stages import stage
 from ..core.system import Load, SemiDiscreteSystem
 from ..laws.free_motions import floating
 from ..laws.materials import Damping, Section
 from . import compat
 from .assembly_checks import check_body, check_boundaries, check_initial, check_ratios
-from .communicators import give_back
+from .communicators import MpiComm, give_back
 from .compact import algebra_for
 from .dashpots import DashpotMatrix, Dashpots, describe_boundaries
 from .dirichlet import refuse_contradictions, taken, taken_space
@@ -76,6 +77,13 @@ def assemble(mesh: Any, material: Materials | None = None, *, forms: Forms | Non
         InputError: cells without a material, of an order that does not fit the degree, or folded; NaN in data,
             components that do not exist, a damping law that damps nothing, ratios xi that no law reads, dashpots on
             held facets, groups without facets or cells, of another mesh or kind, contradictions."""
+    if hasattr(mesh, "comm"):
+        agree(MpiComm(mesh.comm), "assemble", {
+            "material": material, "forms": Parts(forms), "section": section, "clamped": as_tuple(clamped),
+            "prescribed": as_tuple(prescribed), "tied": as_tuple(tied), "dashpots": as_tuple(dashpots),
+            "loads": as_tuple(loads), "damping": damping, "initial_displacement": initial_displacement,
+            "initial_velocity": initial_velocity, "base_inertia": base_inertia, "degree": degree,
+            "quadrature_degree": quadrature_degree, "integration": integration})
     V, degree = taken_space(mesh, space, as_tuple(bcs), degree)
     section, damping = check_body(mesh, material, forms, section, damping, base_inertia, degree, integration)
     held, moved, boundaries = as_tuple(clamped), as_tuple(prescribed), as_tuple(dashpots)

@@ -15,6 +15,7 @@ from dolfinx.mesh import Mesh
 from mpi4py import MPI
 
 from vi_contact.core.checks import ended, function, instance, mask, provides, refuse, shown, whole
+from vi_contact.core.collective import Parts, agree
 from vi_contact.core.errors import InputError
 from vi_contact.core.files import on_root
 from vi_contact.core.stages import stage
@@ -162,6 +163,8 @@ def build_mesh(mesh: MeshScript, comm: MPI.Comm) -> tuple[Mesh, Tags]:
     """Build a mesh without a file from a script of ``vi_contact.meshes``, or from any object with `build(gmsh)`.
 
     It raises the errors of `read_mesh`. Collective."""
+    if isinstance(comm, MPI.Comm):
+        agree(MpiComm(comm), "build_mesh", {"mesh": Parts(mesh)})
     provides("build_mesh", "mesh", mesh, ("build",), "give a script of vi_contact.meshes, BlockMesh(…) for example")
     return _distribute(comm, lambda: arrays_from_script(mesh))
 

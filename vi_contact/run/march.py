@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 
 from ..core.algebra import EffectiveMatrix
+from ..core.collective import together, together_if_own, users
 from ..core.problem import ContactProblem
 from ..core.products import frozen
 from ..core.protocols import Impact
@@ -31,7 +32,8 @@ def march(problem: ContactProblem, *, scheme: Scheme | None = None, solver: Solv
     InputError is raised at the call: arguments of the wrong kind, a state of another problem or inside the obstacle."""
     method = checked_method("march", problem, scheme, (solver, escalation), dt, steps=steps, t_end=t_end, state=state,
                             tolerance=tolerance)
-    state = initial_state(method.problem) if state is None else state
+    with together(method.problem.surface.comm):
+        state = initial_state(method.problem) if state is None else state
     return iter(March(method, step_plan(dt, steps, t_end, state.t), state))
 
 
@@ -70,15 +72,25 @@ class March:
 
     def _restarted(self, dt: float) -> State:
         """The state, with a past for this dt."""
+        if dt == self.dt:
+            return self.state
         method = self.method
-        return self.state if dt == self.dt else method.scheme.start(method.problem, self.state, dt)
+        with together(method.problem.surface.comm):  # it may ask for loads, which are the user's
+            return method.scheme.start(method.problem, self.state, dt)
 
     def _attempt(self, dt: float, *, final: bool) -> Report | None:
-        """A step of dt; None when it closes a point and is to be halved: nothing has happened then."""
+        """A step of dt; None when it closes a point and is to be halved: nothing has happened then.
+
+        Its loads, motions and laws are the user's, and may fail on one rank: all ranks are asked once, at its end."""
+        with together(self.method.problem.surface.comm):
+            return self._attempted(dt, final=final)
+
+    def _attempted(self, dt: float, *, final: bool) -> Report | None:
         problem, scheme, state = self.method.problem, self.method.scheme, self._restarted(dt)
         A, solver = self.prepared.get(dt, (None, None))
-        A = scheme.effective_matrix(problem, dt) if A is None else A
-        step = scheme.step(problem, state, A, dt)
+        with together_if_own(problem.surface.comm, scheme):
+            A = scheme.effective_matrix(problem, dt) if A is None else A
+            step = scheme.step(problem, state, A, dt)
         if solver is None:
             solver = CertifiedSolver(problem, A, step.scale, self.method.solvers, self.method.tolerance)
             self.prepared[dt] = A, solver
@@ -87,8 +99,10 @@ class March:
         result, certificate, escalated = solver.solve(step)
         if not final and problem.surface.some(result.active & ~state.active):
             return None
-        free = scheme.finish(problem, state, step, result, dt)
-        new = after_impact(problem, scheme, state, free, dt)
+        with together_if_own(problem.surface.comm, scheme):
+            free = scheme.finish(problem, state, step, result, dt)
+        with together_if_own(problem.surface.comm, problem.impact or scheme):
+            new = after_impact(problem, scheme, state, free, dt)
         for vector in (free.u, free.v, new.u, new.v):
             frozen(vector)  # what is known of them stays true
         averages = partial(scheme.balance, problem, state, free, dt)
@@ -104,7 +118,7 @@ def after_impact(problem: ContactProblem, scheme: Scheme, old: State, new: State
     if not surface.some(active):
         return new
     impact = Impact(surface.normal_values(old.v), surface.normal_values(new.v), active, active & ~old.active)
-    target = law.target(impact)
+    target = users(f"the impact law {type(law).__name__}", lambda: law.target(impact), np.full(surface.count, np.nan))
     if not surface.some(~np.isnan(target)):
         return new
     return scheme.jump(problem, new, law.apply(problem.equations, surface, new.v, target), dt)

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..core.algebra import from_each, max_abs
 from ..core.checks import at, provides, real, several, shown
+from ..core.collective import Parts, agree, together
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.state_checks import check_problem_given, check_sizes, start_time
@@ -44,17 +45,22 @@ def checked_method(owner: str, problem: ContactProblem, scheme: Scheme | None,
     """Return the method with its defaults; ``solvers``: the first one, None for Automatic(), and the escalation.
 
     InputError for arguments of the wrong kind, and a state of another problem or inside the obstacle. Collective."""
+    check_problem_given(owner, problem)
+    comm = problem.surface.comm
+    agree(comm, owner, {"scheme": scheme, "solver": solvers[0], "escalation": solvers[1], "dt": dt, "steps": steps,
+                        "t_end": t_end, "state": Parts(state), "tolerance": tolerance})
     check_methods(owner, *solvers, tolerance)
     problem, scheme = with_defaults(problem, scheme)
     first, others = solvers
     method = Method(problem, scheme, [Automatic() if first is None else first, *others], dt, tolerance)
     size = step_plan(dt, steps, t_end, start_time(owner, state)).dt(0)
-    method.bind()
-    problem.equations.forget_loads()
-    scheme.check(problem)
-    method.solvers[0].check(problem)
-    if state is not None:
-        check_state(owner, problem, state, dt=size, tolerance=tolerance, scheme=scheme)
+    with together(comm):  # what is the user's own may fail on one rank
+        method.bind()
+        problem.equations.forget_loads()
+        scheme.check(problem)
+        method.solvers[0].check(problem)
+        if state is not None:
+            check_state(owner, problem, state, dt=size, tolerance=tolerance, scheme=scheme)
     return method
 
 

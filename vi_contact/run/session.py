@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 from signal import Signals
 from timeit import repeat
 from typing import Any, Protocol, TypeVar
@@ -15,9 +15,10 @@ import numpy as np
 
 from ..core.algebra import Comm, largest
 from ..core.checks import on_all
+from ..core.collective import together, users
 from ..core.errors import InputError, Interrupted, OutOfTime
 from ..core.stages import done
-from ..core.step import Recorder, Report, State, StepResult
+from ..core.step import Recorder, Report, Row, State, StepResult
 from ..engineering.damping import NOT_COMPUTED, damping_in_words
 from .files.checkpoint import RestartPoint
 from .files.identity import identity
@@ -28,7 +29,8 @@ from .march import March
 from .memory import in_words, memory
 from .method import Method
 from .recorders import refuse_overflow
-from .solution import Solution, energy_warning, sampling_warning
+from .sampling import sampling_warning
+from .solution import Solution, energy_warning
 from .stop_signals import StopSignals
 from .time_steps import StepPlan, described, pieces_of
 from .wall_time import WallTime
@@ -94,7 +96,7 @@ class Session:
                 "dt": described(method.dt), "tolerance": method.tolerance, "ranks": self._comm.size,
                 "unknowns": problem.system.space.unknowns, "contact_points": problem.surface.total,
                 "boundaries": list(problem.system.notes), "damping": damping_in_words(problem, unknown=NOT_COMPUTED),
-                "sampling": sampling_warning(problem.excitations, max(pieces_of(method.dt))[0]) or ""}
+                "sampling": sampling_warning(problem, max(pieces_of(method.dt))[0]) or ""}
 
     @property
     def left(self) -> int:
@@ -120,7 +122,9 @@ class Session:
         except BaseException as error:  # whatever ends a run, what it has is saved; the error is raised again
             interrupted = isinstance(error, KeyboardInterrupt | GeneratorExit)
             reason = str(error) or ENDED.get(type(error), type(error).__name__)
-            self._rescue(writer, "interrupted" if interrupted else "failed", reason, time.perf_counter() - begin)
+            told = getattr(error, "on_all_ranks", False)
+            status = "interrupted" if interrupted else "failed"
+            self._rescue(writer, status, reason, time.perf_counter() - begin, all_ranks=told)
             if isinstance(error, Interrupted):  # on all ranks: none ends before the first has written
                 self._comm.bcast(None)
             raise
@@ -197,10 +201,14 @@ class Session:
         if report.escalated and self.root:
             log.warning("step %d, t = %.6g s: escalated to %s", state.k, state.t, report.result.method)
         row: dict[str, Any] = {}
-        for recorder in self.recorders:
-            row.update(recorder.row(report))
-        self.table.check(row)
-        refuse_overflow(row)
+        nothing: Row = {}
+        with together(self._comm):  # one of the user's may fail on one rank, or record what does not fit there
+            for recorder in self.recorders:
+                name = f"the recorder {type(recorder).__name__} in step {state.k}, t = {state.t:.6g} s,"
+                call: Callable[[], Row] = partial(recorder.row, report)
+                row.update(users(name, call, nothing, as_it_is=True))
+            self.table.check(row)
+            refuse_overflow(row)
         writer.append(row)
         self.last = report
 
@@ -218,15 +226,18 @@ class Session:
     def _about(self) -> dict[str, Any]:
         """What the run is of, for its checkpoints. Collective."""
         method, start, end = self.method, self.place.t_start, self.place.t_start + self.step_plan.length
-        return {"run": identity(method.problem, method.scheme, method.dt, start=start, end=end), "span": (start, end)}
+        with together(self._comm):  # histories of the user's are asked at other times than those of steps
+            known = identity(method.problem, method.scheme, method.dt, start=start, end=end)
+        return {"run": known, "span": (start, end)}
 
-    def _rescue(self, writer: Writer, status: str, reason: str, seconds: float) -> None:
-        """Save what there is. A checkpoint of the last base step only on one rank: others might not come."""
+    def _rescue(self, writer: Writer, status: str, reason: str, seconds: float, *, all_ranks: bool) -> None:
+        """Save what there is. A checkpoint of the last base step only on one rank, or where ``all_ranks`` raise the
+        same error: others might not come."""
         # Of any kind: the error that ended the run is the one to tell, and it may keep each of these from working.
         with suppress(Exception):
             writer.flush(alone=True)
         with suppress(Exception):
-            if self._comm.size == 1:
+            if self._comm.size == 1 or all_ranks:
                 self._checkpoint(writer)
         facts: dict[str, Any] = {"status": status, "reason": reason, "steps": self.place.state.k}
         with suppress(Exception):

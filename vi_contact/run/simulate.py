@@ -3,16 +3,18 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ..core.algebra import Comm
 from ..core.arguments import check
 from ..core.checks import flag, function, optional, provides, several, whole
+from ..core.collective import Parts, agree, together, users
 from ..core.errors import InputError
 from ..core.files import on_root
 from ..core.problem import ContactProblem
-from ..core.state_checks import initial_state
+from ..core.state_checks import check_problem_given, initial_state
 from ..core.step import Columns, Recorder, Report, Row, Scheme, Solver, State
 from ..solvers.certified import TOLERANCE
 from .files.checkpoint import RestartPoint, read_checkpoint
@@ -80,6 +82,13 @@ def opened(problem: ContactProblem, scheme: Scheme | None, solver: Solver | None
            others: Sequence[ContactProblem] = (), runs: int = 1) -> Iterator[tuple[Session, Writer]]:
     """Check the arguments of ``simulate`` and set a run up, in its locked folder. ``others``: problems that lend their
     matrices and factors to it, if they are its own. ``runs``: how many take turns. Collective."""
+    check_problem_given("simulate", problem)
+    comm = problem.system.algebra.comm
+    agree(comm, "simulate", {
+        "scheme": scheme, "solver": solver, "dt": dt, "t_end": t_end, "steps": steps, "record": _kinds(record),
+        "out": None if out is None else str(out), "state": Parts(state), "escalation": escalation,
+        "tolerance": tolerance, "checkpoint_every": checkpoint_every, "restart": restart, "changed": changed,
+        "fields": fields, "cross_check": cross_check, "wall_time": wall_time, "callback": callback})
     _check_outputs(record, out, restart, checkpoint_every, (progress, changed), fields, cross_check)
     optional(function, "simulate", "callback", callback, "give a function of a state and a report, or None")
     if wall_time is not None and out is None:
@@ -91,17 +100,18 @@ def opened(problem: ContactProblem, scheme: Scheme | None, solver: Solver | None
     problem, scheme = with_defaults(problem, scheme, others)
     method = checked_method("simulate", problem, scheme, (solver, escalation), dt, steps=steps, t_end=t_end,
                             state=state, tolerance=tolerance)
-    comm = problem.system.algebra.comm
     source = _source(restart, folder := None if out is None else run_folder(comm, out))
     recorders: list[Recorder] = [Steps(), *((Energy(), Contact()) if record is None else record)]
     with locked(comm, folder):
         if source is None:
-            begin = initial_state(method.problem) if state is None else state
+            with together(comm):
+                begin = initial_state(method.problem) if state is None else state
             place, checksum = RestartPoint(begin, begin.t, begin.k), ""
         else:
             place, checksum = read_checkpoint(source, method.problem, scheme=method.scheme, dt=dt, changed=changed)
         plan = step_plan(dt, steps, t_end, place.t_start)
-        place = replace(place, state=method.scheme.start(problem, place.state, plan.dt(place.base)))
+        with together(comm):
+            place = replace(place, state=method.scheme.start(problem, place.state, plan.dt(place.base)))
         table = Table(*_started(problem, recorders, place.state), None if folder is None else folder / HISTORY_H5, comm)
         stored = None if source is None else StoredRows(source, table, place.state.k, checksum)
         if stored is not None:
@@ -143,14 +153,30 @@ def _started(problem: ContactProblem, recorders: Sequence[Recorder], state: Stat
              resumed: Mapping[str, Any] | None = None) -> tuple[Columns, Row]:
     """Start the recorders: their columns, and the row of the state. InputError when two record the same column."""
     row: dict[str, Any] = {}
+    nothing: Row = {}
     columns: dict[str, tuple[str, str]] = {}
-    for recorder in recorders:
-        row |= recorder.start(problem, state, resumed)
-        twice = sorted(set(columns) & set(recorder.columns()))
-        if twice:
-            raise InputError(f"two recorders have the column '{twice[0]}': leave one of them out")
-        columns |= recorder.columns()
+    comm = problem.system.algebra.comm
+    with together(comm):  # a recorder of the user's may fail on one rank
+        for recorder in recorders:
+            name = f"the recorder {type(recorder).__name__} at the start"
+            call: Callable[[], Row] = partial(recorder.start, problem, state, resumed)
+            row |= users(name, call, nothing, as_it_is=True)
+    with together(comm):
+        for recorder in recorders:
+            twice = sorted(set(columns) & set(recorder.columns()))
+            if twice:
+                raise InputError(f"two recorders have the column '{twice[0]}': leave one of them out")
+            columns |= recorder.columns()
+    agree(comm, "simulate", {"the list of recorded columns": list(columns)})
     return columns, row
+
+
+def _kinds(record: Any) -> Any:
+    """What is compared over ranks of recorders: kinds, and settings of those of the package, as each rank may hold its
+    part of what is recorded."""
+    if not isinstance(record, list | tuple):
+        return record
+    return [Parts(one) if type(one).__module__.startswith("vi_contact.") else type(one) for one in record]
 
 
 def _restored(table: Table, stored: StoredRows, comm: Comm) -> Row:

@@ -2,7 +2,7 @@
 
 import tomllib
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 from importlib import import_module
@@ -16,9 +16,7 @@ import numpy as np
 from ..core.algebra import Array
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
-from ..core.protocols import Excitation
 from ..core.step import Columns, State
-from ..ground_motion.excitation import GroundMotion
 from .files.table import LEDGER
 
 _LINES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
@@ -85,16 +83,6 @@ def energy_warning(facts: Mapping[str, Any]) -> str | None:
     return (f"contact and time scheme created {100 * facts['energy_created']:.3g} % of the largest energy of the run: "
             "take a smaller dt (a wave should not cross more than two elements in a step) or, without impact law, "
             "ContactStabilisedNewmark(), which creates none; HHT() and HalvedAtImpact do not cure it")
-
-
-def sampling_warning(excitations: Sequence[Excitation], dt: float) -> str | None:
-    """Return a sentence when a time step [s] is longer than that of a record, whose peaks it then misses."""
-    finest = min((one.record.dt for one in excitations if isinstance(one, GroundMotion)), default=dt)
-    if dt <= finest * (1.0 + 1e-6):
-        return None
-    return (f"the time step of {dt:g} s is longer than the {finest:g} s of the record, whose peaks fall between the "
-            "steps: take a shorter dt, or give resampled(record, dt), which filters out frequencies that dt cannot "
-            "represent")
 
 
 def _entries(facts: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -18,6 +18,7 @@ import numpy as np
 
 from ..core.algebra import EffectiveMatrix, from_each, largest, max_abs
 from ..core.checks import at, number, real, shown
+from ..core.collective import Parts, agree, together
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.state_checks import check_problem_given, check_sizes, initial_state
@@ -47,9 +48,13 @@ def static_equilibrium(problem: ContactProblem, *, solver: Solver | None = None,
         StepFailure: no answer has a certificate below the tolerance."""
     owner = "static_equilibrium"
     check_problem_given(owner, problem)
+    agree(problem.surface.comm, owner, {"solver": solver, "t": t, "tolerance": tolerance})
     check_methods(owner, solver, (), tolerance)
     t = number(owner, "t", t, unit="s")
-    state = Equilibria(problem, solver=solver, tolerance=tolerance).after(initial_state(problem, t), t)
+    equilibria = Equilibria(problem, solver=solver, tolerance=tolerance)
+    with together(problem.surface.comm):
+        start = initial_state(problem, t)
+    state = equilibria.after(start, t)
     _warn_if_open(problem, state)
     return state
 
@@ -92,12 +97,13 @@ class Equilibria:
     def after(self, old: State, t: float) -> State:
         """Return the equilibrium at time t of a body that rubs and slides from where ``old`` was; its number too."""
         problem = self._problem
-        problem.surface.refuse_driven(t)
-        step = StepProblem(A=self._K, b=problem.static_load.load.at_rest(t), bound=problem.surface.gap(t), scale=1.0,
-                           surface=problem.surface, guess=old.u, active=old.active, t=t, k=old.k,
-                           friction=problem.friction, slip0=problem.slip_origin(old.u, old.t, t))
-        refuse_nan(step, lambda: problem.static_load)
-        result = self._solve(step)
+        with together(problem.surface.comm):  # loads, motions and laws of the user's may fail on one rank
+            problem.surface.refuse_driven(t)
+            step = StepProblem(A=self._K, b=problem.static_load.load.at_rest(t), bound=problem.surface.gap(t),
+                               scale=1.0, surface=problem.surface, guess=old.u, active=old.active, t=t, k=old.k,
+                               friction=problem.friction, slip0=problem.slip_origin(old.u, old.t, t))
+            refuse_nan(step, lambda: problem.static_load)
+            result = self._solve(step)
         return State(t, old.k, result.x, np.zeros_like(old.u), result.r_n, result.active, r_t=result.r_t)
 
 
@@ -119,12 +125,17 @@ def quasi_static(problem: ContactProblem, times: Iterable[float], *, solver: Sol
             which nothing stops.
         StepFailure: no answer below the certificate tolerance."""
     check_problem_given("quasi_static", problem)
+    if isinstance(times, Iterable) and not isinstance(times, str | bytes):
+        times = list(times)
+    agree(problem.surface.comm, "quasi_static",
+          {"times": times, "solver": solver, "state": Parts(state), "tolerance": tolerance})
     check_methods("quasi_static", solver, (), tolerance)
     if problem.friction.at(np.zeros(problem.surface.count)) is not problem.friction:
         raise InputError(f"load steps have no slip rate for {problem.friction}: use Coulomb with the coefficient of "
                          "slow sliding, or compute the history in time by march")
     if state is None:
-        state = initial_state(problem)
+        with together(problem.surface.comm):
+            state = initial_state(problem)
     else:
         check_sizes("quasi_static", problem, state)
     order = _checked(times, state.t)

@@ -10,6 +10,7 @@ import numpy as np
 from ..core.algebra import EffectiveMatrix
 from ..core.certificate import Certificate
 from ..core.checks import on_all
+from ..core.collective import together_if_own
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
 from ..core.products import frozen
@@ -58,7 +59,8 @@ class CertifiedSolver:
         tried = []
         for rank in range(len(self._solvers)):
             try:
-                result = self._get(rank).solve(step)
+                with together_if_own(self._surface.comm, self._solvers[rank]):
+                    result = self._get(rank).solve(step)
             except StepFailure as failure:
                 tried.append(str(failure))
                 continue

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..core.algebra import Array
 from ..core.certificate import Certificate
+from ..core.collective import limit_of
 from ..core.errors import StepFailure
 from ..core.products import frozen
 from ..core.protocols import FrictionLaw
@@ -82,7 +83,7 @@ def kept(step: StepProblem, answer: StepResult, share: float) -> tuple[Array, Ar
     if answer.r_t is None or step.slip0 is None:
         return (1.0 - share) * r_n, None
     law = step.friction_at(surface.tangential_values(answer.x) - step.slip0)
-    limit, size = law.limit(r_n, surface.weights, step.scale), np.linalg.norm(answer.r_t, axis=1)
+    limit, size = limit_of(law, r_n, surface.weights, step.scale), np.linalg.norm(answer.r_t, axis=1)
     onto = np.divide(limit, size, out=np.ones_like(size), where=size > (1.0 - share) * limit)
     return (1.0 - share) * r_n, (1.0 - share) * onto[:, None] * answer.r_t
 

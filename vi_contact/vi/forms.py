@@ -246,3 +246,8 @@ class Problem:
         except (TypeError, ValueError):
             raise refused(f"{name} is {shown(given)}; give a Function on u.function_space itself, a number (or "
                           f"{width}, one for a component), or None") from None
+
+
+def given_alike(bound: Any) -> Any:
+    """Return what of a bound all ranks give alike: numbers and the value of a Constant; of a Function the kind."""
+    return bound.value if isinstance(bound, compat.fem.Constant) else bound

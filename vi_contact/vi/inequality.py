@@ -15,12 +15,14 @@ import numpy as np
 from ..core.algebra import total
 from ..core.certificate import Certificate
 from ..core.checks import instance, shown, whole
+from ..core.collective import agree
 from ..core.errors import StepFailure
 from ..fem import compat
+from ..fem.communicators import MpiComm, kept
 from ..fem.form_checks import refuse_complex
 from ..solvers.volume.options import OptionLayers
 from ..solvers.volume.route import Method, TaoTron, Volume
-from .forms import Problem, refused
+from .forms import Problem, given_alike, refused
 from .judged import Judged
 from .linear_steps import is_symmetric
 from .minimum import minimise
@@ -94,6 +96,10 @@ def solve(form: Any = None, u: Any = None, *, energy: Any = None, lower: Any = N
     if not compat.nodal(u.function_space):
         raise refused("the unknowns of u are not values of one field at points: take Lagrange or DG0, not mixed")
     refuse_choices(form, energy, J, method)
+    agree(MpiComm(kept(u.function_space.mesh.comm)), "vi.solve", {
+        "lower": given_alike(lower), "upper": given_alike(upper), "J": J is None, "energy": energy is None, "method": method,
+        "number of bcs": len(bcs) if isinstance(bcs, list | tuple) else bcs, "petsc_options": petsc_options,
+        "prefix": prefix, "tolerance": tolerance, "iterations": iterations})
     settings = Volume(method or TaoTron(), {} if petsc_options is None else petsc_options, prefix, tolerance)
 
     problem = Problem(form, u, bcs, J, energy)

@@ -12,6 +12,7 @@ from typing import Any, Self, cast
 import numpy as np
 
 from ...core.algebra import Array, Comm, Indices, Mask, from_each, largest
+from ...core.collective import together
 
 
 class Rows:
@@ -66,5 +67,7 @@ def asked(comm: Comm, slots: Indices, ask: Callable[..., tuple[Any, ...]], *valu
         return answer
     parts = from_each(comm, (slots, *values))
     order = np.argsort(np.concatenate([part[0] for part in parts]))
-    whole = ask(*(np.concatenate([part[i] for part in parts])[order] for i in range(1, 1 + len(values))))
+    rows = [np.concatenate([part[i] for part in parts])[order] for i in range(1, 1 + len(values))]
+    with together(comm):  # a function that depends on the rank may fail on one, and not on the others
+        whole = ask(*rows)
     return tuple(one[slots] for one in whole)

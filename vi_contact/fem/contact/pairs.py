@@ -18,6 +18,7 @@ import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask
 from ...core.checks import at, flag, optional, provides
+from ...core.collective import together
 from ...core.corners import FEATURE_ANGLE
 from ...core.errors import InputError
 from ...core.stages import stage
@@ -72,7 +73,8 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
         InputError: nodes that only glue two bodies together, sides that do not pair or do not face each other, bodies
             that overlap, sides of one and the same
             boundary, contact directions that are partly prescribed, clamped nodes that face free ones."""
-    space = contact_space("contact_pair", system, {"facets1": facets1, "facets2": facets2}, points)
+    space = contact_space("contact_pair", system, {"facets1": facets1, "facets2": facets2}, points, matching=matching,
+                          feature_angle=feature_angle)
     optional(provides, "contact_pair", "matching", matching, ("match",), "give NodeToNode() or DualMortar(), or None")
     angle = checked_angle("contact_pair", feature_angle)
     flag("contact_pair", "hinges", hinges)
@@ -90,7 +92,8 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
     tied = one.nodes.numbers[one.tied >= 0]
     around = boundary(space, facets1, beyond=angle)
     faces = _faces(space, one, boundary(space, facets1) if len(around.vertices) else around, angle)
-    nodes, matched = _by_face(faces, two, NodeToNode() if matching is None else matching, space.size)
+    with together(space.comm):  # a matching of the user's may fail on one rank
+        nodes, matched = _by_face(faces, two, NodeToNode() if matching is None else matching, space.size)
     opposite = np.concatenate([nodes.numbers, matched.carried])
     carried = np.setdiff1d(matched.carried, nodes.numbers)
     kept = ~np.isin(nodes.numbers, np.union1d(two.nodes.numbers, tied))

@@ -7,6 +7,7 @@ import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices
 from ...core.checks import array, instance, integers, optional, provides
+from ...core.collective import agree, together
 from ...core.errors import InputError
 from ...core.obstacles import Obstacle, admissible_gap, facing
 from ...core.surfaces import ContactSurface
@@ -40,6 +41,8 @@ def contact_points(system: SemiDiscreteSystem, nodes: Any, normals: Any, *, weig
     space = system.space
     if not isinstance(space, MatrixSpace):
         raise InputError(f"{OWNER} is for systems of own matrices; use fem.contact_surface(points=…) here")
+    agree(space.comm, OWNER, {"nodes": nodes, "normals": normals, "weights": weights, "gap0": gap0,
+                              "obstacle": obstacle, "opposite": opposite})
     optional(provides, OWNER, "obstacle", obstacle, ("directions", "gap"), "give HalfSpace(…) or another")
     if obstacle is not None and (gap0 is not None or opposite is not None):
         raise InputError(f"{OWNER}: the obstacle gives the gaps; leave out gap0 and opposite, or the obstacle")
@@ -56,11 +59,13 @@ def contact_points(system: SemiDiscreteSystem, nodes: Any, normals: Any, *, weig
     directions, faced = every.normals, None
     gap = _spread("gap0", 0.0 if gap0 is None else gap0, (m,), "metres")
     if obstacle is not None:
-        directions, gap = facing(obstacle, every.points, every.normals)
+        with together(space.comm):  # an obstacle of the user's may fail on one rank
+            directions, gap = facing(obstacle, every.points, every.normals)
     if opposite is not None:
         faced = _nodes(space, "opposite", integers(OWNER, "opposite", opposite, (m,)), -every.normals, area)
         gap = gap if gap0 is not None else np.sum((faced.points - every.points) * directions, axis=1)
-    gap = admissible_gap(gap, every.points, space.size)
+    with together(space.comm):
+        gap = admissible_gap(gap, every.points, space.size)
     own = np.flatnonzero(space.blocks_of(numbers) >= 0)
     pairs = None if faced is None else Facing(faced, sp.identity(m, format="csr")[own])
     part = NodalConditions(every.pick(own), snapped(directions)[own], own, pairs)

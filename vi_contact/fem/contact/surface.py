@@ -10,6 +10,7 @@ import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, from_each, largest, total
 from ...core.checks import array, at, flag, optional, provides, several
+from ...core.collective import agree
 from ...core.corners import FEATURE_ANGLE, PARALLEL, tangent_vectors
 from ...core.errors import InputError
 from ...core.obstacles import Obstacle, Touching, admissible_gap, facing
@@ -58,7 +59,8 @@ def contact_surface(system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obs
         InputError: no contact nodes, nodes that only glue two bodies together, a listed point that is clamped or not on
             the facets, a contact direction that is
             partly prescribed, initial penetration, a node with more faces than the body has dimensions."""
-    space = contact_space("contact_surface", system, {"facets": facets}, points)
+    space = contact_space("contact_surface", system, {"facets": facets}, points, obstacle=obstacle,
+                          feature_angle=feature_angle)
     optional(provides, "contact_surface", "obstacle", obstacle, ("directions", "gap"), "give HalfSpace(…) or another")
     angle = checked_angle("contact_surface", feature_angle)
     flag("contact_surface", "hinges", hinges)
@@ -209,9 +211,12 @@ def one_per_direction(whole: Nodes, nodes: Nodes, directions: Array, gap: Array)
     return replace(nodes, weights=weights).pick(kept), directions[kept], gap[kept]
 
 
-def contact_space(owner: str, system: SemiDiscreteSystem, groups: Mapping[str, Facets], points: Any) -> FemSpace:
-    """Return the space of a system; InputError for another kind, groups of another mesh, and a list of no points."""
+def contact_space(owner: str, system: SemiDiscreteSystem, groups: Mapping[str, Facets], points: Any,
+                  **others: Any) -> FemSpace:
+    """Return the space of a system; InputError for another kind, groups of another mesh, and a list of no points, and
+    where ranks give other ``groups``, ``points`` or ``others``. Collective."""
     space = space_of(owner, system)
+    agree(space.comm, owner, {**groups, "points": points, **others})
     for meaning, group in groups.items():
         facets_of(owner, meaning, group, space.mesh)
     for point in () if points is None else several(owner, "points", points, "give a list of points, or None"):

@@ -19,7 +19,7 @@ from ...core.matrix_checks import probe
 from ...core.problem import ContactProblem, with_values
 from ...core.step import Scheme
 from ...core.surfaces import ContactSurface
-from ...core.system import SemiDiscreteSystem
+from ...core.system import SemiDiscreteSystem, history_value
 from ..time_steps import TimeSteps, described, pieces_of
 
 ROUND_OFF = 1e-6  # of coordinates: SAME of it is a hundred times the last digit of a gap
@@ -112,7 +112,8 @@ def _loads(system: SemiDiscreteSystem, probes: Sequence[Array], early: Sequence[
     length = float(np.sqrt(system.algebra.dot(probes[0], probes[0])))
     found = [(system.algebra.dot(w, f), size * length) for f in forces for w in probes]
     for vector, history in system.load.separable:
-        found += [_dot(system, probes[0], vector), *_sampled(np.array([float(history(t)) for t in times]))]
+        values = np.array([float(history_value(history, t)) for t in times])
+        found += [_dot(system, probes[0], vector), *_sampled(values)]
     return found
 
 

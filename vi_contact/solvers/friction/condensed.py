@@ -15,6 +15,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ...core.algebra import Array, Mask
+from ...core.collective import limit_of, slope_of
 from ...core.condensation import Condensation
 from ...core.errors import ViContactError
 from ...core.products import frozen
@@ -50,7 +51,7 @@ class CondensedFriction:
         assert step.slip0 is not None
         none = np.zeros(surface.count)
         rest = step.friction_at(np.zeros_like(step.slip0))
-        cohesion, slope = rest.limit(none, surface.weights, step.scale), rest.slope(surface.weights)
+        cohesion, slope = limit_of(rest, none, surface.weights, step.scale), slope_of(rest, surface.weights)
         given = surface.everywhere(np.column_stack([step.bound, step.slip0, cohesion, slope, step.active]))
         places, (cohesion, slope, closed) = given[:, :-3], given[:, -3:].T
         q = places - free.reshape(places.shape)

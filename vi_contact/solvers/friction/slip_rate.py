@@ -18,6 +18,7 @@ import numpy as np
 
 from ...core.algebra import Array, max_abs
 from ...core.checks import attributes
+from ...core.collective import slope_of
 from ...core.errors import StepFailure
 from ...core.protocols import FrictionLaw
 from ...core.step import StepProblem
@@ -52,7 +53,7 @@ class RateIteration:
         while len(history) < self.max_iterations:
             found = solved(mu, found)
             spent += found.iterations
-            new = np.asarray(surface.everywhere(step.friction_at(slip(found)).slope(surface.weights)))
+            new = np.asarray(surface.everywhere(slope_of(step.friction_at(slip(found)), surface.weights)))
             size = max(max_abs(new), max_abs(mu))
             history.append(max_abs(new - mu) / size if size else 0.0)
             if history[-1] <= self.tolerance:

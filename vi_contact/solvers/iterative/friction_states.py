@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.algebra import Array, Indices, Mask
+from ...core.collective import limit_of, slope_of
 from ...core.step import StepProblem
 from ...core.surfaces import ContactSurface
 from .contact import Contact
@@ -183,4 +184,4 @@ class LawOfStep:
         step, none = self._step, np.zeros(self._step.surface.count)
         law = step.friction_at(slip)
         weights = step.surface.weights
-        return Limits(law.limit(none, weights, step.scale), law.slope(weights), none)
+        return Limits(limit_of(law, none, weights, step.scale), slope_of(law, weights), none)

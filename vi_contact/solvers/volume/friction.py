@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array, Mask, max_abs
+from ...core.collective import limit_of, slope_of
 from ...core.errors import StepFailure
 from ...core.step import StepProblem, StepResult
 from ...laws.friction import project
@@ -51,8 +52,8 @@ class VolumeFriction:
         """Return the step; StepFailure with PETSc's reason, or when the thresholds do not settle."""
         surface = self._body.surface
         rest = step.friction_at(np.zeros((surface.count, surface.tangents.shape[1])))
-        cohesion = rest.limit(np.zeros(surface.count), surface.weights, step.scale)
-        slope = surface.everywhere(rest.slope(surface.weights))
+        cohesion = limit_of(rest, np.zeros(surface.count), surface.weights, step.scale)
+        slope = surface.everywhere(slope_of(rest, surface.weights))
 
         def solved(mu: Array, before: Found | None) -> Found:
             return self._sequence(step, cohesion, mu[surface.slots], before)
@@ -108,7 +109,7 @@ class VolumeFriction:
         """x, with sticking points put exactly where they were, and r_t within the last digit of its disk."""
         surface, friction = self._body.surface, self._friction
         law = step.friction_at(friction.by_point(found.slip))
-        limit = law.limit(found.r_n, surface.weights, step.scale)
+        limit = limit_of(law, found.r_n, surface.weights, step.scale)
         x = found.state.z[: self._body.rows]
         stick = (found.slip == 0.0) & (limit > 0.0)[friction.point]
         x[friction.tangent[stick]] = friction.origin(step)[stick]

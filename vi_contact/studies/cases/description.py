@@ -13,13 +13,14 @@ from ...core.algebra import Array, Comm, largest, total
 from ...core.files import on_root, to_json, write_atomically
 from ...core.problem import ContactProblem
 from ...core.step import AXES
-from ...engineering.damping import NOT_COMPUTED, damping_in_words, first_modes
+from ...engineering.damping import NOT_COMPUTED, damping_in_words, first_modes, first_open_period
 from ...fem.mesh import Cells, Facets
 from ...fem.output.outline import cell_volumes, facets_with_cells, longest_edge, outline
 from ...fem.space import space_of
 from ...ground_motion.excitation import GroundMotion
 from ...ground_motion.record import Record
 from ...run.files.folder import MODEL
+from ...run.sampling import sampling_warning
 from .table_calls import Call, Group, build, nodes_in
 from .unread_choices import left_over
 from .vocabulary import Parts
@@ -42,7 +43,7 @@ def describe(case: Any, comm: Any, parts: Parts | None = None, *, most: int = 50
     supports (kind, groups, components); contact (name, points, size [m²], friction, nodes: a sentence, places, others:
     kind -> places, sides: name, h and G of both); periods, damping_ratios
     of their modes and rigid_motions with the contact closed where it touches at the start, and sticking where there is
-    friction; damping: in words, "none" without; waves
+    friction; periods_open, the first one with it open, where it touches; damping: in words, "none" without; waves
     (body, c_s, h: the longest edge over the degree, f_max = c_s / (8 h), dt_ratio = dt c_s / h); records (file, scale,
     dt, duration, pga, f_95: 95 % of its energy are below); run (dt, t_end, steps); outline (group, lines), on rank 0;
     defects and warnings: sentences.
@@ -67,6 +68,8 @@ def describe(case: Any, comm: Any, parts: Parts | None = None, *, most: int = 50
         "run": run, "outline": outline(space, tags, [cells for cells, _ in space.forms.materials]),
     } | _modes(case, problem, most)
     model |= {"defects": list(_defects(model)), "warnings": [*_warnings(model), *left_over(case.path, case.tables)]}
+    if not any(run["dt"] > one["dt"] * (1.0 + ROUNDED) for one in model["records"]):  # that is a defect
+        model["warnings"] += filter(None, [sampling_warning(problem, max(dt for dt, _ in plan.parts))])
     return dict(json.loads(to_json(model), parse_float=lambda text: float(f"{float(text):.{DIGITS}g}")))
 
 
@@ -185,6 +188,8 @@ def _modes(case: Any, problem: ContactProblem, most: int) -> dict[str, Any]:
     if few:
         modes = first_modes(problem)
         found = {"periods": list(modes.periods), "rigid_motions": modes.rigid_motions}
+        opened = first_open_period(problem)
+        found |= {} if opened is None else {"periods_open": [opened]}
         found["damping_ratios"] = [float(f"{one:.{RATIO_DIGITS}g}") for one in modes.ratios]
     if "strain_compatible" in case.nodes:  # the system has the damping of other cells only
         return {**found, "damping_ratios": [], "damping": WORDS["by_curves"]}
@@ -213,6 +218,8 @@ def _warnings(model: Mapping[str, Any]) -> Iterator[str]:
             yield WORDS["unlike"].format(one=sides[0], two=sides[1])
     if model["run"]["dt"] > next(iter(model.get("periods", ())), np.inf) / STEPS:
         yield WORDS["slow"].format(**model)
+    elif model["run"]["dt"] > next(iter(model.get("periods_open", ())), np.inf) / STEPS:
+        yield WORDS["slow_open"].format(**model)
 
 
 def write_model(comm: Comm, model: Mapping[str, Any], folder: Path) -> None:

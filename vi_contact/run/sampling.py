@@ -1,0 +1,105 @@
+"""Say when time steps are too long for what acts: a motion or a load that changes between the steps is not seen.
+
+A sine of frequency f is zero at every step if dt is a multiple of half its period 1/(2 f), whatever its amplitude; with
+fewer than ``FEWEST`` steps in a period the steps miss its peaks. The same holds for pulses, by the sine that they are
+cut from, and for records and tables, by the distance of their samples."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ..core.problem import ContactProblem
+from ..ground_motion.excitation import GroundMotion
+from ..ground_motion.record import Record
+from ..laws.excitation import FullSine, HalfSine, Rectangular, Tabulated
+
+FEWEST = 4.0  # CHOSEN: steps in a period; a sine at its zeros and peaks still has its largest value at a step
+ROUNDED = 1e-6  # of a time step: round-off of its quotient with a period
+PARTS = ("excitation", "excitations", "motion", "given", "path", "record", "__self__", "__wrapped__", "func", "base")
+DEEP = 5  # how far a motion is looked for in what holds it
+
+
+def sampling_warning(problem: ContactProblem, dt: float) -> str | None:
+    """Return a sentence when the time step [s] is too long for an excitation, a load or a motion of the problem whose
+    frequency, period or samples are known; None when it is not, or nothing is known."""
+    said = (one for source in _sources(problem) for one in _said(source, dt))
+    return next(said, None)
+
+
+def _sources(problem: ContactProblem) -> Iterator[Any]:
+    """Everything that acts as a function of the time: first excitations, then loads, prescribed and moving parts."""
+    yield from problem.excitations
+    system, surface = problem.system, problem.surface
+    for _, history in system.load.separable:
+        yield history
+    yield from (*system.load.general, *system.load.viscous, *system.load.inertial)
+    for condition in getattr(system.space, "prescribed", ()):
+        yield from getattr(condition, "motions", ())
+    yield from getattr(getattr(system.space, "forms", None), "boundaries", ())
+    yield from (surface.motion, surface.slide)
+
+
+def _said(source: Any, dt: float, depth: int = DEEP) -> Iterator[str]:
+    """The sentences about a source, or about the motions that it holds."""
+    if source is None or depth == 0:
+        return
+    name = type(source).__name__
+    if isinstance(source, GroundMotion | Record):
+        yield from _of_samples((source.record if isinstance(source, GroundMotion) else source).dt, dt)
+    elif isinstance(source, Tabulated):
+        spacing = float(np.median(np.diff(source.times)))
+        if dt > spacing * (1.0 + ROUNDED):
+            yield (f"the time step of {dt:g} s is longer than the {spacing:g} s between the times of {name}, whose "
+                   f"peaks fall between the steps: take a dt of at most {spacing:g} s")
+    elif isinstance(source, HalfSine | FullSine | Rectangular):
+        period = source.duration * {HalfSine: 2.0, FullSine: 1.0}.get(type(source), FEWEST)
+        yield from _of_period(f"{name} of {source.duration:g} s", period, dt)
+    elif (frequency := _frequency(source)) is not None:
+        yield from _of_period(f"{name} of {frequency:g} Hz", 1.0 / frequency, dt)
+    else:
+        for held in _held(source):
+            yield from _said(held, dt, depth - 1)
+
+
+def _frequency(source: Any) -> float | None:
+    """The frequency [Hz] that a motion, of the user's too, says that it has."""
+    value: Any = getattr(source, "frequency", None)
+    known = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    return float(value) if known and 0.0 < float(value) < np.inf else None
+
+
+def _held(source: Any) -> Iterator[Any]:
+    """What a function or an object may have its motion from: its owner, a part of it, or what it closes over."""
+    for name in PARTS:
+        found = getattr(source, name, None)
+        yield from found if isinstance(found, list | tuple) else (found,)
+    for cell in getattr(source, "__closure__", None) or ():
+        try:
+            found = cell.cell_contents
+        except ValueError:  # not yet filled
+            continue
+        for one in found if isinstance(found, list | tuple) else (found,):
+            if callable(getattr(one, "value", None)):  # of a load
+                yield one.value
+            elif callable(one) or hasattr(one, "acceleration"):
+                yield one
+
+
+def _of_samples(spacing: float, dt: float) -> Iterator[str]:
+    """A record with longer steps than its own."""
+    if dt > spacing * (1.0 + ROUNDED):
+        yield (f"the time step of {dt:g} s is longer than the {spacing:g} s of the record, whose peaks fall between "
+               "the steps: take a shorter dt, or give resampled(record, dt), which filters out frequencies that dt "
+               "cannot represent")
+
+
+def _of_period(what: str, period: float, dt: float) -> Iterator[str]:
+    """A sine, or a part of one, with too few steps in its period."""
+    if dt <= period / FEWEST * (1.0 + ROUNDED):
+        return
+    halves = 2.0 * dt / period
+    blind = round(halves) >= 1 and abs(halves - round(halves)) <= ROUNDED * halves
+    why = (f"is {round(halves)} times half the period of {what}, {0.5 * period:g} s, so that every step sees the same "
+           "value, or zero" if blind else f"has only {period / dt:.3g} steps in the period of {period:g} s of {what}")
+    yield f"the time step of {dt:g} s {why}: take a dt of at most {period / 20.0:g} s, a twentieth of the period"
