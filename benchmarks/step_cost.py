@@ -44,7 +44,7 @@ from demos.problems.wall import Wall, build  # noqa: E402
 from vi_contact import fem  # noqa: E402
 from vi_contact.core import contact_last  # noqa: E402
 from vi_contact.core.algebra import EffectiveMatrix, SerialComm  # noqa: E402
-from vi_contact.core.compiled import library  # noqa: E402
+from vi_contact.core.compiled import cholmod  # noqa: E402
 from vi_contact.core.state_checks import initial_state  # noqa: E402
 from vi_contact.fem.petsc_algebra import PREFIX, PetscFactor  # noqa: E402
 from vi_contact.meshes.block import BlockMesh  # noqa: E402
@@ -115,7 +115,7 @@ class Cholmod:
         ends, columns, values = matrix.mat.getValuesCSR()
         A = sp.csr_matrix((values, columns, ends), shape=(len(ends) - 1,) * 2)
         mine, contact_last.SHORT_COLUMNS = contact_last.SHORT_COLUMNS, 0.0
-        self.factor = contact_last.ContactLast(library(SerialComm()), A, np.zeros(0, dtype=np.int64))
+        self.factor = contact_last.ContactLast(cholmod(SerialComm()), A, np.zeros(0, dtype=np.int64))
         contact_last.SHORT_COLUMNS = mine
 
     def solve(self, b: np.ndarray) -> np.ndarray:

@@ -37,7 +37,6 @@ NOTE = ROOT / "docs" / "commands_run.txt"
 LIMIT = 900  # s
 ABOVE = ("README", "CONTRIBUTING", "CHANGELOG", "SUPPORT", "SECURITY")  # pages of the site that stand above docs/
 NAME, BEGINNING = "the name of a command", "the beginning of a command"
-OLD = "a command of version 0.1; tests/house/test_upgrade.py compares what it answers"
 PROGRAM = (r"(?:[A-Z_]+=\S+ )*(?:(?:bash|vi-contact|python3|mpirun|srun|sbatch|git|pip|sudo|apt|apt-get|docker|podman|"
            r"apptainer|export|cd|\.venv/\S+|venv/\S+|\. venv/\S+)(?= )|/usr/bin/python3 )")
 JOINED = re.compile(r"\s*\\\n\s*")  # lines that end with a backslash
@@ -74,7 +73,6 @@ ELSEWHERE = {  # what fits the whole command: what runs it, or why nothing here 
         "needs what install/report.sh brings; "
         "tests/plots/test_web_page.py::test_every_text_is_escaped_and_nothing_is_loaded",
     r"bash demos/run\.sh|python3 -m|pip install|mpirun -n|mpirun --mca \S+ \S+": BEGINNING,
-    r"vi-contact (wall|channel|beam|layer)": OLD,
     # too long or too large
     r"bash benchmarks/peers/run\.sh.*": "installs other programs; tests/benchmarks/test_peers.py::"
         "test_our_rows_are_measured, tests/benchmarks/test_peers.py::"
@@ -113,6 +111,7 @@ DEMOS = {  # the test that runs a demo in its short form, main(quick=True), on t
 }
 BENCHMARKS = {  # the test that runs a benchmark, or one of its rows, with small sizes
     "obstacle": "vi/test_plain_snesvi.py::test_units_and_warm_starts",
+    "load_steps": "vi/test_load_steps.py::test_beside_snes",
     "scale": "validation/test_scale_ratios.py::test_counts_are_those_of_the_table",
     "long_steps": "validation/test_long_steps.py::test_the_scheme_of_the_warning_creates_none",
     "bem_multiplier": "bem/test_multiplier_mesh.py::test_the_benchmark",

@@ -50,6 +50,7 @@ SMALL: Mapping[str, tuple[str, str, Mapping[str, Any]]] = {  # name -> its words
         "hertz": one.PROBLEMS["hertz"][:1]}}),
     "friction_cost": ("--sizes 5e2 --steps 2", r"^ +560 +20 FixedPoint, Anderson ", {}),
     "ida": ("--records 1 --scales 1 --duration 0.1 --mesh 2 3", r"^worst_difference +0$", {}),
+    "ledger": ("--steps 3 --only Midpoint() --json", r'^ +"defect, thrown": \d', {"DIVISIONS": (4, 2)}),
     "raft": ("--sizes 2e4 --steps 2 --no-gravity", r"^  steps +2\n  worst +\d", {
         "raft.SIZES": lambda one: {"2e4": 2.0}}),
     "raft --halving": ("--halving", r"^  worst certificate ", {

@@ -203,30 +203,11 @@ def test_petsc_options_are_told_from_ours():
     assert split_petsc(["run", "--out", "x"]) == (["run", "--out", "x"], [])
 
 
-@pytest.mark.parametrize("old", ["wall", "channel --size 0.25"])
-def test_old_commands_name_the_new_ones(old, capsys):
-    """One sentence, and where their options went; nothing is computed."""
-    assert main(old.split()) == 1
-    said = capsys.readouterr().err
-    assert f"give vi-contact run {old.split()[0]} (see " in said and "docs/reference/upgrade.md" in said
-    assert said.startswith("vi-contact: '") and said.count("\n") == 1
-
-
 def test_cases_are_listed(capsys):
     assert main(["cases"]) == 0
     *lines, folder = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines] == ["channel", "wall"]
     assert (Path(folder.removeprefix("the files: ")) / "wall.toml").is_file()
-
-
-@pytest.mark.parametrize("words", ["beam --t-end 0.5 --exact", "run layer", "run {file}", "report {folder}"])
-def test_retired_cases_name_their_demo(words, tmp_path, capsys):
-    """As a command of before, as a case, in a case file and in the folder of a run of before."""
-    (tmp_path / "case.toml").write_text("[layer]\nk = [1.0]\n")
-    assert main(words.format(file=tmp_path / "case.toml", folder=tmp_path).split()) == 1
-    said, demo = capsys.readouterr().err, "timoshenko_beam" if "beam" in words else "particle_layer"
-    assert f"is retired: bash demos/run.sh {demo} computes" in said and said.count("\n") == 1
-    assert (ROOT / "demos" / f"{demo}.py").is_file()
 
 
 def test_a_library_that_is_missing_is_named():

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from random import Random
 
 import pytest
 from chain import chain_problem
+from fuzz import Fuzz
 
 pytest.importorskip("dolfinx")
 pytest.importorskip("matplotlib")
@@ -22,6 +24,11 @@ from vi_contact.cli.entry import main
 from vi_contact.cli.errors import printable
 
 pytestmark = pytest.mark.serial
+SHAKING = """[[excitation]]
+type = "GroundMotion"
+record = {path = "motion.at2", units = "g"}
+direction = [1.0, 0.0]
+"""
 COUNT = 120
 NUMBER = ["nan", "x", "", "1e400e", "1_0x", "--", "\0"]  # no number at all
 POSITIVE = ["0", "-1", "inf", "1e400", *NUMBER]
@@ -68,10 +75,10 @@ WRONG: dict[str, dict[str, list[str]]] = {  # command -> option -> values; an op
         "subprocess --set friction.type=subprocess:Popen", "vi_contact --set friction.type=vi_contact.laws:Tresca",
     ]},
     "run": {"": ["x.toml", "FOLDER", "FILE", "CASE --out \0", "CASE --check --out=", ""]},
-    "ida CASE --motions FILE --edp u_x_top --out study --scales": {"": ["nan", "", "-1", "x", "1,1", "0", "inf"]},
-    "ida CASE --motions FILE --edp u_x_top --out study --levels": {"": ["nan", "0", "-1", "1,x"]},
-    "ida CASE --motions FILE --out study --scales 1 --edp": {"": [":max", "a:b", "a:max:b"]},
-    "ida CASE --motions FILE --edp u_x_top --out study --scales 1": {
+    "ida SHAKEN --motions FILE --edp u_x_top --out study --scales": {"": ["nan", "", "-1", "x", "1,1", "0", "inf"]},
+    "ida SHAKEN --motions FILE --edp u_x_top --out study --levels": {"": ["nan", "0", "-1", "1,x"]},
+    "ida SHAKEN --motions FILE --out study --scales 1 --edp": {"": [":max", "a:b", "a:max:b"]},
+    "ida SHAKEN --motions FILE --edp u_x_top --out study --scales 1": {
         "--im": ["foo", "sa", "sa:0", "sa:nan", "sa:x", "pga:1"], "--jobs": ["0", "-1", "x"],
         "--part": ["0/1", "5/2", "x", "1"], "--launch": ["'"], "--motions": ["FILE FILE", "FILE,FILE", ",", ""],
         "--levels": ["1"], "--set": ["x"],
@@ -83,6 +90,7 @@ WRONG: dict[str, dict[str, list[str]]] = {  # command -> option -> values; an op
         "--set system.prescribed=": ["foo", '{type="foo"}'], "--set gravity.cells=": ["foo", "3"],
         "--set mesh.size=": SET, "--set model.size=": SET, "--set model.sides=": ["foo", '{type="foo"}'],
         "--set material.soil=": ["{E=1,nu=0.6,rho=1}", "3"], "--set friction.mu=": ["0.3"],
+        "--set friction.type=Coulomb --set friction.mu=": ["-1", "x", "nan"],
         "--set system.damping=": ['{type="Rayleigh",alpha=-1}', '{type="Rayleigh.from_frequencies",f1=nan}'],
     },
     **{command: {"": ["", "--steps 3", "--out x", "--k 1 2", "--help", "--motion FILE --scale 2"]}
@@ -116,16 +124,62 @@ def places(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     vc.simulate(problem, scheme=vc.ZienkiewiczWoodTaylor(), dt=5e-3, steps=20, out=folder / "run", progress=False,
                 record=[vc.Probe({"end": (3.0,)}, acceleration=True)])
     (folder / "empty").mkdir()
+    shaken = re.sub(r"(?s)\[\[excitation\]\].*?(?=\n\[)", SHAKING, (folder / "case.toml").read_text("utf-8"), count=1)
+    (folder / "shaken.toml").write_text(shaken, "utf-8")
     return {"FILE": str(folder / "motion.at2"), "CASE": str(folder / "case.toml"), "RUN": str(folder / "run"),
-            "FOLDER": str(folder / "empty")}
+            "FOLDER": str(folder / "empty"), "SHAKEN": str(folder / "shaken.toml")}
 
 
-def lines() -> list[list[str]]:
-    """Wrong values by chance, each at most once."""
-    every = [words(command, option, value) for command, options in WRONG.items() for option, values in options.items()
-             for value in values]
-    assert len(every) > COUNT
-    return Random(7).sample(every, COUNT)
+FUZZ = Fuzz("command lines", __file__)
+RETIRED = ("wall", "channel", "beam", "layer")
+SPECIAL = {  # (command, option, value) -> the word that the sentence must have, where it is no word of the line
+    ("motion info FILE", "--units", ""): "unit", ("run CASE --check --allow", "", ""): "--allow ''",
+    ("run", "", ""): "''", ("", "", ""): "COMMAND", ("", "", "--nosuch"): "COMMAND", ("", "", "\0"): "COMMAND",
+    ("run", "", "CASE --out \0"): "NUL", ("motion convert FILE", "", "a\0b"): "NUL",
+    ("run wall", "--set contact.points=", "[[1]]"): "contact point (1.0,)",
+    ("run wall", "--set contact.points=", "[[7,1]]"): "contact point (7, 1)",
+    ("run channel", "--set material.soil=", "3"): "[material]",
+    ("run channel", "--set friction.mu=", "0.3"): "[friction] has no type",
+    ("post loop RUN", "", "u_x_end"): "FORCE",
+    ("motion spectrum FILE", "--ec8", "Z --ag 1"): "ground 'Z'",
+    ("run CASE --check --set", "", "x.y=1"): "[x]",
+    ("run CASE --check --set", "", "material.concrete.E=1" + "0" * 400): "material.concrete.E holds a whole number",
+    ("ida SHAKEN --motions FILE --edp u_x_top --out study --scales", "", "1,1"): "[1.0, 1.0]",
+    ("ida SHAKEN --motions FILE --edp u_x_top --out study --scales 1", "--motions", "FILE,FILE"):
+        "motion.at2, motion.at2",
+    **{(f"run {case}", "--motion", "."): "Is a directory" for case in ("wall", "channel")},
+    **{(f"run {case}", "--set", "impact.e=2"): "unknown key 'e'" for case in ("wall", "channel")},
+    ("report", "", "RUN --show t,u_x_end"): "columns t, u_x_end",
+}
+
+
+def entries() -> list[list[str]]:
+    """[command, option, value] of every wrong line."""
+    return [[command, option, value] for command, options in WRONG.items() for option, values in options.items()
+            for value in values]
+
+
+def chosen(dice: Random) -> list[str]:
+    """A wrong line; of an option that takes numbers sometimes with a number that nobody has written down here."""
+    command, option, value = dice.choice(entries())
+    if option in ("--low", "--high", "--resample", "--dt", "--arias") and command == "motion info FILE":
+        value = dice.choice([value, f"-{dice.random()}", f"{dice.random()}x",
+                             f"{dice.randint(1, 9)}e{dice.randint(400, 999)}"])
+    return [command, option, value]
+
+
+def faults(command: str, option: str, value: str) -> list[str]:
+    """Words of which the sentence must have one: the key or option that was given the wrong value, or this value."""
+    if (command, option, value) in SPECIAL:
+        return [SPECIAL[command, option, value]]
+    if command in RETIRED:
+        return [f"'{command}'"]
+    name = option.split()[-1].rstrip("=") if option else ""
+    found = [name.lstrip("-").split(".")[-1]] if name else []
+    for word in value.split(" "):
+        key, equals, given = word.partition("=")
+        found += [key.split(".")[-1], given] if equals else [word]
+    return [word for word in found if len(word) > 1 and not word.replace(".", "").isdecimal()] or [value]
 
 
 def words(command: str, option: str, value: str) -> list[str]:
@@ -144,23 +198,58 @@ def placed(word: str, places: dict[str, str]) -> str:
     return word
 
 
-def test_wrong_command_lines(places: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                             capsys: pytest.CaptureFixture[str]) -> None:
-    """An exception that is no SystemExit would be a traceback, and ends this test; so does a warning of numpy."""
+def answered(line: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str]:
+    """(status, what was said on standard error) of a command line."""
+    try:
+        code = main(line)
+    except SystemExit as end:
+        code = end.code if isinstance(end.code, int) else 1
+    return code, capsys.readouterr().err
+
+
+@pytest.fixture
+def check(places: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+          capsys: pytest.CaptureFixture[str]) -> Callable[[list[str]], None]:
+    """Try a line in an empty folder: one sentence about the very fault that it has. An exception that is no SystemExit
+    would be a traceback, and ends the test; so does a warning of numpy."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("signal.signal", lambda *_: None)  # ida makes Ctrl-C of SIGTERM for good
     warnings.simplefilter("error", RuntimeWarning)
-    for line in lines():
-        line = [placed(word, places) for word in line]
-        try:
-            code = main(line)
-        except SystemExit as end:
-            code = end.code if isinstance(end.code, int) else 1
-        said = capsys.readouterr().err
+
+    def tried(entry: list[str]) -> None:
+        command, option, value = entry
+        line = [placed(word, places) for word in words(command, option, value)]
+        code, said = answered(line, capsys)
         assert code in (1, 2), (line, said)
         assert code == 2 or said.startswith("vi-contact: ") and said.count("\n") == 1, (line, said)
-        assert 0 < len(said.splitlines()[-1]) < 900, (line, said)
+        sentence = said.splitlines()[-1]
+        assert 0 < len(sentence) < 900, (line, said)
+        about = [placed(word, places) for word in faults(command, option, value)]
+        assert any(word[:50] in sentence for word in about), (line, about, sentence)
+
+    return tried
+
+
+@pytest.mark.fuzz
+def test_wrong_command_lines(check: Callable[[list[str]], None], tmp_path: Path) -> None:
+    FUZZ.each(COUNT, chosen, check)
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+@pytest.mark.slow
+def test_all_wrong_command_lines(check: Callable[[list[str]], None], tmp_path: Path) -> None:
+    """Those that are written down here, one after the other."""
+    for entry in entries():
+        check(entry)
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+def test_every_wrong_line_is_about_its_fault(places: dict[str, str]) -> None:
+    """The words that sentences must have are words of the fault: none of them is one that every sentence has."""
+    assert len(entries()) > 400
+    for entry in entries():
+        about = faults(*entry)
+        assert about and not {"vi-contact", "error", "give"} & set(about), entry
 
 
 @pytest.mark.parametrize(("command", "words"), [

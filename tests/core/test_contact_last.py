@@ -13,11 +13,12 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from vi_contact.core import compiled, contact_last
+from vi_contact.core import compiled, contact_last, packages
 from vi_contact.core.algebra import Array, SerialComm
-from vi_contact.core.compiled import library
+from vi_contact.core.compiled import cholmod, library
 from vi_contact.core.contact_last import ContactLast
 
+pytest.importorskip("petsc4py.PETSc")  # whose CHOLMOD is taken
 pytestmark = pytest.mark.serial
 EPS = np.finfo(float).eps
 
@@ -60,7 +61,7 @@ def test_parts_beside_dense_algebra(name: str, short: float, monkeypatch: Any) -
     A, last = MATRICES[name]
     c, dense, b = np.array(last, dtype=np.int64), A.toarray(), np.random.default_rng(0).normal(size=A.shape[0])
     i = np.setdiff1d(np.arange(len(b)), c)
-    factor, inverse = ContactLast(library(SerialComm()), A, c), np.linalg.inv(dense)
+    factor, inverse = ContactLast(cholmod(SerialComm()), A, c), np.linalg.inv(dense)
     limit = 50.0 * EPS * np.linalg.cond(dense)
     schur = dense[np.ix_(c, c)] - dense[np.ix_(c, i)] @ np.linalg.solve(dense[np.ix_(i, i)], dense[np.ix_(i, c)])
     assert np.array_equal(factor.corner, np.tril(factor.corner))
@@ -84,56 +85,119 @@ def test_matrices_that_are_not_positive_definite_are_left_to_others() -> None:
         A = grid(4, 4).tolil()
         A[5, 5] = wrong
         with pytest.raises(ArithmeticError):
-            ContactLast(library(SerialComm()), sp.csr_matrix(A), np.array([3]))
+            ContactLast(cholmod(SerialComm()), sp.csr_matrix(A), np.array([3]))
 
 
 @pytest.fixture
 def cold(tmp_path: Path, monkeypatch: Any) -> Any:
     """An empty cache, and a process that has loaded nothing."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    compiled._library.cache_clear()
+    forget()
     yield tmp_path / "vi_contact"
-    compiled._library.cache_clear()
+    forget()
+
+
+def forget() -> None:
+    """Ask for compiled functions anew."""
+    for one in (compiled._loops, compiled._with_cholmod, compiled._without_cholmod):
+        one.cache_clear()
 
 
 @pytest.fixture
-def small(cold: Path, monkeypatch: Any) -> Path:
-    """A source of the same names that compiles in no time."""
+def small(cold: Path) -> Path:
+    """A source that compiles in no time."""
     source = cold.with_name("small.c")
     source.write_text("long columns(void) { return 1; }\ndouble relax(void) { return 1.0; }\n")
-    monkeypatch.setattr(compiled, "SOURCE", source)
     return source
 
 
-@pytest.mark.parametrize("how", ["no compiler", "no header", "no cache"])
+NEEDS = "PETSc factorises, because the quicker way needs a C compiler and PETSc's CHOLMOD: "
+SLOW = "numpy does what compiled loops would do faster, because they need a C compiler: "
+
+
+@pytest.mark.parametrize("how", ["no compiler", "no cache", "no header", "no SuiteSparse", "no PETSc", "two", "static"])
 def test_without_it_today_s_factor_serves_and_the_log_says_so_once(
-    how: str, cold: Path, monkeypatch: Any, caplog: Any
+    how: str, cold: Path, small: Path, monkeypatch: Any, caplog: Any, tmp_path: Path
 ) -> None:
+    """Whatever is missing is told, and the loops that need no CHOLMOD go on where there is a compiler."""
+    monkeypatch.setattr(compiled, "LOOPS", small)
     caplog.set_level(logging.INFO)
+    maps, said = tmp_path / "maps", ""
+    line = "7f00-7f01 r-xp 00000000 08:01 12 {}\n"
     if how == "no compiler":
         monkeypatch.setenv("CC", "/nowhere/cc")
-    elif how == "no header":
-        monkeypatch.setenv("CC", "cc -DCHOLMOD_H -nostdinc")
-    else:
+        said = "there is no C compiler that works"
+    elif how == "no cache":
         cold.write_text("a file where the folder should be")
-    assert library(SerialComm()) is None and library(SerialComm()) is None
-    said = [record.getMessage() for record in caplog.records]
-    assert len(said) == 1 and said[0].startswith("PETSc factorises, because the quicker way needs")
-    assert not cold.is_dir() or not list(cold.iterdir())
+        said = "there is no C compiler that works"
+    elif how == "no header":
+        monkeypatch.setattr(compiled, "cholmod_of_petsc", lambda: Path("/nowhere/lib/libcholmod.so.3"))
+        said = "there is no header cholmod.h beside /nowhere/lib/libcholmod.so.3"
+    elif how == "no SuiteSparse":
+        monkeypatch.setattr(packages, "petsc_has", lambda package: False)
+        said = "this PETSc was built without SuiteSparse"
+    elif how == "no PETSc":
+        monkeypatch.setattr(packages, "PETSC", "nobody.PETSc")
+        said = "no PETSc is in this process"
+    else:
+        maps.write_text(line.format("/lib/libm.so.6") + 2 * (how == "two") * line.format("/a/libcholmod.so.3")
+                        + (how == "two") * line.format("/b/libcholmod-1.so.4") + "7f02-7f03 r-xp 0 08:01 0\n")
+        monkeypatch.setattr(compiled, "MAPS", maps)
+        said = "there are 2 files of CHOLMOD in this process" if how == "two" else "there are 0 files of CHOLMOD"
+    assert cholmod(SerialComm()) is None and cholmod(SerialComm()) is None
+    told = [record.getMessage() for record in caplog.records]
+    assert [one for one in told if one.startswith(NEEDS)] == [one for one in told if said in one] != []
+    assert (library(SerialComm()) is None) == (how in ("no compiler", "no cache"))
+    slow = sum(record.getMessage().startswith(SLOW) for record in caplog.records)
+    assert slow == (how in ("no compiler", "no cache"))
+    assert len(caplog.records) == 1 + slow
+    assert not cold.is_dir() or all(one.name.startswith("small-") for one in cold.iterdir())
+
+
+def test_the_loops_need_no_library_of_the_machine() -> None:
+    """What every process loads names no CHOLMOD, and brings none."""
+    script = ("from vi_contact.core.algebra import SerialComm; from vi_contact.core.compiled import cholmod, library; "
+              "print(library(SerialComm()) is not None, cholmod(SerialComm()), "
+              "'cholmod' in open('/proc/self/maps').read())")
+    told = subprocess.run([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True, check=True).stdout
+    assert told.split() == ["True", "None", "False"]
+
+
+def test_a_cholmod_of_another_version_than_its_header_is_left_alone(
+    small: Path, monkeypatch: Any, tmp_path: Path
+) -> None:
+    """Structures change between versions: the compiled file itself compares."""
+    if not packages.petsc_has("suitesparse"):
+        pytest.skip("PETSc has no CHOLMOD here")
+    header = compiled._header(compiled.cholmod_of_petsc()) / "cholmod.h"
+    other = tmp_path / "cholmod.h"
+    other.write_text(f'#include "{header}"\n#undef CHOLMOD_SUB_VERSION\n#define CHOLMOD_SUB_VERSION 99\n')
+    monkeypatch.setattr(compiled, "_header", lambda file: tmp_path)
+    monkeypatch.setattr(compiled, "LOOPS", small)
+    forget()
+    assert cholmod(SerialComm()) is None
 
 
 def test_a_file_that_cannot_be_loaded_is_made_again(small: Path) -> None:
     """As after a change of CHOLMOD."""
-    file = compiled.compiled()
+    file = compiled.compiled(small, [])
     file.write_bytes(b"not a library")
     os.utime(file, (0, 0))
-    assert compiled.compiled() == file and file.stat().st_size > 1000 and file.stat().st_mtime > 0
+    assert compiled.compiled(small, []) == file and file.stat().st_size > 1000 and file.stat().st_mtime > 0
+
+
+def test_another_library_is_another_file(small: Path, tmp_path: Path) -> None:
+    """What was compiled beside a library is not taken beside another one at the same place."""
+    beside = compiled.compiled(small, [])
+    first = compiled.compiled(small, [], beside)
+    os.utime(beside, (1, 1))
+    assert len({beside, first, compiled.compiled(small, [], beside)}) == 3
 
 
 def test_processes_that_compile_at_once_do_not_meet(small: Path, cold: Path) -> None:
     """Both find it missing, both make it, one file is left, and each has loaded a whole one."""
-    script = f"import pathlib; from vi_contact.core import compiled; compiled.SOURCE = pathlib.Path({str(small)!r}); " \
-             "print(compiled.compiled())"
+    script = f"import pathlib; from vi_contact.core import compiled; source = pathlib.Path({str(small)!r}); " \
+             "print(compiled.compiled(source, []))"
     runs = [subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) for _ in range(2)]
     told = {run.communicate()[0].strip() for run in runs}
     assert all(run.returncode == 0 for run in runs) and told == {str(file) for file in cold.iterdir()}

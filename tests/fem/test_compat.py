@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from vi_contact.meshes.block import BlockMesh
 
@@ -10,6 +11,7 @@ dolfinx = pytest.importorskip("dolfinx")
 ufl = pytest.importorskip("ufl")
 
 from vi_contact import fem  # noqa: E402
+from vi_contact.core.errors import InputError  # noqa: E402
 from vi_contact.fem import compat  # noqa: E402
 
 
@@ -43,6 +45,37 @@ def test_assembled_mass_is_symmetric_and_weighs_the_block(comm):
     product.axpy(-1.0, b)
     assert product.norm() < 1e-14 * b.norm() * 10
     assert M.isSymmetric(1e-15)
+
+
+def test_without_a_compiler_a_form_is_one_sentence_on_all_ranks(monkeypatch, shared_tmp, comm):
+    """And the remedy works: a compiler that CC names. The cache is empty."""
+    mesh, _ = fem.build_mesh(BlockMesh(lengths=(1.0,), divisions=(4,)), comm)
+    functions = compat.vector_space(mesh)
+    u, v = ufl.TrialFunction(functions), ufl.TestFunction(functions)
+    number = 1234567.5
+    form = number * ufl.inner(u, v) * ufl.dx
+    monkeypatch.setitem(compat._defaults, "cache_dir", (str(shared_tmp), "of the test"))
+    monkeypatch.setenv("CC", "/nowhere/cc")
+    said_of_it = r"cannot compile a finite element form \(.*/nowhere/cc.*name the compiler by the environment variable"
+    with pytest.raises(InputError, match=said_of_it) as said:
+        compat.compile_form(form)
+    assert len(str(said.value).splitlines()) == 1
+    monkeypatch.setenv("CC", "gcc")
+    matrix = compat.assemble_matrix(compat.compile_form(form))
+    one, product = matrix.createVecs()
+    one.set(1.0)
+    matrix.mult(one, product)
+    assert one.dot(product) == pytest.approx(number, rel=1e-13)
+
+
+def test_other_errors_of_forms_stay_what_they_are():
+    """A form that is wrong is not told as a missing compiler."""
+    with pytest.raises(RuntimeError, match="^of something else$"):
+        compat._compiling(MPI.COMM_WORLD, lambda: _raise(RuntimeError("of something else")))
+
+
+def _raise(error):
+    raise error
 
 
 def test_waiting_for_another_process_that_compiles_has_patience():

@@ -23,6 +23,7 @@ import vi_contact as vc
 from vi_contact import fem
 from vi_contact.core.errors import InputError
 from vi_contact.fem import compat
+from vi_contact.fem.output import fields, functions
 from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.cut import CutOpen
 from vi_contact.plots.bodies import Scene, plot_deformed
@@ -79,6 +80,12 @@ def test_fields_have_all_nodes_in_the_order_of_vtk(name: str, curved: bool, shar
     assert read_frames(shared_tmp / "run").cells.shape[1] == len(vertices)
 
 
+def of_reactions(problem: vc.ContactProblem, state: vc.State) -> Any:
+    """The contact pressure of the reactions alone: zero where a node has no condition."""
+    nodal = fields.nodal_contact(problem, state, np.ones(len(state.r_n)))[0]
+    return functions._function(problem, "contact_pressure", nodal[:, 0], state.t)
+
+
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("name", ["triangles", "hexahedra"])
 def test_functions_and_pressure(name: str) -> None:
@@ -93,7 +100,10 @@ def test_functions_and_pressure(name: str) -> None:
     pressure = fem.as_function(problem, state, "contact_pressure")
     ds = compat.measure(mesh, d - 1, tags["bottom"].indices)
     total = COMM.allreduce(state.r_n.sum())
-    assert integral(mesh, pressure, ds) == pytest.approx(total, rel=1e-12) and total > 1e3
+    told = of_reactions(problem, state)
+    assert integral(mesh, told, ds) == pytest.approx(total, rel=1e-12) and total > 1e3
+    assert np.array_equal(told.x.array, pressure.x.array * (told.x.array != 0.0))
+    assert integral(mesh, pressure, ds) > 1.01 * total  # clamped nodes have the pressure of their neighbours
     free = linear(fem.assemble(mesh, CONCRETE, degree=2))
     bent = vc.State(0.0, 0, nodal(free.system, lambda x: x[:, ::-1] * x[:, :1]), np.zeros(free.system.rows),
                     np.zeros(0), np.zeros(0, dtype=bool))
@@ -255,7 +265,8 @@ def test_reactions_of_both_sides_of_a_pair(degree: int) -> None:
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("points", [None, [(1.0, 0.0, 0.6), (2.0, 0.0, 1.2)]], ids=["all", "listed"])
 def test_the_pressure_of_tetrahedra_has_the_contact_force(points: Any) -> None:
-    """∫ p = sum r_n, also where contact facets have vertices without a condition, clamped or not listed."""
+    """∫ p = sum r_n of p that is zero at vertices of contact facets without a condition, clamped or not listed; as a
+    function clamped ones have the pressure of their neighbours."""
     mesh, tags = fem.build_mesh(mesh_of("tetrahedra", False), COMM)
     system = fem.assemble(mesh, SOFT, clamped=tags["left"], loads=fem.BodyForce((0.0, -3e4, 0.0)), degree=2)
     problem = vc.ContactProblem(system, fem.contact_surface(system, tags["bottom"], points=points))
@@ -264,4 +275,6 @@ def test_the_pressure_of_tetrahedra_has_the_contact_force(points: Any) -> None:
     ds = compat.measure(mesh, 2, tags["bottom"].indices)
     force = COMM.allreduce(float(state.r_n.sum()))
     assert force > 0.0
-    assert integral(mesh, pressure, ds) == pytest.approx(force, rel=1e-12)
+    assert integral(mesh, of_reactions(problem, state), ds) == pytest.approx(force, rel=1e-12)
+    more = integral(mesh, pressure, ds) / force - 1.0
+    assert more > 0.01 if points is None else abs(more) < 1e-12

@@ -160,10 +160,14 @@ def test_points_outside_the_body():
         system.space.find_nodes(np.array([[0.0, 0.0, 0.0]]))
 
 
-def test_empty_boundary_holds_nothing():
-    """A group without facets on any rank: nothing is prescribed, and the floating body is recognised."""
+def test_empty_boundary_is_refused():
+    """A group without facets on any rank would hold and load nothing; without it the floating body is recognised."""
     mesh, _ = block(COMM, lengths=(2.0, 2.0), divisions=(4, 4))
     nothing = Facets("nothing", np.zeros(0, dtype=np.int32), mesh)
-    system = assemble(mesh, CONCRETE, clamped=nothing, loads=Traction(nothing, (1.0, 1.0)))
+    with pytest.raises(InputError, match="the boundary group 'nothing' of clamped has no facets"):
+        assemble(mesh, CONCRETE, clamped=nothing)
+    with pytest.raises(InputError, match="the boundary group 'nothing' of loads has no facets"):
+        assemble(mesh, CONCRETE, loads=Traction(nothing, (1.0, 1.0)))
+    system = assemble(mesh, CONCRETE)
     assert system.floating and system.space.unknowns == 50
     assert not system.load(0.0).any()

@@ -17,7 +17,6 @@ from typing import Any
 import pytest
 from site_pages import DOCS, FENCE, ROOT, blocks, loaded
 
-import vi_contact
 from vi_contact.cli.entry import main
 from vi_contact.core.errors import InputError
 from vi_contact.studies import read_case
@@ -27,7 +26,7 @@ pytestmark = pytest.mark.serial
 PAGES = loaded(DOCS / "run_commands.py").pages()
 RUN = {  # page, its blocks -> what runs them, or compares them with a run
     "README.md": {"python 1, text 1": "house/test_documents.py::test_first_example_prints_what_readme_says"},
-    "docs/guide/bounds.md": {"python 1, text 1": "house/test_documents.py::test_programs_print_what_their_pages_say"},
+    "docs/guide/bounds.md": {"python 2, text 2": "house/test_documents.py::test_programs_print_what_their_pages_say"},
     "docs/guide/bring_your_own.md": {
         "python 12, text 1": "house/test_documents.py::test_programs_print_what_their_pages_say"},
     "docs/guide/check.md": {"sh 1": "commands",
@@ -54,12 +53,6 @@ RUN = {  # page, its blocks -> what runs them, or compares them with a run
     "docs/reference/api.md": {"pycon 10": "house/test_rooms.py::test_a_room_says_how_to_use_it"},
     "docs/reference/faq.md": {"python 1, text 1": "house/test_documents.py::test_programs_print_what_their_pages_say"},
     "docs/reference/files.md": {"python 3": "house/test_documents.py::test_reading_examples_run_on_its_output"},
-    "docs/reference/upgrade.md": {
-        "pycon 1": "house/test_snippets.py::test_an_old_name_is_answered_as_the_page_says",
-        "diff 1": "house/test_upgrade.py::"
-                  "test_the_program_of_before_stops_and_with_the_lines_of_the_page_it_prints_the_same",
-        "text 3": "house/test_upgrade.py::test_an_old_run_is_continued_only_by_name",  # and by two others there
-        "toml 6": "house/test_upgrade.py::test_old_case_files_are_answered_and_those_of_the_page_are_read"},
     "docs/start/ten_minutes_bar.md": {"sh 3": "commands"},
     "docs/start/ten_minutes_form.md": {"sh 1": "commands",
                                        "python 1, text 1": "house/test_ten_minutes.py::test_your_form"},
@@ -265,14 +258,6 @@ def test_tables_of_the_guides_stand_in_case_files(tmp_path: Path) -> None:
 def test_the_entry_point_is_in_the_group_that_is_read() -> None:
     (text,) = (one for one in blocks("docs/guide/extend.md", "toml") if one.startswith("# pyproject.toml"))
     assert list(tomllib.loads(text)["project"]["entry-points"]) == [GROUP]
-
-
-def test_an_old_name_is_answered_as_the_page_says() -> None:
-    (session,) = blocks("docs/reference/upgrade.md", "pycon")
-    asked, said = session.splitlines()
-    with pytest.raises(AttributeError) as told:
-        eval(asked.removeprefix(">>> "), {"vc": vi_contact})
-    assert f"AttributeError: {told.value}" == said
 
 
 def test_mistakes_are_told_as_the_page_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,

@@ -18,7 +18,7 @@ pytest.importorskip("gmsh")
 from vi_contact.core.errors import InputError
 from vi_contact.meshes import GeoFile
 from vi_contact.meshes.extract import arrays_of
-from vi_contact.meshes.geo_file import allowed
+from vi_contact.meshes.geo_script import allowed
 from vi_contact.meshes.gmsh_session import session
 
 pytestmark = pytest.mark.serial
@@ -125,14 +125,10 @@ FORBIDDEN = {
     "a command that was declared": ('SystemCall = 1; SystemCall "touch broken";', '"touch broken"'),
     "a file that is read": ('Merge "other.msh";', "Merge"),
     "a file that is included": ('Include "other.geo";', "Include"),
-    "a file that is written": ('Save "broken";', "Save"),
-    "a line in a file": ('Printf("x") > "broken";', "Printf"),
     "the end": ("Exit;", "Exit"),
     "a plugin": ("Plugin(MathEval).Run;", "Plugin"),
     "a macro": ("Macro m SystemCall x; Return", "Macro"),
     "a call": ("Call m;", "Call"),
-    "a view": ("View.Light = 0;", "View"),
-    "options of the program": ("General.Terminal = 1;", "General"),
     "a file of a field": ('Field[1] = Structured; Field[1].FileName = "x";', "Structured"),
     "the name of a file of a field": ('Field[1] = Distance; Field[1].FileName = "x";', "FileName"),
     "a process of a field": ('Field[1] = ExternalProcess;', "ExternalProcess"),
@@ -152,7 +148,6 @@ FORBIDDEN = {
     "NUL": ("Point\0(1) = {0, 0, 0};", "\0"),
     "the shell's quotes": ("x = `id`;", "`"),
     "names made of others": ("H~{1} = 1;", "~"),
-    "parameters of ONELAB": ('DefineConstant[ a = {1, Name "x"} ];', "Name"),
 }
 
 
@@ -167,9 +162,129 @@ def test_all_else_is_refused(tmp_path: Path, what: str) -> None:
     assert sorted(one.name for one in tmp_path.iterdir()) == ["wall.geo"]
 
 
+PLAIN = SQUARE.replace("EXTRA", "")
+HABITS = {  # statements that nearly every script has and that change no mesh
+    "an option of files": "Mesh.MshFileVersion = 2.2;",
+    "an option of the window": "General.Terminal = 1;",
+    "a colour": "Mesh.Color.Lines = Black;",
+    "a view": "View.Light = 0;",
+    "numbers at points": "Geometry.PointNumbers = 1;",
+    "a printed line": 'Printf("height %g\\n; {", H);',
+    "a line in a file": 'Printf("x") > "broken";',
+    "a file that is written": 'Save "broken";',
+    "the mesh": "Mesh 2;",
+    "coloured things": "Color {1, 2, 3} { Surface{1}; }",
+    "a named colour": "Recursive Color Red { Surface{1}; };",
+    "hidden things": "Hide { Line{1:2}; }",
+    "all is shown": 'Show "*";',
+    "a condition": 'If (H > 0) Printf("high"); EndIf',
+}
+
+
+@pytest.mark.parametrize("what", HABITS)
+def test_harmless_habits_are_left_out(tmp_path: Path, what: str) -> None:
+    """What Gmsh gets is what it gets of the script without them, each word in its line; no file is written."""
+    plain = allowed(written(tmp_path, "H = 1;\n\n" + PLAIN))
+    script = allowed(written(tmp_path, f"H = 1;\n{HABITS[what]}\n" + PLAIN))
+    empty = "If ( own_H > 0 ) EndIf" if what == "a condition" else ""
+    assert [line.strip() for line in script.text.splitlines()] == [
+        empty if row == 1 else line.strip() for row, line in enumerate(plain.text.splitlines())
+    ]
+    assert plain.left_out == ()
+    assert [line for line, _ in script.left_out] == [2]
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["wall.geo"]
+
+
+def test_a_script_of_habits_has_the_mesh_of_the_script_without(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A block as public scripts draw it; the log names the lines that were left out."""
+    plain = """H = 10; h = 1;
+Point(1) = {0,0,0,h}; Point(2) = {6,0,0,h}; Point(3) = {6,H,0,h}; Point(4) = {0,H,0,h};
+Line(1) = {1,2}; Line(2) = {2,3}; Line(3) = {3,4}; Line(4) = {4,1};
+Line Loop(1) = {1:4}; Plane Surface(1) = {1};
+Transfinite Surface {1}; Recombine Surface {1};
+Physical Surface("dam", 101) = {1}; Physical Line("base", 201) = {1};
+"""
+    habits = plain.replace("Surface {1}", 'Surface "*"')
+    habits += 'Mesh.MshFileVersion = 2.2;\nPrintf("height %g", H);\nMesh 2;\nSave "dam.msh";\n'
+    wanted = arrays_of(GeoFile(path=written(tmp_path, plain, "plain.geo")))
+    made = arrays_of(GeoFile(path=written(tmp_path, habits, "habits.geo")))
+    assert np.array_equal(made.points, wanted.points) and np.array_equal(made.cells, wanted.cells)
+    assert made.cell == "quadrilateral" and list(made.facet_groups) == ["base"]
+    (said,) = (one.getMessage() for one in caplog.records if "left out" in one.getMessage())
+    assert said.endswith("line 7 Mesh.MshFileVersion, line 8 Printf, line 9 Mesh 2, line 10 Save")
+    assert not (tmp_path / "dam.msh").exists()
+
+
+def test_a_surface_that_cannot_be_transfinite_is_meshed_freely(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """As Gmsh's own command does, with a warning that names the surface. Area of the trapezium: (6 + 1)/2 10 m²."""
+    text = PLAIN.replace("{L, 1, 0, 1}", "{1, 10, 0, 1}").replace("{0, 1, 0, 1}", "{0, 10, 0, 1}")
+    text = text.replace("L = 2", "L = 6").replace("Transfinite Surface {1}", 'Transfinite Surface "*"')
+    arrays = arrays_of(GeoFile(path=written(tmp_path, text)))
+    assert area(arrays) == pytest.approx(35.0, rel=1e-12)
+    said = [one.getMessage() for one in caplog.records]
+    assert any("Surface 1 is meshed freely, not transfinite: its sides have divisions" in one for one in said)
+
+
+@pytest.mark.parametrize("text", [
+    "Mesh.ScalingFactor = 0.001;", "Geometry.Tolerance = 1;", "RefineMesh;", "SetOrder 2;",
+    'Merge "a"; Printf("b");', 'Printf("never closed"', "Color Red { Surface{1}; ", 'x = Printf("a");',
+])
+def test_what_may_change_a_mesh_is_no_habit(tmp_path: Path, text: str) -> None:
+    with pytest.raises(InputError, match=r"wall.geo: line 2 has .*only words of geometry"):
+        allowed(written(tmp_path, f"H = 1;\n{text}\n"))
+
+
+def test_all_that_is_refused_is_told_at_once(tmp_path: Path) -> None:
+    path = written(tmp_path, 'H = 1;\nMerge "a";\nPoint(1) = {0, 0, 0, H};\nPlugin(Cut).Run; Exit;\n')
+    with pytest.raises(InputError) as caught:
+        allowed(path)
+    said = str(caught.value)
+    assert "line 2 has 'Merge', line 4 has 'Plugin', line 4 has 'Exit', and only words" in said
+    assert "leave them out" in said
+
+
+def test_parameters_of_a_window_are_left_out(tmp_path: Path) -> None:
+    """DefineConstant with a name, bounds and choices gives the mesh of its value."""
+    constant = 'DefineConstant[ L = {2, Name "Sizes/L = 3", Min 0,\nMax {4}}, n = 3, w[] = {1, 2} ];'
+    script = allowed(written(tmp_path, constant + PLAIN[6:]))
+    head = script.text.split("Point")[0]
+    assert " ".join(head.split()) == "DefineConstant [ own_L = 2 , own_n = 3 , own_w [ ] = { 1 , 2 } ] ;"
+    assert script.text.count("\n") == (constant + PLAIN[6:]).count("\n") + 1
+
+
+def test_numbers_are_given_to_what_a_script_does_not_set(tmp_path: Path) -> None:
+    """As -setnumber of Gmsh: for a name that is not set, and in the place of a DefineConstant. Lengths to 1e-12."""
+    free = written(tmp_path, PLAIN.removeprefix("L = 2;"), "free.geo")
+    default = written(tmp_path, "DefineConstant[ L = {2, Min 0} ];" + free.read_text(), "default.geo")
+    for path in (free, default):
+        points = arrays_of(GeoFile(path=path, numbers={"L": 5})).points
+        assert np.ptp(points[:, 0]) == pytest.approx(5.0, rel=1e-12)
+    assert np.ptp(arrays_of(GeoFile(path=default)).points[:, 0]) == pytest.approx(2.0, rel=1e-12)
+    with pytest.raises(InputError, match=r"line 2 uses 'L', which the script does not set: set it there, or give "
+                                         r"numbers = \{L = …\}"):
+        allowed(free)
+
+
+@pytest.mark.parametrize(("numbers", "said"), [
+    ({"L": 5.0}, r"numbers gives 'L', but line 1 sets it in any case: write DefineConstant\[ L = … \] there"),
+    ({"M": 5.0}, "numbers gives 'M', which the script does not use: leave it out"),
+    ({"L": float("nan")}, "numbers of 'L' is nan; give a finite number"),
+    ({"L": "5"}, "numbers of 'L' is '5'; give a finite number"),
+    ({"SystemCall x": 5.0}, "numbers has the name 'SystemCall x'; give a name of the script"),
+    ([1.0], r"numbers is \[1.0\]; give names and their values"),
+])
+def test_numbers_without_effect_are_refused(tmp_path: Path, numbers: Any, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        GeoFile(path=written(tmp_path, PLAIN), numbers=numbers).build(None)
+
+
 def test_gmsh_gets_no_word_but_those_of_the_lists(tmp_path: Path) -> None:
     """A script's own names are never commands, and line 7 stays line 7."""
-    text = allowed(written(tmp_path, WALL + "Exit = 3; Merge = Exit;\n"))
+    text = allowed(written(tmp_path, WALL + "Exit = 3; Merge = Exit;\n")).text
     assert "own_Exit = 3 ; own_Merge = own_Exit ;" in text
     assert [line.split()[0] for line in text.split("\n")[6:9]] == ["For", "Line", "EndFor"]
 
@@ -200,7 +315,7 @@ def test_other_mistakes_are_told(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"wall.geo: Gmsh cannot mesh it: .*line 4"):
         arrays_of(GeoFile(path=broken))
     stopped = "it stopped at a formula or size: check Field"
-    for wrong, said in (('Field[1] = MathEval; Field[1].F = "nofun(x)"; Background Field = 1;', stopped),
+    for wrong, said in (('Field[1] = MathEval; Field[1].F = "nofun(x)"; Background Field = 1;', f"{stopped}|invalid"),
                         ("Mesh.MeshSizeMax = -1;", f"{stopped}|Wrong mesh element size")):  # newer versions name it
         with pytest.raises(InputError, match=f"Gmsh cannot mesh it: .*({said})"):
             arrays_of(GeoFile(path=written(tmp_path, SQUARE.replace("EXTRA", wrong))))
@@ -294,7 +409,7 @@ LOOPS = {  # the points that they make
 def test_loops_go_round_however_lines_end(tmp_path: Path, text: str) -> None:
     path = tmp_path / "loop.geo"
     path.write_bytes(text.encode())
-    made = written(tmp_path, allowed(path))
+    made = written(tmp_path, allowed(path).text)
     with session() as gmsh:
         gmsh.merge(str(made))
         gmsh.model.geo.synchronize()

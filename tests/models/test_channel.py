@@ -364,10 +364,6 @@ def test_at_rest_before_the_shaking():
         ("gravity.cells=bedrock", "a boundary group: give the name of a cell group"),
         ("mesh.wide=3", "unknown key 'wide' for ChannelMesh: did you mean width"),
         ("mesh.size=-1", "size is -1.0; give a finite number"),
-        ("model.size=0.25", r"\[model\] size was of the model Channel, which is retired: give mesh.size of the case"),
-        ("model.weighing=[]", "give gravity.cells of the case 'channel', .*builtin/channel.toml"),
-        ("model.held=true", r"give held in each \[\[contact\]\]"),
-        ("model.sides.type=FreeFieldSides", r"give clamped, prescribed, tied and dashpots in \[system\]"),
     ],
 )
 def test_wrong_options(wrong, sentence):

@@ -16,6 +16,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import fuzz
 import h5py
 import numpy as np
 import pytest
@@ -30,7 +31,8 @@ from vi_contact.run.simulate import Solution
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 
 pytestmark = pytest.mark.serial
-CHECKPOINTS, FOLDERS, SECONDS, SEED = 80, 25, 10.0, 0  # how many, and the processor time of one at most
+CHECKPOINTS, FOLDERS, SECONDS = 80, 25, 10.0  # how many, and the processor time of one at most
+SEED = 1000 * fuzz.SEED  # of the first one
 Dice = np.random.Generator
 Arrays = dict[str, Any]
 PROBLEM = chain()
@@ -169,6 +171,7 @@ def mutated(data: bytes, dice: Dice) -> tuple[bytes, bool]:
 # Checkpoints ----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.fuzz
 def test_checkpoints(sound: Path, tmp_path: Path) -> None:
     """160 of them. Where a checksum was forged, numbers may be others, but are finite and of the right shape."""
     good = (sound / "checkpoint.npz").read_bytes()
@@ -259,9 +262,12 @@ def damage(folder: Path, dice: Dice) -> str:
     return path.name
 
 
+@pytest.mark.fuzz
 def test_folders(sound: Path, tmp_path: Path) -> None:
     """100 of them: a restart gives the straight run, or one sentence, and no file is changed; so does reading."""
     wanted, whole = restarted(sound), read_run(sound).history["u_x_12"]
+    with h5py.File(sound / "history.h5") as file:
+        rows = len(file["k"])
     kept = 0
     for seed in range(FOLDERS):
         folder = tmp_path / str(seed)
@@ -283,7 +289,8 @@ def test_folders(sound: Path, tmp_path: Path) -> None:
         except InputError as error:
             assert "\n" not in str(error), (seed, name)
         else:
-            assert name == "history.csv" or np.array_equal(again, whole), (seed, name)
+            held = len(again) if name != "history.csv" else rows  # later ones of a killed run have no second copy
+            assert np.array_equal(again[:held], whole[:held]), (seed, name)
         assert time.process_time() - begin < SECONDS, (seed, name)
         shutil.rmtree(folder)
     assert 1 < kept < 23  # 5 to 14 with other seeds: the files of other machines differ, and the dice fall elsewhere

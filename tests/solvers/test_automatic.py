@@ -16,7 +16,7 @@ from fem_problems import BOX_DT, max_over_ranks, shaken_wall, thrown_box
 from mpi4py import MPI
 
 import vi_contact as vc
-from vi_contact.core.compiled import library
+from vi_contact.core.compiled import cholmod
 from vi_contact.core.errors import InputError
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.surfaces import empty_surface
@@ -67,9 +67,9 @@ def test_friction_and_ranks_make_it_iterative_sooner(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(automatic, "DENSE", {3: surface.total})
     assert [rule.route(K, surface, rubs) for rubs in (False, True)] == [vc.Condensed(), vc.Iterative()]
     monkeypatch.setattr(automatic, "IN_SPACE", 100)
-    alone = COMM.size == 1 and library(surface.comm) is not None
+    alone = COMM.size == 1 and cholmod(surface.comm) is not None
     assert rule.route(K, surface, False) == (vc.Condensed() if alone else vc.Iterative())
-    monkeypatch.setattr(automatic, "library", lambda comm: None)
+    monkeypatch.setattr(automatic, "cholmod", lambda comm: None)
     assert rule.route(K, surface, False) == vc.Iterative()
     *_, (_, report) = march(replace(problem, friction=vc.Coulomb(0.3)), dt=BOX_DT, steps=2)
     assert report.result.method.startswith("Iterative")

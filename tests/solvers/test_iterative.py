@@ -221,6 +221,30 @@ def test_petsc_options_choose_the_preconditioner(parallel: bool) -> None:
         prepared(c, "gamg", petsc_options={"pc_type": "no such thing"})
 
 
+@pytest.mark.parametrize(("kind", "options", "said"), [
+    ("jacobi", {"pc_typ": "sor"}, "Iterative(jacobi): nothing reads 'pc_typ' of petsc_options: did you mean 'pc_type'"),
+    ("icc", {"sub_pc_factor_level": 1}, "did you mean 'sub_pc_factor_levels'"),
+    ("icc", {"pc_gamg_threshold": 0.1}, "nothing reads 'pc_gamg_threshold'"),
+    ("gamg", {"pc_gamg_treshold": 0.1}, "did you mean 'pc_gamg_threshold'"),
+    ("gamg", {"ksp_type": "cg"}, "nothing reads 'ksp_type'"),
+    ("auto", {"pc_gamg_treshold": 0.1}, "did you mean 'pc_gamg_threshold'"),
+])
+def test_options_that_nothing_reads_are_refused(parallel: bool, kind: str, options: dict[str, Any], said: str) -> None:
+    with pytest.raises(InputError) as caught:
+        prepared(pushed_block(parallel=parallel), kind, petsc_options=options)
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(("kind", "options"), [
+    ("icc", {"sub_pc_factor_levels": 1}), ("gamg", {"pc_gamg_threshold": 0.1, "mg_levels_ksp_max_it": 3}),
+    ("gamg", {"mg_coarse_sub_pc_type": "lu"}), ("auto", {"pc_gamg_threshold": 0.1, "sub_pc_factor_levels": 1}),
+])
+def test_options_of_parts_are_taken(parallel: bool, kind: str, options: dict[str, Any]) -> None:
+    """Those of blocks and levels, read late or not at all on so few unknowns; with "auto" those of every kind."""
+    c = pushed_block(parallel=parallel)
+    agree(c, prepared(c, kind, petsc_options=options).solve(c.step), c.exact())
+
+
 class Plane:
     """A space of nodes in the plane, of which some components are unknowns."""
 

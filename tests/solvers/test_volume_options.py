@@ -119,6 +119,76 @@ def test_unsound_options_of_the_command_line_are_refused(
         prepare(pushed, Volume(method=method))
 
 
+SPELT = [
+    (ReducedNewton(), {"pc_typ": "jacobi"}, "nothing reads 'pc_typ' of petsc_options: did you mean 'pc_type'?"),
+    (ReducedNewton(), {"snes_max_its": 5}, "did you mean 'snes_max_it'?"),
+    (ReducedNewton(), {"mat_mumps_icntl_140": 5}, "did you mean 'mat_mumps_icntl_14'?"),
+    (ReducedNewton(), {"ksp_rtol": 1e-8}, "nothing reads 'ksp_rtol' of petsc_options: what it is for is not part of"),
+    (ReducedNewton(), {"tao_max_it": 5}, "nothing reads 'tao_max_it'"),
+    (ReducedNewton(), {PREFIX + "pc_type": "lu"}, "give it without its prefix, as 'pc_type'"),
+    (SemismoothNewton(), {"-snes_linesearch_typ": "bt"}, "did you mean 'snes_linesearch_type'?"),
+    (TaoTron(), {"sub_pc_factor_level": 1, "pc_type": "bjacobi"}, "did you mean 'sub_pc_factor_levels'?"),
+    (TaoTron(), {"quite_another": 1}, "nothing reads 'quite_another'"),
+]
+RIGHT = [
+    (ReducedNewton(), {"snes_linesearch_max_it": 3, "mat_mumps_icntl_14": 90, "snes_max_it": 30}),
+    (ReducedNewton(), {"ksp_type": "cg", "pc_type": "bjacobi", "ksp_rtol": 1e-10, "sub_pc_type": "icc"}),
+    (SemismoothNewton(), {"ksp_type": "gmres", "ksp_gmres_restart": 20, "pc_type": "lu", "ksp_rtol": 1e-12}),
+    (TaoTron(), {"pc_type": "bjacobi", "sub_pc_type": "icc", "sub_pc_factor_levels": 1, "tao_max_it": 90}),
+    (TaoTron(), {"pc_type": "jacobi", "-ksp_rtol": 1e-6}),
+]
+
+
+@pytest.mark.two_ranks
+@pytest.mark.parametrize(("method", "options", "said"), SPELT)
+def test_what_nothing_reads_is_refused(pushed: Case, method: Any, options: dict[str, Any], said: str) -> None:
+    """By name and with the nearest one that PETSc has, once a step has been solved; the database is as before."""
+    before = PETSc.Options().getAll()
+    with pytest.raises(InputError) as caught:
+        prepare(pushed, Volume(method=method, petsc_options=options)).solve(pushed.step)
+    assert said in str(caught.value) and PETSc.Options().getAll() == before
+
+
+@pytest.mark.parametrize(("method", "options"), RIGHT)
+def test_what_is_read_late_is_taken(pushed: Case, method: Any, options: dict[str, Any]) -> None:
+    """Options of MUMPS, of blocks and of line searches are read when these are made, and stay right in later steps."""
+    solver = prepare(pushed, Volume(method=method, petsc_options=options))
+    for _ in range(2):
+        assert kkt_residual(pushed.step, solver.solve(pushed.step)).worst <= 1e-9
+
+
+def test_a_misspelt_option_of_the_command_line_is_a_warning(
+    pushed: Case, database: Any, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another solver with this prefix may read it; it is told once."""
+    monkeypatch.setattr("vi_contact.solvers.volume.options._TOLD", set())
+    database[PREFIX + "pc_tipe"] = "jacobi"
+    for _ in range(2):
+        prepare(pushed, Volume()).solve(pushed.step)
+    told = [one.message for one in caplog.records if "pc_tipe" in one.message]
+    assert len(told) == (pushed.step.surface.comm.rank == 0)
+    assert all("did you mean 'pc_type'?" in one for one in told)
+
+
+@pytest.mark.two_ranks
+def test_bounds_on_a_field_have_the_same_options(comm: Any) -> None:
+    """``vi.solve`` hands them to its method; one that is only for the first method it tries is not held against it."""
+    pytest.importorskip("dolfinx")
+    from own_forms import Known, space, square
+    from ufl import dx, grad, inner
+
+    from vi_contact import vi
+
+    def solve(**options: Any) -> Any:
+        known = Known(space(square(comm, 6), ("Lagrange", 1)), lambda u, v: inner(grad(u), grad(v)) * dx)
+        return vi.solve(known.linear, known.u, lower=known.lower, upper=known.upper, bcs=[known.bc], **options)
+
+    for method in (None, *METHODS):
+        with pytest.raises(InputError, match="nothing reads 'pc_typ' of petsc_options: did you mean 'pc_type'"):
+            solve(method=method, petsc_options={"pc_typ": "jacobi"})
+    assert solve(petsc_options={"tao_max_it": 90}).method == "TaoTron"
+
+
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("kind", ["cp", "none", "bt"])
 def test_line_searches(pushed: Case, kind: str) -> None:
@@ -227,7 +297,7 @@ def test_reasons_of_every_petsc_have_words() -> None:
         assert "(the residual is not a number): check the load" in str(stopped("Volume", reasons, NOT_A_NUMBER, 1, 0.5))
     for words in ("Inf or NaN detected", "User provided compute function generated infinity or NaN"):
         assert "check the load" in str(raised("Volume", RuntimeError(words)))
-    assert "check that A" in str(raised("Volume", RuntimeError("Nanometres are too long")))
+    assert "check that" in str(raised("Volume", RuntimeError("Nanometres are too long")))
 
 
 @pytest.mark.serial

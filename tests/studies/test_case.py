@@ -190,16 +190,13 @@ def test_the_wall_with_other_values(shared_tmp: Path) -> None:
 
 
 def test_the_channel_with_a_recorder_of_its_demo(shared_tmp: Path) -> None:
-    """Keys of its mesh; a recorder that stands with the demo, its weight and static stage; its model is retired."""
+    """Keys of its mesh; a recorder that stands with the demo, its weight and static stage."""
     text = located("channel").read_text("utf-8") + (
         '\n[[record]]\ntype = "demos.problems.channel:SoilProbe"\npoints = {1_soil = [10.0, 5.0]}\n')
     path = write(shared_tmp, text)
     given = ("mesh.size=1.0", "mesh.wall=1.0", "mesh.slab=1.0", "run.steps=2", "fields=")
     history = read_case(path, given, allow=("demos",)).run(COMM, progress=False).history
     assert history["contact_resultant"][0] > 0.0 and "u_x_1_soil" in history
-    retired = write(shared_tmp, '[model]\ntype = "Channel"\n[run]\ndt = 0.01\nsteps = 1\n', "old.toml")
-    with pytest.raises(InputError, match=r"\[model\] type was of the model Channel, which is retired: give the tables"):
-        read_case(retired)
 
 
 GROUND = """
@@ -308,10 +305,7 @@ MISTAKES = {  # what is replaced in demos/cases/wall.toml, by what, what the sen
     "inner table": ('section = {type = "PlaneStress", thickness = 0.20}', "section = {type = 'PlaneStress', depth = 1}",
                     ": [system.section] has the unknown key 'depth' for PlaneStress"),
     "no dt": ("dt = 0.0017857142857142857", "", ": [run] lacks the key 'dt', which simulate needs"),
-    "model": ("[mesh]", '[model]\ntype = "Wall"\n[mesh]', ": [model] type was of the model Wall, which is retired: "
-              "give the tables of the case 'wall'"),
-    "part of the model": ("[mesh]", "[model]", ": [model] height was of the model Wall, which is retired: give "
-                          "mesh.height of the case 'wall'"),
+    "unknown table": ("[mesh]", '[model]\ntype = "Wall"\n[mesh]', ": the table [model] is unknown: "),
     "no mesh": ('[mesh]\ntype = "WallMesh"\nheight = 9.0              # m\nwidth = 6.0\ndivisions = [8, 12]\n', "",
                 ": the table [mesh] is missing: give the mesh of the body"),
 }

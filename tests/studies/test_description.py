@@ -14,6 +14,7 @@ pytest.importorskip("dolfinx")
 
 from mpi4py import MPI
 
+import vi_contact as vc
 from vi_contact.cli.entry import main
 from vi_contact.plots.sketch import sketch
 from vi_contact.studies import read_case
@@ -242,3 +243,75 @@ def test_warnings_name_what_is_coarse(tmp_path: Path) -> None:
     assert np.sqrt(0.5 * 1.8e4 / RHO) / 2.0 == pytest.approx(1.06, rel=1e-2) and "up to 1.06 Hz" in soft["warnings"][0]
     (slow,) = described(written(tmp_path), COMM, "run.dt=0.005")["warnings"]
     assert "0.005 s is longer than a twentieth of the first natural period" in slow
+
+
+RAFT = """
+title = "A raft on coarser soil"
+[mesh]
+type = "TwoBlocks"
+lower = {lengths = [20.0, 6.0], divisions = [13, 4]}
+upper = {lengths = [8.0, 0.8], divisions = [16, 2]}
+offset = [6.4]
+[material]
+lower = {E = 5e7, nu = 0.3, rho = 1900.0}
+upper = {E = 3e10, nu = 0.2, rho = 2500.0}
+[system]
+clamped = ["lower_bottom", "lower_left"]
+[gravity]
+cells = "upper"
+[[contact]]
+type = "contact_pair"
+name = "base"
+facets1 = "upper_bottom"
+facets2 = "lower_top"
+matching = {type = "DualMortar"}
+[run]
+dt = 0.002
+steps = 2
+"""
+EXCHANGED = RAFT.replace('1 = "upper_bottom"', '1 = "lower_top"').replace('2 = "lower_top"', '2 = "upper_bottom"')
+FINER = RAFT.replace("divisions = [13, 4]", "divisions = [40, 8]")
+
+
+def test_contact_nodes_are_counted_and_placed(shared_tmp: Path) -> None:
+    """14 nodes on the soil: 6 points, one that is partly covered, and 7 beside the raft, of which one is clamped."""
+    model = describe(read_case(written(shared_tmp, EXCHANGED)), COMM)
+    (contact,) = model["contact"]
+    assert contact["nodes"] == (
+        "6 points of 14 nodes; 7 nodes in front of nothing (left out), at (0, 6), (1.53846, 6), (3.07692, 6) and 4 "
+        "more places; 1 node partly covered (carried by their neighbours), at (15.3846, 6)"
+    )
+    assert f"  base: {contact['nodes']}" in in_words(model)
+    assert {kind: len(places) for kind, places in contact["others"].items()} == {
+        "in front of nothing": 7,
+        "partly covered": 1,
+    }
+    labels = sketch(model).axes[0].get_legend_handles_labels()[1] if COMM.rank == 0 else ["base: 1 partly covered"]
+    assert "base: 1 partly covered" in labels
+
+
+@pytest.mark.parametrize(("text", "warns"), [(RAFT, True), (EXCHANGED, False), (FINER, False)])
+def test_a_softer_side_2_with_longer_edges_is_told(
+    shared_tmp: Path, text: str, warns: bool, caplog: Any
+) -> None:
+    """By the check and, as points are open at rest, by the static stage; both remedies close all of them."""
+    case = read_case(written(shared_tmp, text))
+    model = describe(case, COMM)
+    sides = model["contact"][0]["sides"]
+    assert [round(side["h"], 9) for side in sides] == {
+        RAFT: [0.5, 1.538461538],
+        EXCHANGED: [1.538461538, 0.5],
+        FINER: [0.5, 0.5],
+    }[text]
+    said = [one for one in model["warnings"] if "zigzag" in one]
+    assert len(said) == warns
+    assert all("'upper_bottom', side 1 of its contact, has edges of 0.5 m" in one for one in said)
+    problem = case.problem(COMM)
+    with caplog.at_level("WARNING"):
+        state = vc.static_equilibrium(problem)
+    opened = COMM.allreduce(float(np.sum(problem.surface.weights[~state.active]))) / COMM.allreduce(
+        float(np.sum(problem.surface.weights))
+    )
+    assert (opened > 0.2) if warns else opened == 0.0
+    if COMM.rank == 0:
+        assert ("of the contact area that touches at the start is open" in caplog.text) is warns

@@ -195,7 +195,7 @@ def test_names_that_are_refused(folder: Path, name: str, words: str) -> None:
 
 
 def test_modules_that_end_or_fail(folder: Path) -> None:
-    assert "(ZeroDivisionError: division by zero): install fails" in said(folder, *law("fails:Law"), allow=["fails"])
+    assert "(ZeroDivisionError: division by zero): correct fails" in said(folder, *law("fails:Law"), allow=["fails"])
     assert "cannot import (SystemExit: 0)" in said(folder, *law("ends:Law"), allow=["ends"])
     assert "which is not a class" in said(folder, *law("os:system"), allow=["os"])
     assert "which has no method limit" in said(folder, *law("subprocess:Popen"), allow=["subprocess"])

@@ -212,6 +212,16 @@ def test_a_failure_is_one_sentence_and_keeps_the_best(comm: Any) -> None:
         vi.solve(laplace(known.u, v) + ufl.sqrt(known.u - 10.0) * v * ufl.dx, known.u, bcs=[known.bc])
 
 
+def test_a_linear_form_that_is_not_positive_is_told(comm: Any) -> None:
+    """Nothing has a minimum: TRON would go on for ever. The sentence speaks of F and not of a matrix."""
+    V = space(square(comm, 6), ("Lagrange", 1))
+    u, v = fem.Function(V), ufl.TestFunction(V)
+    F = laplace(u, v) - 400.0 * u * v * ufl.dx + v * ufl.dx
+    with pytest.raises(StepFailure, match="the linear problem is not solved: check that bcs or bounds") as failure:
+        vi.solve(F, u, upper=1.0, bcs=[clamped(V)], method=TaoTron())
+    assert " A " not in str(failure.value) and "\n" not in str(failure.value)
+
+
 @pytest.mark.two_ranks
 def test_steps_that_are_too_long_are_shortened(comm: Any) -> None:
     """The p-Laplacian, p = 6, from a rough guess: Newton's steps are too long, and the search shortens them."""

@@ -26,7 +26,9 @@ def setting(comm: Any) -> SimpleNamespace:
     u, v, w = fem.Function(V), ufl.TestFunction(V), ufl.TrialFunction(V)
     a, L = ufl.inner(ufl.grad(w), ufl.grad(v)) * ufl.dx, -1.0 * v * ufl.dx
     F = ufl.inner(ufl.grad(u), ufl.grad(v)) * ufl.dx + v * ufl.dx
-    return SimpleNamespace(V=V, u=u, v=v, w=w, a=a, L=L, F=F, bc=clamped(V), other=space(square(comm, 3), ("DG", 0)))
+    Pi = 0.5 * ufl.inner(ufl.grad(u), ufl.grad(u)) * ufl.dx + u * ufl.dx
+    other = space(square(comm, 3), ("DG", 0))
+    return SimpleNamespace(V=V, u=u, v=v, w=w, a=a, L=L, F=F, Pi=Pi, bc=clamped(V), other=other)
 
 
 def filled(V: Any, *values: tuple[float, float]) -> Any:
@@ -42,6 +44,17 @@ Call = Callable[[SimpleNamespace], Any]
 CASES: dict[str, tuple[Call, str]] = {
     "functional": (lambda s: vi.solve(s.u**2 * ufl.dx, s.u), "F is a form of rank 0, and a linear form is needed"),
     "no form": (lambda s: vi.solve(1.0, s.u), r"the form is 1.0, J None; give a UFL form F"),
+    "nothing": (lambda s: vi.solve(u=s.u), r"there is nothing to solve: give the form F\(u; v\), or energy="),
+    "both": (lambda s: vi.solve(s.F, s.u, energy=s.Pi), "both a form and energy= are given: give one of them"),
+    "energy of rank 1": (lambda s: vi.solve(energy=s.F, u=s.u), "energy is a form of rank 1, and a functional is"),
+    "no energy": (lambda s: vi.solve(energy=2.0, u=s.u), "energy is 2.0, and a functional is needed"),
+    "energy of another": (lambda s: vi.solve(energy=fem.Function(s.V) ** 2 * ufl.dx, u=s.u),
+                          "energy does not depend on u"),
+    "energy and J": (lambda s: vi.solve(energy=s.Pi, u=s.u, J=s.a), "J is given beside energy=.*leave J out"),
+    "energy and method": (lambda s: vi.solve(energy=s.Pi, u=s.u, method=TaoTron()),
+                          r"method is TaoTron\(\), which solves the linear steps of a form; leave it out"),
+    "energy's options": (lambda s: vi.solve(energy=s.Pi, u=s.u, petsc_options={"pc_type": "incomplete"}),
+                         "PETSc does not accept the options under vi_contact_vi_"),
     "three forms": (lambda s: vi.solve((s.a, s.L, s.L), s.u), "the form is "),
     "a of rank 1": (lambda s: vi.solve((s.L, s.L), s.u), "a is a form of rank 1, and a bilinear form is needed"),
     "L of rank 2": (lambda s: vi.solve((s.a, s.a), s.u), "L is a form of rank 2, and a linear form is needed"),

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ..core.algebra import Array
 from ..core.checks import instance, number
+from ..core.errors import InputError
 from ..laws.materials import LinearElastic
 from .boundary_mesh import BoundaryMesh
 from .element_pairs import ElementPairs
@@ -37,6 +38,9 @@ def check_body(mesh: BoundaryMesh, material: LinearElastic, orders: Orders) -> N
     instance(owner, "the mesh", mesh, BoundaryMesh, "give a BoundaryMesh, for example polygon(...)")
     instance(owner, "the material", material, LinearElastic, "give a LinearElastic")
     instance(owner, "orders", orders, Orders, "give numbers of points, Orders()")
+    if material.xi:
+        raise InputError(f"{owner}: the material has the damping ratio xi = {material.xi:g}, and they are elastic "
+                         "without damping; leave xi out")
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from ..core.step import StepProblem, StepResult
 from ..core.verify import kkt_residual
 from ..solvers.certified import TOLERANCE
 from ..solvers.condensed import Condensed
+from ..solvers.door import refuse_nan
 from ..solvers.normal.lemke import Lemke
 from .contact import BoundaryContact
 from .poincare_steklov import work
@@ -118,6 +119,7 @@ def run_steps(
     pairs: list[tuple[StepProblem, StepResult]] = []
     for k in range(len(loads)):
         step = contact.step(k, loads, x, active)
+        refuse_nan(step)
         result = solved(step)
         loads[k] = contact.load(result.r_n, result.r_t)
         x, active = result.x, result.active

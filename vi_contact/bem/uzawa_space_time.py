@@ -18,7 +18,7 @@ from scipy.linalg import norm  # of tiny numbers too, whose squares are zero
 from ..core.algebra import Array, max_abs
 from ..core.checks import attributes, instance
 from ..core.errors import InputError, StepFailure
-from ..core.step import StepProblem, StepResult
+from ..core.step import StepProblem, StepResult, refuse_limits
 from ..laws.friction import project
 from .contact import BoundaryContact
 from .contact_run import ContactRun, run_steps
@@ -111,6 +111,7 @@ class _SpaceTime:
             sliding = surface.sliding(times[k], times[k + 1])
             if sliding is not None:
                 self._sliding[k] = sliding[:, 0] * self._rubs
+        refuse_limits(contact.friction, surface, 1.0, 0.0)
         self._still = contact.friction.limit(np.zeros(surface.count), surface.weights, 1.0)
         self._slope = contact.friction.slope(surface.weights)
 

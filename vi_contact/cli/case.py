@@ -13,11 +13,14 @@ from ..core.errors import InputError
 from ..studies.cases.library import FOLDER, builtin_cases, copy_starter, located, starters
 from ..studies.cases.short_settings import ShortOptions
 from ..studies.cases.toml_file import read_toml
-from .errors import printable, world
+from .errors import say, world
 from .options import add_command
 
 if TYPE_CHECKING:
     from ..studies.cases.case import Case
+
+
+OPTIONS = {"restart": "--restart", "changed": "--restart-changed", "wall_time": "--wall-time"}
 
 
 def add_case_commands(commands: Any) -> None:
@@ -60,6 +63,10 @@ def _run(options: argparse.Namespace) -> str:
     restart = options.restart or options.changed
     out = options.out or case.out or Path("results") / path.stem
     if options.check:
+        vain = next((name for name in ("restart", "changed", "wall_time") if getattr(options, name)), None)
+        if vain is not None:
+            raise InputError(f"{OPTIONS[vain]} has no effect with --check, which computes no step: leave one of the "
+                             "two out")
         return _checked(case, comm, Path(out))
     found = case.run(comm, out=out, restart=restart, progress=not options.quiet, changed=options.changed,
                      wall_time=options.wall_time)
@@ -69,20 +76,22 @@ def _run(options: argparse.Namespace) -> str:
 def _checked(case: "Case", comm: Any, folder: Path) -> str:
     """Describe and draw the model of a case; InputError for what is wrong with it, once all the rest is told."""
     from ..core.files import on_root
-    from ..plots.sketch import sketch  # late: matplotlib
-    from ..run.files.folder import ABOUT, HISTORY_CSV, run_folder
+    from ..core.own_files import inner_folder
+    from ..plots.histories import write_picture  # late: matplotlib
+    from ..plots.sketch import sketch
+    from ..run.files.folder import is_marked, run_folder
     from ..studies.cases.description import describe, in_words, write_model
 
     case.check()
     parts = case.parts(comm)
     model, ranks = describe(case, comm, parts), parts.system.algebra.comm
     case.columns(comm, parts)  # points and groups of the recorders
-    if any((folder / name).exists() for name in (ABOUT, HISTORY_CSV)):  # of a run, of which model.json there tells
-        folder = folder / "check"
+    if is_marked(folder):  # of a run, of which model.json there tells
+        folder = inner_folder(folder, "check")
     write_model(ranks, model, run_folder(ranks, folder))
-    on_root(ranks, lambda: sketch(model).savefig(folder / "model.png", dpi=130, bbox_inches="tight"))
+    on_root(ranks, lambda: write_picture(sketch(model), folder / "model.png", bbox_inches="tight"))
     if comm.rank == 0:
-        print(printable(f"{in_words(model)}\npicture: {folder / 'model.png'}"))
+        say(f"{in_words(model)}\npicture: {folder / 'model.png'}")
     if model["defects"]:
         raise InputError(f"{case.path}: {'; '.join(model['defects'])}")
     return f"{case.path}: {model['title']}: the file is in order" if comm.rank == 0 else ""

@@ -6,11 +6,10 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 
-from ..core.errors import InputError, Interrupted, OutOfTime, ViContactError
+from ..core.errors import Interrupted, OutOfTime, ViContactError
 from ..core.version import __version__
-from ..studies.cases import library
 from .case import add_case_commands
-from .errors import Parser, check_words, fail_together, printable, told, world
+from .errors import Parser, check_words, fail_together, keep_streams, say, told, world
 from .ida import add_ida_commands
 
 _DESCRIPTION = """vi-contact computes structures that may lift off, bounce and slide. It checks every time step.
@@ -47,13 +46,6 @@ def split_petsc(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
     return own, petsc
 
 
-def refuse_retired(arguments: Sequence[str]) -> None:
-    """Raise InputError for a command of before, with the command or the demo in its place."""
-    library.refuse_retired(first := list(arguments[:1]))
-    if first in (["wall"], ["channel"]):
-        raise InputError(f"'{first[0]}' is now a case: give vi-contact run {first[0]} (see docs/reference/upgrade.md)")
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and print its text; return 0, 1 (one sentence on stderr), 128 + n (signal n) or 75 (wall time)."""
     if arguments is None:  # a process of our own: with DOLFINx 0.5 the compiler of forms tells the root its calls
@@ -61,7 +53,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     own, petsc = split_petsc(sys.argv[1:] if arguments is None else arguments)
 
     def command() -> None:
-        refuse_retired(own)
         options = parser(own[0] if own else "").parse_args(own)
         if petsc:
             import petsc4py
@@ -69,13 +60,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
             petsc4py.init(["vi-contact", *petsc])
         check_words(own)
         if text := told(lambda: options.run(options), getattr(options, "spelling", {})):
-            print(printable(text))
+            say(text)
 
     return status_of(command)
 
 
 def status_of(call: Callable[[], object]) -> int:
     """Call a command, or the main function of a script, and return 0; other ends are as those of ``main``."""
+    keep_streams()
     try:
         told(call, {})
     except ViContactError as error:
@@ -86,7 +78,7 @@ def status_of(call: Callable[[], object]) -> int:
         if isinstance(error, OutOfTime):  # on all ranks: a launcher kills what is left when the first one has failed
             fail_together(str(error))
         return _stopped(stopped, stopped.status)
-    except Exception:
+    except Exception:  # a defect: its traceback is shown, and the other ranks end too
         fail_together(traceback.format_exc())
         raise
     return 0

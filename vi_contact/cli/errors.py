@@ -1,22 +1,20 @@
 """Tell errors in one sentence, those of the machine and of libraries too, and end a command on all its ranks."""
 
 import argparse
-import errno
+import os
 import re
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from textwrap import shorten
 from typing import Any, NoReturn
 
 from ..core.algebra import SerialComm
 from ..core.checks import SHOWN, shown
-from ..core.errors import InputError, ViContactError
+from ..core.errors import InputError, ViContactError, of_memory
 from ..core.files import sentence
 
 PATIENCE = 30.0  # seconds between the first rank that has failed and the last
-PETSC_ERR_MEM = 55  # of petscsystypes.h
-_MEMORY = ("out of memory", "cannot allocate memory", "unable to allocate", "memory allocation failed", "bad_alloc")
 LIBRARIES = ("dolfinx", "ufl", "basix", "petsc4py", "mpi4py", "h5py", "gmsh", "matplotlib", "tqdm")
 OUT_OF_MEMORY = ("out of memory: take a coarser mesh, fewer steps or samples, or more ranks on more machines; a run "
                  "keeps what it has written, and --restart continues it")
@@ -48,7 +46,7 @@ def told(run: Callable[[], Any], spelling: Mapping[str, str]) -> Any:
     try:
         return run()
     except ViContactError as error:
-        if _of_memory(error):
+        if of_memory(error):
             raise ViContactError(OUT_OF_MEMORY) from error
         if spelling and isinstance(error, InputError):
             said = str(error)
@@ -56,7 +54,7 @@ def told(run: Callable[[], Any], spelling: Mapping[str, str]) -> Any:
                 said = said.replace(f" {argument}= ", f" {option} ").replace(f" {argument}=", f" {option} ")
             raise InputError(said.rstrip()) from error
         raise
-    except Exception as error:
+    except Exception as error:  # those that have no sentence are raised again
         text = _sentence(error)
         if text is None:
             raise
@@ -71,8 +69,30 @@ def printable(text: str) -> str:
     return text.encode(encoding, "backslashreplace").decode(encoding)
 
 
+def say(text: str) -> None:
+    """Print a text. Where nobody reads it any more (head has ended), it and all that follows is dropped."""
+    try:
+        print(printable(text), flush=True)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or Python complains at its end
+
+
+def keep_streams() -> None:
+    """Give standard streams that are closed, as daemons have them, a place.
+
+    Else the next file that is opened gets their number, and what a library prints goes into it."""
+    for number in (0, 1, 2):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # gets the lowest number that is free: this one
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # Python found it closed
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115  # as long as the process
+
+
 def _sentence(error: Exception) -> str | None:
-    if _of_memory(error):
+    if of_memory(error):
         return OUT_OF_MEMORY
     if isinstance(error, OSError):
         return sentence(error)
@@ -81,22 +101,6 @@ def _sentence(error: Exception) -> str | None:
     if isinstance(error, OverflowError | FloatingPointError):
         return f"a number is too large for the machine ({error}): check the sizes and units of all inputs"
     return None
-
-
-def _of_memory(error: BaseException) -> bool:
-    """Whether an error, or one it came from, says that there is no memory: Python's, numpy's, HDF5's, PETSc's."""
-    return any(isinstance(one, MemoryError) or getattr(one, "errno", None) == errno.ENOMEM
-               or getattr(one, "ierr", None) == PETSC_ERR_MEM
-               or (not isinstance(one, ViContactError) and any(word in str(one).lower() for word in _MEMORY))
-               for one in _chain(error))
-
-
-def _chain(error: BaseException | None) -> Iterator[BaseException]:
-    seen: set[int] = set()
-    while error is not None and id(error) not in seen:
-        seen.add(id(error))
-        yield error
-        error = error.__cause__ or error.__context__
 
 
 def world() -> Any:

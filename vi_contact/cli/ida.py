@@ -8,6 +8,7 @@ from typing import Any
 from ..core.checks import shown
 from ..core.errors import InputError, OutOfTime, ViContactError
 from ..studies.cases.library import located
+from .errors import say
 from .options import add_command
 
 
@@ -47,7 +48,7 @@ def _ida(options: argparse.Namespace) -> str:
         signal.signal(signum, signal.default_int_handler)
     try:
         rows = run_ida(study, options.out, jobs=options.jobs, part=options.part, launch=launch,
-                       say=lambda line: print(line, flush=True), wall_time=options.wall_time)
+                       say=say, wall_time=options.wall_time)
     except OutOfTime:
         raise
     except KeyboardInterrupt:

@@ -1,6 +1,7 @@
 """``vi-contact motion info|convert|plot|spectrum``: options and what each action does."""
 
 import argparse
+import math
 import re
 from dataclasses import fields
 from pathlib import Path
@@ -53,7 +54,9 @@ def _read(options: argparse.Namespace, path: str) -> Record:
     asked = {one.name: getattr(options, one.name) for one in fields(Processing)}
     if (words := options.psa) is not None:
         try:
-            asked["psa"] = acceleration(words[0]), float(words[1])
+            asked["psa"] = acceleration(words[0]), (period := float(words[1]))
+            if not 0.0 < period < math.inf:
+                raise ValueError(words[1])
         except (argparse.ArgumentTypeError, ValueError):
             raise InputError(f"--psa {' '.join(words)}: give an acceleration such as 0.5g, and a period in seconds"
                              ) from None

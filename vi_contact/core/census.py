@@ -10,6 +10,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from .algebra import Array
+from .checks import at
+
+NAMED = 3  # places of a kind that are named
+MEANINGS = {
+    "shared by both sides": "joined there",
+    "clamped": "left out",
+    "prescribed": "left out",
+    "tied to another": "one condition with it",
+    "not listed": "left out",
+    "in front of nothing": "left out",
+    "partly covered": "carried by their neighbours",
+    "hardly covered": "pressures left out of the largest",
+}  # kind -> what that means for the conditions
 
 
 @dataclass(frozen=True)
@@ -22,10 +35,22 @@ class Census:
         points: number of contact conditions on all ranks. A node at an edge has one for each of its faces.
         places: kind of node -> coordinates (k, d) [m] of all nodes of this kind, on all ranks alike, ordered by node
             number. A kind says in a few words what became of the node, as in "shared by both sides", "clamped",
-            "prescribed", "faces nothing", "partly covered".
+            "prescribed", "in front of nothing", "partly covered".
     """
 
     name: str
     nodes: int
     points: int
     places: Mapping[str, Array] = field(default_factory=dict)
+
+    def in_words(self) -> str:
+        """Return how many points of how many nodes there are, and the other kinds with their first places."""
+        kinds = [self._kind(kind, points) for kind, points in self.places.items()]
+        return "; ".join([f"{self.points} points of {self.nodes} nodes", *kinds])
+
+    def _kind(self, kind: str, points: Array) -> str:
+        meaning = f" ({MEANINGS[kind]})" if kind in MEANINGS else ""
+        named = ", ".join(at(point) for point in points[:NAMED])
+        more = f" and {len(points) - NAMED} more places" if len(points) > NAMED else ""
+        nodes = "1 node" if len(points) == 1 else f"{len(points)} nodes"
+        return f"{nodes} {kind}{meaning}, at {named}{more}"

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from .algebra import Array, Comm, Indices, Mask, largest
-from .errors import InputError, ViContactError
+from .errors import InputError, ViContactError, of_machine
 
 T = TypeVar("T")
 
@@ -191,7 +191,7 @@ def shown(value: Any) -> str:
         return f"the class {value.__name__}"
     try:
         text = " ".join(repr(value).split())
-    except Exception:  # a number of more digits than Python prints, an object with a broken repr
+    except Exception:  # of a foreign repr, which may raise anything; and numbers of more digits than Python prints
         text = f"an object of type {type(value).__name__}"
     return text if len(text) <= SHOWN else text[: SHOWN - 1] + "…"
 
@@ -224,15 +224,20 @@ def ended(name: str, error: Exception) -> str:
     """Return the sentence about an error in a user's function: the package's own as it is, others with their line."""
     place = traceback.extract_tb(error.__traceback__)[-1]
     said = f"{type(error).__name__}: {error} ({Path(place.filename).name}, line {place.lineno})"
+    if of_machine(error):
+        return f"{name} ended in {said}: the machine refused it"
     return str(error) if isinstance(error, ViContactError) else f"{name} ended in {said}: correct its function"
 
 
 def on_all(comm: Comm, name: str, call: Callable[[], T]) -> T:
     """Return what a call of a user's function returns; InputError on all ranks where it raises on one. Collective."""
-    found, defect = [], ""
+    found, defect, failure = [], "", None
     try:
         found.append(call())
-    except Exception as error:  # the others must not wait for this one
-        defect = ended(name, error)
-    refuse([defect], comm)
+    except Exception as error:  # of a user's function, which may raise anything: the others must not wait for this one
+        defect, failure = ended(name, error), error
+    try:
+        refuse([defect], comm)
+    except InputError as told:
+        raise told from failure  # whoever tells it sees what it came from, such as a lack of memory
     return found[0]

@@ -1,5 +1,9 @@
-"""Compile ``contact_last.c`` against CHOLMOD when it is first needed, and keep it in the user's cache, as DOLFINx keeps
-forms: $XDG_CACHE_HOME or ~/.cache, folder vi_contact. Compiling against its header is what makes any CHOLMOD do."""
+"""Compile the C files of this room when they are first needed, and keep them in the user's cache, as DOLFINx keeps
+forms: $XDG_CACHE_HOME or ~/.cache, folder vi_contact.
+
+``loops.c`` needs a C compiler only. ``contact_last.c`` needs CHOLMOD too, and takes none but the one that PETSc has
+brought into the process: another one beside it would share names with it, and with the METIS and the BLAS of PETSc, so
+that functions of one call those of the other. Compiling against the header beside that CHOLMOD makes any version do."""
 
 import ctypes
 import logging
@@ -7,65 +11,138 @@ import os
 import platform
 import shlex
 import subprocess
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import SimpleNamespace
 from typing import Any
 
+from . import packages
 from .algebra import Comm, largest
 
 log = logging.getLogger(__name__)
-SOURCE = Path(__file__).with_name("contact_last.c")
-HEADERS = "-I/usr/include/suitesparse"
+LOOPS = Path(__file__).with_name("loops.c")
+CONTACT_LAST = Path(__file__).with_name("contact_last.c")
+MAPS = Path("/proc/self/maps")  # of Linux: the files of all libraries of this process
+OF_LOOPS = ("forward", "backward", "forward_many", "backward_many")
+OF_CHOLMOD = ("order", "factorise", "columns", "release", "substitute")
 
 
 def library(comm: Comm) -> Any:
-    """Return the compiled functions, or None, the same on all ranks; the first rank compiles them. Collective."""
-    if comm.rank == 0:
-        _library()
-    comm.bcast(None)
-    found = _library()
-    return None if largest(comm, found is None) else found
+    """Return the functions of ``loops.c``, or None, the same on all ranks; the first rank compiles them. Collective."""
+    return _alike(comm, _loops)
 
 
-@lru_cache(maxsize=1)
-def _library() -> Any:
-    """The functions; None, and once a line in the log, where there is no compiler, CHOLMOD or cache."""
-    try:
-        return _loaded(compiled())
-    except (OSError, RuntimeError, subprocess.SubprocessError) as problem:  # RuntimeError: nobody's home is known
-        said = (getattr(problem, "stderr", None) or str(problem)).strip().splitlines() or [repr(problem)]
-        log.info("PETSc factorises, because the quicker way needs a C compiler and CHOLMOD: %s", said[0])
-        return None
+def cholmod(comm: Comm) -> Any:
+    """Return what ``ContactLast`` needs, of ``loops.c`` and of CHOLMOD, or None where PETSc has no CHOLMOD or nothing
+    can be compiled, the same on all ranks; the first rank compiles it. Collective."""
+    return _alike(comm, _factoriser)
 
 
 def already() -> Any:
-    """Return the functions where somebody has asked for them before, else None."""
-    return _library() if _library.cache_info().currsize else None
+    """Return the functions of ``loops.c`` where somebody has asked for them before, else None."""
+    return _loops() if _loops.cache_info().currsize else None
 
 
-def compiled() -> Path:
-    """Return the file of the compiled functions, made unless one that can be loaded is there. Safe in any number of
-    processes: each compiles aside, and the last one to end replaces the file as a whole."""
-    command = [*shlex.split(os.environ.get("CC") or "cc"), "-O3", "-shared", "-fPIC", HEADERS]
-    key = sha256(f"{SOURCE.read_text(encoding='utf-8')}{command}{platform.machine()}".encode()).hexdigest()[:16]
-    folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "vi_contact"
-    file = folder / f"contact_last-{key}.so"
+def _alike(comm: Comm, found: Callable[[], Any]) -> Any:
+    if comm.rank == 0:
+        found()
+    comm.bcast(None)
+    here = found()
+    return None if largest(comm, here is None) else here
+
+
+@lru_cache(maxsize=1)
+def _loops() -> Any:
+    """The functions; None, and once a line in the log, where there is no compiler or cache."""
     try:
-        _loaded(file)  # fails too where it was made beside another CHOLMOD, since removed
+        found = ctypes.CDLL(str(compiled(LOOPS, [])))
+    except (OSError, RuntimeError, subprocess.SubprocessError) as problem:  # RuntimeError: nobody's home is known
+        log.info("numpy does what compiled loops would do faster, because they need a C compiler: %s", _said(problem))
+        return None
+    found.relax.restype = ctypes.c_double
+    return found
+
+
+def _factoriser() -> Any:
+    """The functions for the CHOLMOD of this process, which a PETSc may bring later than we are asked first."""
+    try:
+        return _with_cholmod(cholmod_of_petsc())
+    except OSError as problem:
+        return _without_cholmod(str(problem))
+
+
+@lru_cache(maxsize=1)
+def _with_cholmod(file: Path) -> Any:
+    loops = _loops()
+    if loops is None:
+        return _without_cholmod("there is no C compiler that works")
+    try:
+        made = compiled(CONTACT_LAST, [f"-I{_header(file)}"], file)
+        found = ctypes.CDLL(str(made))
+        if not found.header_fits():
+            raise OSError(f"the header in {_header(file)} is of another version than {file}")
+    except (OSError, RuntimeError, subprocess.SubprocessError) as problem:
+        return _without_cholmod(_said(problem))
+    found.columns.restype = ctypes.c_long
+    functions = {name: getattr(loops, name) for name in OF_LOOPS}
+    return SimpleNamespace(**functions, **{name: getattr(found, name) for name in OF_CHOLMOD})
+
+
+@lru_cache(maxsize=1)
+def _without_cholmod(reason: str) -> None:
+    """Say once in the log why."""
+    log.info("PETSc factorises, because the quicker way needs a C compiler and PETSc's CHOLMOD: %s", reason)
+
+
+def cholmod_of_petsc() -> Path:
+    """Return the file of the CHOLMOD that PETSc has brought into this process; OSError, which says why, without one."""
+    if not packages.petsc_is_here():
+        raise OSError("no PETSc is in this process")
+    if not packages.petsc_has("suitesparse"):
+        raise OSError("this PETSc was built without SuiteSparse")
+    lines = MAPS.read_text(encoding="utf-8", errors="surrogateescape").splitlines()
+    files = {line.split(maxsplit=5)[5] for line in lines if len(line.split(maxsplit=5)) == 6}
+    found = sorted(file for file in files if Path(file).name.startswith("libcholmod"))
+    if len(found) != 1:
+        raise OSError(f"there are {len(found)} files of CHOLMOD in this process {found}")
+    return Path(found[0])
+
+
+def _header(file: Path) -> Path:
+    """The folder of the header that was installed with this library: lib, or lib/x86_64-linux-gnu, beside include."""
+    for parent in file.parents[1:3]:
+        for folder in (parent / "include" / "suitesparse", parent / "include"):
+            if (folder / "cholmod.h").is_file():
+                return folder
+    raise OSError(f"there is no header cholmod.h beside {file}")
+
+
+def compiled(source: Path, options: Sequence[str], *libraries: Path) -> Path:
+    """Return the file of the compiled functions, made unless one that can be loaded is there. Safe in any number of
+    processes: each compiles aside, and the last one to end replaces the file as a whole.
+
+    ``libraries``: files to link with, which are in the process already; a changed one is another result."""
+    command = [*shlex.split(os.environ.get("CC") or "cc"), "-O3", "-shared", "-fPIC", *options]
+    stamps = [(str(one), one.stat().st_size, one.stat().st_mtime_ns) for one in libraries]
+    text = f"{source.read_text(encoding='utf-8')}{command}{stamps}{platform.machine()}"
+    key = sha256(text.encode()).hexdigest()[:16]
+    folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "vi_contact"
+    file = folder / f"{source.stem}-{key}.so"
+    try:
+        ctypes.CDLL(str(file))
     except OSError:
         folder.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(dir=folder) as aside:
             made = Path(aside) / file.name
-            command += [str(SOURCE), "-o", str(made), "-lcholmod", "-lm"]
+            command += [str(source), "-o", str(made), *map(str, libraries), "-lm"]
             subprocess.run(command, check=True, capture_output=True, text=True)
             made.replace(file)
     return file
 
 
-def _loaded(file: Path) -> Any:
-    """The functions of a file; OSError where it cannot be loaded."""
-    found = ctypes.CDLL(str(file))
-    found.columns.restype, found.relax.restype = ctypes.c_long, ctypes.c_double
-    return found
+def _said(problem: Exception) -> str:
+    """The first line of what a compiler or the system said."""
+    return ((getattr(problem, "stderr", None) or str(problem)).strip().splitlines() or [repr(problem)])[0]

@@ -1,6 +1,13 @@
 """Name the ways a run stops early: wrong input, a step that no method could certify, or somebody asked it to."""
 
+import errno
 import signal
+from collections.abc import Iterator
+
+PETSC_ERR_MEM = 55  # of petscsystypes.h
+_MEMORY = ("out of memory", "cannot allocate memory", "unable to allocate", "memory allocation failed", "bad_alloc")
+_MACHINE = (errno.ENOMEM, errno.EMFILE, errno.ENFILE, errno.EACCES, errno.EPERM, errno.ESTALE, errno.ENOSPC,
+            errno.EDQUOT)
 
 
 class ViContactError(Exception):
@@ -36,3 +43,26 @@ class OutOfTime(Interrupted):
     def __init__(self, message: str) -> None:
         super().__init__(message)
         self.status = 75
+
+
+def of_memory(error: BaseException) -> bool:
+    """Say whether an error, or one it came from, says that there is no memory: Python's, numpy's, HDF5's, PETSc's."""
+    return any(isinstance(one, MemoryError) or getattr(one, "errno", None) == errno.ENOMEM
+               or getattr(one, "ierr", None) == PETSC_ERR_MEM
+               or (not isinstance(one, ViContactError) and any(word in str(one).lower() for word in _MEMORY))
+               for one in _chain(error))
+
+
+def of_machine(error: BaseException) -> bool:
+    """Say whether an error tells of the machine (memory, permissions, open files), and so nothing of what a file holds.
+
+    A handler that takes other errors for the damage of a file raises these again."""
+    return of_memory(error) or (isinstance(error, OSError) and error.errno in _MACHINE)
+
+
+def _chain(error: BaseException | None) -> Iterator[BaseException]:
+    seen: set[int] = set()
+    while error is not None and id(error) not in seen:
+        seen.add(id(error))
+        yield error
+        error = error.__cause__ or error.__context__

@@ -1,10 +1,13 @@
-"""Write files that a crash cannot spoil, on rank 0 alone, with failures told to all ranks."""
+"""Write files that a crash cannot spoil, on rank 0 alone, with failures told to all ranks.
+
+Which names are opened, and that no link is followed: ``core.own_files``; HDF5 files are read by ``core.hdf5``."""
 
 import csv
 import errno
 import io
 import json
 import os
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -14,23 +17,34 @@ import numpy as np
 
 from .algebra import Comm
 from .errors import ViContactError
+from .hdf5 import StoredFile
+from .own_files import inner_folder, is_stream, open_new, open_to_read, remove, temporary_of
 
 T = TypeVar("T")
 
 FIELDS = "fields"  # the folder of an XDMF series inside a run folder
 FIELDS_INDEX = "fields.xdmf"
 
+STRIDE = 2**20  # bytes that are copied at once
 _FULL = (errno.ENOSPC, errno.EDQUOT)
+_MANY = (errno.EMFILE, errno.ENFILE)
 _REFUSED = (errno.EACCES, errno.EPERM, errno.EROFS)
 
 
+FRAME = re.compile(r"frame_(\d{6,})\.h5")  # a file of one frame, with the number of its step
+FRAMES = re.compile(r"frames_\d{6,}\.h5")  # a file of several frames
+
+
 def frames_of(folder: Path) -> dict[int, tuple[Path, str]]:
-    """Return where the frames of an XDMF series in a run folder are: step -> (HDF5 file, group in it)."""
-    single = [path for path in (folder / FIELDS).glob("frame_*.h5") if path.stem[6:].isdecimal()]
-    found = {int(path.stem[6:]): (path, "/") for path in single}
-    for path in (folder / FIELDS).glob("frames_*.h5"):
-        with open_hdf5(path) as file:
-            found |= {int(name): (path, f"/{name}") for name in file}
+    """Return where the frames of an XDMF series in a run folder are: step -> (HDF5 file, group in it).
+
+    InputError where the folder of fields, or a file of frames, is a link."""
+    fields = inner_folder(folder, FIELDS)
+    names = sorted(os.listdir(fields)) if fields.is_dir() else []
+    found = {int(match[1]): (fields / name, "/") for name in names if (match := FRAME.fullmatch(name))}
+    for name in filter(FRAMES.fullmatch, names):
+        with open_hdf5(fields / name) as file:
+            found |= {int(step): (fields / name, f"/{step}") for step in file if step.isdecimal()}
     return found
 
 
@@ -59,13 +73,17 @@ def on_root(comm: Comm, action: Callable[[], T]) -> T | None:
 
 def sentence(error: OSError) -> str:
     """Return one sentence: what happened to which file, and the remedy."""
-    path = error.filename or "the output folder"
+    path = "a file" if error.filename is None else f"'{os.fsdecode(error.filename)}'"
     if error.errno in _FULL:
-        return (f"the disk is full: '{path}' could not be written; what was written before is kept, free some space "
+        return (f"the disk is full: {path} could not be written; what was written before is kept, free some space "
                 "and restart from the last checkpoint")
     if error.errno in _REFUSED:
-        return f"'{path}' cannot be written ({error.strerror}): choose another output folder or change its permissions"
-    return f"'{path}' cannot be read or written ({error.strerror or error}): choose another output folder"
+        return f"{path} cannot be opened ({error.strerror}): change its permissions, or choose another folder"
+    if error.errno in _MANY:
+        return f"{path} cannot be opened ({error.strerror}): raise the limit of open files (ulimit -n)"
+    if isinstance(error, BrokenPipeError):
+        return f"what reads {path} has ended before all was written: let it read to the end"
+    return f"{path} cannot be read or written ({error.strerror or error}): check it, or choose another output folder"
 
 
 def write_atomically(path: Path, data: bytes, *, safe: bool = True) -> None:
@@ -74,9 +92,29 @@ def write_atomically(path: Path, data: bytes, *, safe: bool = True) -> None:
         write_all(file, data)
 
 
+def write_output(path: str | os.PathLike[str], data: bytes) -> None:
+    """Write a file that a user has named, as a whole or not at all; to a stream, such as /dev/stdout, as it is.
+
+    OSError names the file. A link of this name is replaced, and what it points at stays as it is."""
+    if is_stream(Path(path)):
+        with open(path, "ab", buffering=0) as file:
+            write_all(file, data)
+    else:
+        write_atomically(Path(path), data, safe=False)
+
+
+def copy_start(source: Path, target: Path, length: int) -> None:
+    """Copy the first bytes of a file of a run, as a whole or not at all; OSError names the target."""
+    with open_to_read(source) as old, _whole_or_not_at_all(target) as new:
+        left = length
+        while left and (data := old.read(min(left, STRIDE))):
+            write_all(new, data)
+            left -= len(data)
+
+
 def push(path: Path) -> None:
     """Push a file, if there is one, onto the medium."""
-    with suppress(FileNotFoundError), open(path, "rb") as file:
+    with suppress(FileNotFoundError), open_to_read(path) as file:
         os.fsync(file.fileno())
 
 
@@ -92,7 +130,7 @@ def write_csv(path: str | Path, header: Sequence[str], rows: Iterable[Sequence[A
     text = io.StringIO(newline="")
     csv.writer(text, lineterminator="\n").writerows([header, *rows])
     try:
-        write_atomically(Path(path), text.getvalue().encode())
+        write_output(path, text.getvalue().encode())
     except OSError as error:
         raise ViContactError(sentence(error)) from error
     return Path(path)
@@ -119,24 +157,22 @@ def _plain(value: Any) -> Any:
 @contextmanager
 def _whole_or_not_at_all(path: Path, safe: bool = True) -> Iterator[Any]:
     """Open an unbuffered file beside ``path`` that takes its place at the end; OSError names ``path``."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    temporary = temporary_of(path)
     try:
-        with open(temporary, "w+b", buffering=0) as file:
+        with open_new(temporary) as file:
             yield file
             if safe:
                 os.fsync(file.fileno())
         os.replace(temporary, path)
     except OSError as error:
         with suppress(OSError):
-            temporary.unlink(missing_ok=True)
+            remove(temporary)
         raise OSError(error.errno, error.strerror or str(error), str(path)) from error
 
 
-def open_hdf5(path: Path) -> Any:
-    """Open an HDF5 file to be read."""
-    import h5py  # late: no step needs it
-
-    return h5py.File(path, "r")
+def open_hdf5(path: Path) -> StoredFile:
+    """Open an HDF5 file of a run folder to be read; OSError when it is none, InputError when it is a link."""
+    return StoredFile(path)
 
 
 def hdf5_atomically(path: Path, fill: Callable[[Any], None]) -> None:

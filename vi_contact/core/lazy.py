@@ -2,12 +2,14 @@
 
 import ast
 import sys
+import warnings
 from collections.abc import Callable
-from functools import cache
 from importlib import import_module
-from os.path import dirname, splitext
+from os.path import splitext
 from types import ModuleType
 from typing import Any
+
+from .renamed import NAMES
 
 
 def lazy(package: str, file: str) -> tuple[list[str], Callable[[str], Any], Callable[[], list[str]]]:
@@ -27,7 +29,10 @@ def lazy(package: str, file: str) -> tuple[list[str], Callable[[str], Any], Call
 
     def get(name: str) -> Any:
         if name not in home:
-            raise AttributeError(f"module '{package}' has no attribute '{name}'{since(package, name)}")
+            renamed = _renamed(package, name)
+            if renamed is None:
+                raise AttributeError(f"module '{package}' has no attribute '{name}'")
+            return renamed
         return getattr(import_module(home[name]), name)
 
     class Room(ModuleType):
@@ -41,16 +46,11 @@ def lazy(package: str, file: str) -> tuple[list[str], Callable[[str], Any], Call
     return public, get, lambda: public
 
 
-def since(package: str, name: str) -> str:
-    """Return the end of a sentence about a name of version 0.1 that is another one now; empty for all else."""
-    now = retired().get(package, {}).get(name)
-    return f": since 0.2.0 it is {now}" if now else ""
-
-
-@cache
-def retired() -> dict[str, Any]:
-    """Return core/retired.toml, read once: Python and its tools often ask a package for names that it has not."""
-    import tomllib
-
-    with open(f"{dirname(__file__)}/retired.toml", "rb") as table:
-        return tomllib.load(table)
+def _renamed(package: str, name: str) -> Any:
+    """Return what an old public name of a package is called now, with a warning; None for a name that never was."""
+    path = NAMES.get(package, {}).get(name)
+    if path is None:
+        return None
+    warnings.warn(f"'{package}.{name}' is now {path}: use that name", DeprecationWarning, stacklevel=3)
+    module, _, now = path.rpartition(".")
+    return getattr(import_module(module), now)

@@ -6,9 +6,14 @@ from typing import Protocol
 
 import numpy as np
 
-from .algebra import Array, Indices
+from .algebra import Array, Indices, Mask
 from .checks import array, at, function
 from .errors import InputError
+
+ROUND_OFF = 1e-9  # cosine of a right angle
+BESIDE = 0.01  # cosine of the angle (89.4°) from which on a direction is along a boundary
+REMEDY = ("give unit vectors from the body to the obstacle (the normal of a HalfSpace points towards the body: turn "
+          "its sign)")
 
 
 class Obstacle(Protocol):
@@ -87,25 +92,77 @@ def alike(points: Array) -> Indices:
     return np.asarray(np.unique(points, axis=0, return_inverse=True)[1], dtype=np.int64).ravel()
 
 
-def facing(obstacle: Obstacle, points: Array, normals: Array) -> tuple[Array, Array]:
+def facing(
+    obstacle: Obstacle, points: Array, normals: Array, *, name: str = "", angle: float = 0.0, alone: bool = True
+) -> tuple[Array, Array]:
     """Return the contact directions (m, d) and gaps (m,) [m] of an obstacle, checked.
 
-    InputError for other shapes, what are no real numbers, and directions that point into the body: away from the
-    outward normals of all faces of a point (at right angles it may touch with an edge)."""
+    The obstacle can reach facets whose outward normals do not look away from it. Of the whole boundary, the mean
+    direction must be within a right angle of the mean normal of those: else nothing of it can touch. A point whose
+    normals all look away from the direction, on the far side of a round face, cannot touch either, and is let be: its
+    gap is larger than that of every point which looks towards the obstacle, and the normals turn from theirs to its own
+    by no more than ``angle`` [rad] at once. Other such points are of a face that the obstacle never reaches.
+
+    Args:
+        name: of the boundary, for the sentence.
+        alone: whether these are all its points; some of them only are refused where others might decide.
+    Raises:
+        InputError: other shapes, what are no real numbers, directions of no length, along the boundary or into the
+            body."""
     owner, m = type(obstacle).__name__, len(points)
     directions = array(owner, "what directions returns", obstacle.directions(points, normals), points.shape)
     length = np.linalg.norm(directions, axis=1)
-    towards, places = np.sum(directions * normals, axis=1) >= -1e-9 * length, alike(points)
-    wrong = np.flatnonzero(~np.isin(places, places[towards]) | (length == 0.0))
-    if len(wrong):
-        raise InputError(f"{owner}: the contact direction at {at(points[wrong[0]])} points into the body or has no "
-                         "length; give unit vectors from the body to the obstacle (the normal of a HalfSpace points "
-                         "towards the body: turn its sign)")
+    if not length.all():
+        raise InputError(f"{owner}: the contact direction at {at(points[np.argmin(length)])} has no length; {REMEDY}")
+    _refuse_beside(owner, name, directions / length[:, None], normals)
     gap = np.asarray(obstacle.gap(points, normals))
     if gap.shape != (m,) or gap.dtype.kind not in "iuf":
         raise InputError(f"{owner}: gap returned {gap.dtype} of shape {gap.shape} for {m} points; return one real gap "
                          "per point")
+    cosines, places = np.sum(directions * normals, axis=1) / length, alike(points)
+    towards = cosines >= -ROUND_OFF
+    beyond = gap > np.max(gap[cosines > BESIDE], initial=-np.inf) if alone else np.zeros(m, dtype=bool)
+    away = ~np.isin(places, places[towards])
+    wrong = np.flatnonzero(away & ~(beyond & _turned_smoothly(cosines, angle)))
+    if len(wrong):
+        turn = np.degrees(np.arccos(np.clip(cosines[wrong], -1.0, 1.0)).mean())
+        raise InputError(f"{owner}: the contact direction at {at(points[wrong[0]])}{_of(name)} points into the body at "
+                         f"{turn:.4g} degrees to the outward normal, in the mean of {len(wrong)} points; leave the "
+                         f"face there out of the boundary, or {REMEDY}")
     return directions, gap.astype(float)
+
+
+def _refuse_beside(owner: str, name: str, directions: Array, normals: Array) -> None:
+    """Raise InputError, once for a whole boundary, for unit directions along it or into the body."""
+    cosines = np.sum(directions * normals, axis=1)
+    if not len(cosines) or cosines.max() > BESIDE:
+        return
+    reached = cosines >= -ROUND_OFF if np.any(cosines >= -ROUND_OFF) else np.ones(len(cosines), dtype=bool)
+    way, normal = (_unit(one[reached].mean(axis=0)) for one in (directions, normals))
+    angle = np.degrees(np.arccos(np.clip(way @ normal, -1.0, 1.0)))
+    what = "points into the body" if cosines.max() < -BESIDE else "is along the boundary"
+    raise InputError(f"{owner}: the contact direction {at(way.round(6))}{_of(name)} {what} at {angle:.4g} degrees to "
+                     f"its mean outward normal {at(normal.round(6))}; choose the boundary that looks towards the "
+                     f"obstacle, or {REMEDY}")
+
+
+def _of(name: str) -> str:
+    """The name of a boundary in a sentence."""
+    return f" of '{name}'" if name else ""
+
+
+def _turned_smoothly(cosines: Array, angle: float) -> Mask:
+    """Which normals (m,), by their cosines with the direction, are reached from the one that looks towards it most by
+    turns of no more than ``angle`` from one normal to the next."""
+    turns = np.arccos(np.clip(cosines, -1.0, 1.0))
+    steps = np.unique(turns)
+    wide = np.flatnonzero(np.diff(steps) > angle * (1.0 + 1e-9))
+    return np.asarray(turns <= (steps[wide[0]] if len(wide) else np.inf))
+
+
+def _unit(vector: Array) -> Array:
+    """The vector with length one, zero as it is, without negative zeros."""
+    return np.asarray(vector / (np.linalg.norm(vector) or 1.0) + 0.0)
 
 
 def admissible_gap(gap: Array, points: Array, size: float) -> Array:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from .errors import InputError
 from .protocols import EXCITATION, Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
 from .stages import stage
 from .surfaces import ContactSurface
-from .system import SemiDiscreteSystem
+from .system import Load, SemiDiscreteSystem
 
 
 @dataclass(frozen=True)
@@ -91,11 +92,16 @@ class ContactProblem:
     def turned(self) -> SemiDiscreteSystem:
         """Return the system in the nodal frames, every body in its own unknowns: one for all problems on a surface."""
         system, basis, dual = self.system, self.surface.basis, self.surface.dual
-        known: dict[Any, SemiDiscreteSystem] = system.cached("turned", dict)
-        if basis is not None and basis not in known:
+        if basis is None:
+            return system
+        known: dict[Any, tuple[Load, SemiDiscreteSystem]] = system.cached("turned", dict)
+        if (basis, dual) not in known:
             known.clear()  # it takes as much memory as the system
-            known[basis] = system.in_basis(basis, dual)
-        return system if basis is None else known[basis]
+            known[basis, dual] = system.load, system.in_basis(basis, dual)
+        load, turned = known[basis, dual]
+        if load is system.load:
+            return turned
+        return turned.loaded(system.load.in_basis(basis))  # the matrices are shared with systems of other loads
 
     def _relative(self, system: SemiDiscreteSystem) -> SemiDiscreteSystem:
         return system if self.surface.coupling is None else system.in_relative(self.surface.coupling)
@@ -161,6 +167,15 @@ def check_parts(problem: Any) -> None:
     refuse((*_of_system(system), *_of_surface(surface, system, surface.total)), surface.comm)
     if problem.frictional:
         refuse_rubbing(surface)
+    _refuse_repeated(excitations)
+
+
+def _refuse_repeated(excitations: Sequence[Any]) -> None:
+    """Raise InputError for an excitation that is named twice: it would shake twice."""
+    for one, other in combinations(excitations, 2):
+        if one is other:
+            raise InputError(f"ContactProblem: excitation names {shown(one)} twice, which would shake twice: leave it "
+                             "out once, or scale it")
 
 
 def _check_excitation(excitation: Any, system: SemiDiscreteSystem) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -82,6 +82,8 @@ class FrictionLaw(Protocol):
 @dataclass(frozen=True)
 class Frictionless:
     """Let everything slide freely: limit = 0."""
+
+    never_negative: ClassVar[bool] = True
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
         """Return zeros, shape (m,)."""

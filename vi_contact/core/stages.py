@@ -52,7 +52,7 @@ def _tell(name: str, seconds: float) -> None:
 
 def show(shown: bool) -> None:
     """Choose whether stages that take longer than a second are told too where standard error is a terminal."""
-    _shown[0] = shown and sys.stderr.isatty()
+    _shown[0] = shown and sys.stderr is not None and sys.stderr.isatty()
 
 
 def done() -> str:

@@ -29,7 +29,7 @@ import numpy as np
 
 from .algebra import Array, EffectiveMatrix, Mask
 from .certificate import Certificate
-from .checks import on_all
+from .checks import at, on_all, shown
 from .errors import InputError, ViContactError
 from .problem import ContactProblem
 from .protocols import FrictionLaw, Frictionless, MassLaw
@@ -93,10 +93,33 @@ class StepProblem:
 
     def friction_at(self, slip: Array) -> FrictionLaw:
         """Return the friction law at the rates [m/s] of this slip, B_t x - slip0 (m, d - 1). Collective: what a law of
-        the user's own raises on one rank is raised on all."""
+        the user's own raises on one rank is raised on all. InputError for limits that are negative or no numbers."""
         speed = self.rate_factor * np.linalg.norm(slip, axis=1)
-        return on_all(self.surface.comm, f"{type(self.friction).__name__} at t = {self.t:g} s",
-                      lambda: self.friction.at(speed))
+
+        def law() -> FrictionLaw:
+            found = self.friction.at(speed)
+            refuse_limits(found, self.surface, self.scale, self.t)
+            return found
+
+        return on_all(self.surface.comm, f"{type(self.friction).__name__} at t = {self.t:g} s", law)
+
+
+def refuse_limits(law: FrictionLaw, surface: ContactSurface, scale: float, t: float) -> None:
+    """Raise InputError unless limit = cohesion + slope max(r_n, 0) has cohesion and slope >= 0 at every condition of
+    this rank. Laws whose ``never_negative`` is true were checked when they were made."""
+    if getattr(law, "never_negative", False):
+        return
+    weights = surface.weights
+    parts = {"slope": law.slope(weights), "limit(0)": law.limit(np.zeros(surface.count), weights, scale)}
+    for name, values in parts.items():
+        found = np.asarray(values)
+        if found.dtype.kind not in "iuf" or found.shape != (surface.count,):
+            raise InputError(f"{type(law).__name__}: {name} is {shown(values)} at t = {t:g} s; return {surface.count} "
+                             "real numbers, one for each contact condition")
+        wrong = np.flatnonzero(~((found >= 0.0) & (found < np.inf)))
+        if len(wrong):
+            raise InputError(f"{type(law).__name__}: {name} is {found[wrong[0]]:g} at {at(surface.points[wrong[0]])} "
+                             f"and t = {t:g} s; a friction limit is zero or a positive finite number")
 
 
 @dataclass(frozen=True)

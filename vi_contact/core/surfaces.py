@@ -10,19 +10,37 @@ import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .algebra import Array, Comm, Indices, Mask, Matrix, SerialComm, largest, on_first, total
+from .census import Census
 from .checks import function, number, shown
 from .contact_last import at
 from .errors import InputError
+from .products import frozen
 from .system import Companion
 
 log = logging.getLogger(__name__)
 Motion = Callable[[float], float | Array]
+
+
+class WatchedNodes(Protocol):
+    """Say where nodes of a contact boundary are that move as they are prescribed, and have no condition."""
+
+    def smallest(self, t: float) -> float:
+        """Return their smallest gap at time t [m]. Collective."""
+
+    def refuse_driven(self, t: float) -> None:
+        """Raise InputError, on all ranks, for a node that is in what it faces at time t. Collective."""
+
+    def before_moving(self, towards: Motion | None) -> "WatchedNodes":
+        """Return the same nodes before an obstacle that moves towards them, t [s] -> [m]."""
+
+    def carried(self, ground: Callable[[float], Array]) -> "WatchedNodes":
+        """Return the same nodes before an obstacle that the ground carries, t [s] -> (d,) [m]."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +66,12 @@ class ContactSurface:
         space: of the systems that it was made for; None when it was made by hand.
         companions: motions of the obstacle that are marched beside the run, with its scheme and time steps.
         nodes: (m,) numbers of the nodes, to be told apart only: several conditions may be of one. None: one each.
-        frictionless_corners: True when nodes with several conditions are allowed beside friction."""
+        frictionless_corners: True when nodes with several conditions are allowed beside friction.
+        uncovered: (m,) True where the other side lies in front of so little around the node that r_n / weight is no
+            pressure; None: nowhere. Such points are left out of largest pressures.
+        watched: nodes of its boundaries without a condition, since they are prescribed in every component.
+        censuses: what became of the nodes of each contact boundary, in the order in which surfaces were joined; empty
+            where nothing is known of facets."""
 
     comm: Comm
     points: Array
@@ -69,6 +92,16 @@ class ContactSurface:
     dual: Matrix | None = None
     nodes: Indices | None = None
     frictionless_corners: bool = False
+    censuses: tuple[Census, ...] = field(default=(), repr=False)
+    uncovered: Mask | None = field(default=None, repr=False)
+    watched: tuple["WatchedNodes", ...] = field(default=(), repr=False)
+
+    def __post_init__(self) -> None:
+        """Keep copies that nobody can write to: what is made of them once stays true."""
+        for name in ("points", "normals", "weights", "gap0", "bilateral", "compliance", "owned", "slots", "tangents"):
+            value = getattr(self, name)
+            if isinstance(value, np.ndarray) and value.flags.writeable:
+                object.__setattr__(self, name, frozen(value.copy()))
 
     def __repr__(self) -> str:
         """Return how many conditions this rank has, and of which kind: not the arrays."""
@@ -177,6 +210,11 @@ class ContactSurface:
         """Return the gap of the undeformed body at time t, (m,) [m]: gap0 less what the obstacle has moved."""
         return self.gap0 if self.motion is None else self.gap0 - self.motion(t)
 
+    def refuse_driven(self, t: float) -> None:
+        """Raise InputError, on all ranks, where a prescribed node is in what it faces at time t. Collective."""
+        for one in self.watched:
+            one.refuse_driven(t)
+
     def advance(self, start: float, end: float) -> Array | None:
         """Return what the obstacle moves towards the body between two times, (m,) [m]; None for one at rest."""
         return None if self.motion is None else self.motion(end) - self.motion(start)
@@ -194,7 +232,9 @@ class ContactSurface:
             function("moving", name, way, "give a function of the time t [s] that returns metres")
             return lambda t: _spread(name, way(t), shape, t)
 
-        return replace(self, motion=None if towards is None else spread("towards", towards, (self.count,)),
+        watched = tuple(one.before_moving(towards) for one in self.watched)
+        return replace(self, watched=watched,
+                       motion=None if towards is None else spread("towards", towards, (self.count,)),
                        slide=None if along is None else spread("along", along, (self.count, self.tangents.shape[1])))
 
     def bilateral_everywhere(self) -> "ContactSurface":

@@ -48,6 +48,7 @@ class Space(Protocol):
         """Return the values (k, d) at the nodes, on every rank; derivative 0, 1, 2: of the prescribed motion."""
 
 
+OTHERS = 4  # surfaces and the like of which factors are kept
 KEPT = {"M": 6, "C": 4, "K": 2, "load": 2}  # products with each: what a step and the next one may ask for again
 PAIR = "give pairs of a vector [N] and a function of the time"
 
@@ -192,11 +193,23 @@ class SemiDiscreteSystem:
         """Return ½ uᵀ K u [J]."""
         return 0.5 * self.algebra.dot(u, self.K @ u)
 
-    def cached(self, name: str, make: Callable[[], Any]) -> Any:
-        """Return what ``make`` returned the first time: factors and the like, which live as long as the system."""
-        if name not in self._cache:
-            self._cache[name] = make()
-        return self._cache[name]
+    def cached(self, name: str, make: Callable[[], Any], *of: Any) -> Any:
+        """Return what ``make`` returned the first time: factors and the like, which live as long as the system.
+
+        ``of``: the objects beside M, C and K that it depends on, as the contact surface; each of the last few has its
+        own. What depends on the load does not belong here: systems that differ in it share this memory (``loaded``)."""
+        known: dict[tuple[int, ...], tuple[Any, Any]] = self._cache.setdefault(name, {})
+        key = tuple(map(id, of))
+        if key not in known:
+            made = make()
+            if len(known) >= OTHERS:
+                del known[next(iter(known))]
+            known[key] = of, made  # with the objects, so that ids stay theirs
+        return known[key][1]
+
+    def forget_loads(self) -> None:
+        """Forget the loads of the last times: a user's functions may give others in another run."""
+        self._products.pop("load", None)
 
     def product(self, name: str, x: Array) -> Array:
         """Return M x, C x or K x, read-only; made once for each of the last frozen vectors (core.products)."""

@@ -139,7 +139,7 @@ class StepEnergy:
 
     @property
     def defect(self) -> float:
-        """Return what the ledger cannot explain; round-off when the equation of motion was satisfied."""
+        """Return what the ledger cannot explain; rounding and the tolerance of the solver when it was solved."""
         return self.change - (self.input - self.damping - self.contact - self.friction - self.algorithmic)
 
 

@@ -2,6 +2,8 @@
 # The public names of this package: one line each, here only. docs/make_api.py sorts them and writes __all__.
 from .checks.comparison import Check as Check
 from .checks.comparison import Comparison as Comparison
+from .damping import FirstModes as FirstModes
+from .damping import first_modes as first_modes
 from .floor_spectra import TransferFunction as TransferFunction
 from .floor_spectra import floor_spectrum as floor_spectrum
 from .floor_spectra import recorded_motion as recorded_motion
@@ -16,4 +18,4 @@ from .racking import Racking as Racking
 from .resultants import Resultants as Resultants
 from .resultants import contact_summary as contact_summary
 
-__all__: list[str] = ['Check', 'Comparison', 'Loop', 'Peak', 'Racking', 'Resultants', 'TransferFunction', 'contact_summary', 'floor_spectrum', 'hysteresis', 'lowest_frequency', 'peaks', 'recorded_motion', 'transfer_function', 'write_peaks']
+__all__: list[str] = ['Check', 'Comparison', 'FirstModes', 'Loop', 'Peak', 'Racking', 'Resultants', 'TransferFunction', 'contact_summary', 'first_modes', 'floor_spectrum', 'hysteresis', 'lowest_frequency', 'peaks', 'recorded_motion', 'transfer_function', 'write_peaks']

@@ -37,8 +37,10 @@ def lowest_frequency(system: SemiDiscreteSystem, *, max_iterations: int = 2000) 
     return float(np.sqrt(square)) / (2.0 * np.pi)
 
 
-def natural_frequencies(algebra: Algebra, K: Matrix, M: Matrix, *, count: int = 3, rigid: int = 0) -> tuple[Array, int]:
-    """Return (lowest frequencies above zero [Hz], ascending; number of rigid motions) of K phi = (2 pi f)² M phi.
+def natural_modes(algebra: Algebra, K: Matrix, M: Matrix, *, count: int = 3,
+                  rigid: int = 0) -> tuple[Array, Array, int]:
+    """Return (lowest frequencies above zero [Hz], ascending; their modes phi, (rows, k), of this rank's rows; number of
+    rigid motions) of K phi = (2 pi f)² M phi.
 
     rigid: there are no more rigid motions than these. Solved on rank 0, by Lanczos' method and one factor of K + s M,
     which there is where bodies float, too. Collective."""
@@ -52,7 +54,11 @@ def natural_frequencies(algebra: Algebra, K: Matrix, M: Matrix, *, count: int = 
         scale = float(np.max(k.diagonal()[mass > 0.0] / mass[mass > 0.0]))
         solve = LinearOperator(k.shape, SerialFactor(SerialMatrix(k + SHIFT * scale * m)).solve)
         wanted = {"k": min(count + rigid, n - 1), "v0": np.cos(np.arange(n) ** 2.0)}
-        squares = np.sort(eigsh(k, M=m, sigma=-SHIFT * scale, OPinv=solve, return_eigenvectors=False, **wanted))
-        found = squares[squares > RIGID * scale], int(np.count_nonzero(squares <= RIGID * scale))
-    squares, free = algebra.comm.bcast(found)
-    return np.sqrt(squares[:count]) / (2.0 * np.pi), free
+        squares, vectors = eigsh(k, M=m, sigma=-SHIFT * scale, OPinv=solve, **wanted)
+        order = np.argsort(squares)
+        squares, vectors = squares[order], vectors[:, order]
+        elastic = np.flatnonzero(squares > RIGID * scale)[:count]
+        found = squares[elastic], vectors[:, elastic], int(np.count_nonzero(squares <= RIGID * scale))
+    squares, vectors, free = algebra.comm.bcast(found)
+    first = algebra.first(K.rows)
+    return np.sqrt(squares) / (2.0 * np.pi), vectors[first : first + K.rows], free

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core.algebra import Array
+from ..core.arguments import checked
 from ..core.checks import instance, number, several
 from ..core.errors import InputError
 from ..core.files import write_csv
@@ -54,6 +55,7 @@ def peaks(history: Mapping[str, Array], columns: Columns, names: Sequence[str] |
     return found
 
 
+@checked
 def write_peaks(path: str | Path, rows: Sequence[Peak]) -> Path:
     """Write ``peaks.csv``: name, quantity (its meaning), unit, max, t_max [s], min, t_min [s], to the last bit."""
     return write_csv(path, HEADER, map(astuple, rows))

@@ -187,7 +187,8 @@ class Resultants:
     part: Any = None
 
     def __post_init__(self) -> None:
-        self.name = self.name or getattr(self.part, "name", "")
+        own = self.name if isinstance(self.name, str) else column_name("part name", self.name)
+        self.name = own or getattr(self.part, "name", "")
         column_name("part name", self.name)
         check_part(self.name, self.centre, self.where, self.normal)
         if self.part is not None and self.where is not None:

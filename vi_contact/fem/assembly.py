@@ -18,7 +18,7 @@ from ..core.system import Load, SemiDiscreteSystem
 from ..laws.free_motions import floating
 from ..laws.materials import Damping, Section
 from . import compat
-from .assembly_checks import check_body, check_boundaries, check_initial
+from .assembly_checks import check_body, check_boundaries, check_initial, check_ratios
 from .communicators import give_back
 from .compact import algebra_for
 from .dashpots import DashpotMatrix, Dashpots, describe_boundaries
@@ -63,7 +63,8 @@ def assemble(mesh: Any, material: Materials | None = None, *, forms: Forms | Non
         clamped: facets with u = 0; prescribed: facets that move (eq. 3) or are held in some components.
         dashpots: absorbing boundaries: Dashpots, CompliantBase, soil.FreeField. Their loss counts as damping.
         tied: boundaries whose opposite nodes move together; damping: NoDamping() by default, MassProportional(c)
-            (eq. 7), Rayleigh or KelvinVoigt; loads: tractions (eqs. 4, 6), body forces, InitialStrain, LinearForm.
+            (eq. 7), Rayleigh, KelvinVoigt, or DampingRatio, which alone reads the xi of materials.
+        loads: tractions (eqs. 4, 6), body forces, InitialStrain, LinearForm.
         base_inertia: whether the inertia load of a ground motion counts the mass that elements share with prescribed
             nodes. True is right for motions relative to the ground; False is the load of docs/start/first_wall.md.
         integration: "full", or "selective" for nearly incompressible bodies of quadrilaterals or hexahedra, where each
@@ -73,7 +74,8 @@ def assemble(mesh: Any, material: Materials | None = None, *, forms: Forms | Non
         quadrature_degree: degree of all integrals; None means UFL's estimate, exact on cells with parallel sides.
     Raises:
         InputError: cells without a material, of an order that does not fit the degree, or folded; NaN in data,
-            components that do not exist, dashpots on held facets, groups of another mesh or kind, contradictions."""
+            components that do not exist, a damping law that damps nothing, ratios xi that no law reads, dashpots on
+            held facets, groups without facets or cells, of another mesh or kind, contradictions."""
     V, degree = taken_space(mesh, space, as_tuple(bcs), degree)
     section, damping = check_body(mesh, material, forms, section, damping, base_inertia, degree, integration)
     held, moved, boundaries = as_tuple(clamped), as_tuple(prescribed), as_tuple(dashpots)
@@ -119,6 +121,7 @@ def _stated(space: FemSpace, material: Materials | None, forms: Forms | None, se
     else:
         body = OwnForms(space, forms, materials, section, damping)
     body.boundaries = boundaries
+    check_ratios(body, forms is None)
     return body
 
 

@@ -11,12 +11,23 @@ from dolfinx.mesh import Mesh
 
 from ..core.checks import check_word, flag, instance, optional, provides, refuse, several, shown
 from ..core.errors import InputError
-from ..laws.materials import Damping, LinearElastic, NoDamping, PlaneStrain, PlaneStress, Rayleigh, Section, Solid
+from ..laws.materials import (
+    BLIND_TO_RATIOS,
+    Damping,
+    DampingRatio,
+    LinearElastic,
+    NoDamping,
+    PlaneStrain,
+    PlaneStress,
+    Rayleigh,
+    Section,
+    Solid,
+)
 from . import compat
 from .communicators import MpiComm
 from .dashpots import Dashpots
 from .form_checks import refuse_complex
-from .forms import KINDS
+from .forms import KINDS, ElasticForms
 from .groups import cells_of, facets_of, field_given
 from .linear_forms import LOADS
 from .loads import Prescribed
@@ -26,6 +37,7 @@ from .ties import Tied
 
 log = logging.getLogger(__name__)
 OWNER = "assemble"
+SIDES = ("facets", "first", "second")  # attributes of conditions and loads that are boundary groups
 LOCKING = 0.495  # Poisson's ratio; CHOSEN: 0.49 is common for wet soil, 0.499 is 10 % to 40 % too stiff
 
 
@@ -55,6 +67,9 @@ def check_body(mesh: Any, material: Any, forms: Any, section: Any, damping: Any,
     if mesh.geometry.dim == 3 and isinstance(section, PlaneStrain | PlaneStress):
         raise InputError(f"assemble: {section} is a section of a plane body and this one has three dimensions; give "
                          "Solid(), or leave it out")
+    if mesh.geometry.dim == 2 and isinstance(section, Solid):
+        raise InputError("assemble: Solid() is for a body in space and this one is plane; give PlaneStrain() or "
+                         "PlaneStress(thickness)")
     provides(OWNER, "damping", damping, ("coefficients",), "give Rayleigh(alpha, beta), MassProportional(c) or None")
     if forms is not None and not (isinstance(damping, Rayleigh | NoDamping) or hasattr(damping, "viscosities")):
         raise InputError(f"assemble: {damping} needs the density of a material and forms=… have none; give "
@@ -69,6 +84,36 @@ def check_body(mesh: Any, material: Any, forms: Any, section: Any, damping: Any,
     if forms is None and degree == 1 and thick and integration == "full" and mesh.comm.rank == 0:
         _tell_locking([one for one in found if isinstance(one, LinearElastic)])
     return section, damping
+
+
+def check_ratios(body: ElasticForms, of_materials: bool) -> None:
+    """Raise InputError, on all ranks, for a damping law that damps nothing, and for damping ratios that no law reads.
+
+    body: the forms of a body, with its dashpots; of_materials: whether its stiffness and mass are those of materials,
+    and not the user's own forms."""
+    law, ratio = body.damping, body.largest_ratio
+    if isinstance(law, DampingRatio) and not any(callable(one.xi) or one.xi for _, one in body.materials):
+        raise InputError(f"assemble: {law} damps by the ratios xi of the materials, and none of them has one; give "
+                         "LinearElastic(…, xi=0.05), or another law, such as Rayleigh(alpha, beta)")
+    rayleigh = isinstance(law, Rayleigh) and (law.alpha > 0.0 or law.beta > 0.0)
+    damps = body.damped if of_materials else rayleigh or body.viscous is not None
+    if not isinstance(law, NoDamping | DampingRatio) and not damps:
+        raise InputError(f"assemble: {law} damps nothing, as its coefficients are zero; give coefficients above zero, "
+                         "or leave damping out")
+    if ratio and isinstance(law, BLIND_TO_RATIOS):
+        raise InputError(f"assemble: a material has the damping ratio xi = {ratio:g}, which {law} does not read; give "
+                         "damping=DampingRatio(frequency), or leave xi out")
+    _refuse_ratio_behind(body)
+
+
+def _refuse_ratio_behind(body: ElasticForms) -> None:
+    """Raise InputError for a ratio of a material that only dashpots have: they have no damping but their own."""
+    inside = [one for _, one in body.materials]
+    for boundary in body.boundaries:
+        behind = boundary.material
+        if behind is not None and behind.xi and behind not in inside:
+            raise InputError(f"assemble: the material of {type(boundary).__name__} on '{boundary.facets.name}' has the "
+                             f"damping ratio xi = {behind.xi:g}, and dashpots read none; leave xi out there")
 
 
 def _refuse_lonely_nodes(mesh: Mesh) -> None:
@@ -137,11 +182,35 @@ def check_boundaries(mesh: Mesh, clamped: Any, prescribed: Any, tied: Any, dashp
         remedy = f"give {' or '.join(f'fem.{kind.__name__}(…)' for kind in kinds)}, or a list of them"
         for item in items:
             instance(OWNER, name, item, kinds, remedy)
-            for group in (getattr(item, one, None) for one in ("facets", "first", "second")):
+            for group in (getattr(item, one, None) for one in SIDES):
                 if group is not None:
                     facets_of(OWNER, f"the facets of {name}", group, mesh)
+    _refuse_repeated(loads=loads, dashpots=dashpots)
+    _refuse_empty(mesh, clamped, prescribed, tied, dashpots, loads)
     conditions = [Prescribed(group) for group in clamped] + list(prescribed)
     refuse(_contradictions(conditions, tied, dashpots), MpiComm(mesh.comm))
+
+
+def _refuse_repeated(**lists: Sequence[Any]) -> None:
+    """Raise InputError for an object that a list names twice: it would act twice."""
+    for name, items in lists.items():
+        for one, other in combinations(items, 2):
+            if one is other:
+                raise InputError(f"assemble: {name} names one {type(one).__name__} twice, which would act twice; leave "
+                                 "it out once, or give one of twice the size")
+
+
+def _refuse_empty(mesh: Mesh, clamped: Any, prescribed: Any, tied: Any, dashpots: Any, loads: Any) -> None:
+    """Raise InputError, on all ranks, for a boundary group without facets on any rank: it holds and loads nothing."""
+    own = {"clamped": clamped, "prescribed": prescribed, "tied": tied, "dashpots": dashpots, "loads": loads}
+    found = [(name, group) for name, items in own.items() for item in items
+             for group in ([item] if name == "clamped" else [getattr(item, side, None) for side in SIDES])
+             if group is not None]
+    counts = mesh.comm.allreduce(np.array([len(group.indices) for _, group in found], dtype=float))
+    for (name, group), count in zip(found, counts, strict=True):
+        if not count:
+            raise InputError(f"assemble: the boundary group '{group.name}' of {name} has no facets, so it has no "
+                             "effect; correct the group, or leave it out")
 
 
 def _contradictions(held: Sequence[Prescribed], tied: Sequence[Tied], damped: Sequence[Dashpots]) -> Iterator[str]:

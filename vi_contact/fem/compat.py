@@ -15,10 +15,13 @@ import dolfinx
 import numpy as np
 import numpy.typing as npt
 import ufl
+from cffi import VerificationError
 from dolfinx.fem import petsc as fem_petsc
 from dolfinx.mesh import GhostMode, Mesh, meshtags
 from mpi4py import MPI
 from petsc4py import PETSc
+
+from ..core.errors import InputError
 
 Indices = npt.NDArray[np.int32]
 
@@ -34,6 +37,31 @@ _DOFMAP_PER_CELL_TYPE = VERSION >= (0, 11)
 _jit: Any = dolfinx.jit
 _defaults = _jit.DOLFINX_DEFAULT_JIT_OPTIONS if VERSION >= (0, 6) else _jit.DOLFINX_DEFAULT_JIT_PARAMETERS
 _defaults["timeout"] = (120, "Timeout for JIT compilation [s]")
+
+# What compiles --------------------------------------------------------------------------------------------------------
+
+TOGETHER = (  # errors that DOLFINx raises on all ranks when the first one could not compile; all but one are of others
+    "Failed just-in-time compilation of form",
+    "Failed JIT compilation of form",
+    "JIT compilation failed on rank 0",
+)
+
+
+def _compiling(comm: MPI.Comm, make: Callable[[], Any]) -> Any:
+    """Return make(), for which DOLFINx may have to compile; InputError, on all ranks, where no C compiler works."""
+    try:
+        return make()
+    except (RuntimeError, VerificationError) as error:
+        said = str(error)
+        if comm.size > 1 and said.startswith(TOGETHER):
+            said = comm.bcast(said)  # the first rank knows more
+        if not any(f"{kind}Error: " in said for kind in ("Compile", "Link")):
+            raise
+        found = said.split("Error: ", 1)[1].strip().splitlines()[0]
+        raise InputError(
+            f"DOLFINx cannot compile a finite element form ({found}): it needs a C compiler and the headers of Python "
+            "and of the C library; install them (Debian: gcc libc6-dev python3-dev), or name the compiler by the "
+            "environment variable CC") from error
 
 
 # Meshes ---------------------------------------------------------------------------------------------------------------
@@ -163,11 +191,15 @@ def vector_space(mesh: Mesh, degree: int = 1) -> Any:
 def lagrange(mesh: Mesh, degree: int, shape: tuple[int, ...] = (), *, continuous: bool = True) -> Any:
     """Make the space of Lagrange fields of values of this shape: (), (d,) or that of a matrix."""
     family = "Lagrange" if continuous else "DG" if _BASIX_ELEMENTS or is_simplex(mesh) else "DQ"
-    if _BASIX_ELEMENTS:
-        return fem.functionspace(mesh, (family, degree, shape) if shape else (family, degree))
-    if len(shape) == 2:
-        return fem.TensorFunctionSpace(mesh, (family, degree), shape=shape)
-    return (fem.VectorFunctionSpace if shape else fem.FunctionSpace)(mesh, (family, degree))
+
+    def made() -> Any:
+        if _BASIX_ELEMENTS:
+            return fem.functionspace(mesh, (family, degree, shape) if shape else (family, degree))
+        if len(shape) == 2:
+            return fem.TensorFunctionSpace(mesh, (family, degree), shape=shape)
+        return (fem.VectorFunctionSpace if shape else fem.FunctionSpace)(mesh, (family, degree))
+
+    return _compiling(mesh.comm, made)
 
 
 def is_simplex(mesh: Mesh) -> bool:
@@ -217,7 +249,8 @@ def _as_table(rows: Any, layout: Any) -> Indices:
 
 def compile_form(ufl_form: ufl.Form) -> Any:
     """Generate, compile and load the code of a variational form; collective, cached on disk by its signature."""
-    return fem.form(ufl_form)
+    comm = ufl_form.ufl_domain().ufl_cargo().comm
+    return _compiling(comm, lambda: fem.form(ufl_form))
 
 
 def assemble_matrix(form: Any) -> PETSc.Mat:
@@ -234,6 +267,11 @@ def assemble_vector(form: Any) -> PETSc.Vec:
     return vector
 
 
+def assemble_scalar(form: Any) -> float:
+    """Assemble a compiled functional over the cells and facets of this rank; the ranks' values are not added."""
+    return float(fem.assemble_scalar(form))
+
+
 def cell_space(mesh: Mesh) -> Any:
     """Make the space of functions that are constant on every cell."""
     return lagrange(mesh, 0, continuous=False)
@@ -242,7 +280,8 @@ def cell_space(mesh: Mesh) -> Any:
 def expression(expr: Any, space: Any) -> Any:
     """Make what ``Function.interpolate`` takes of an expression of UFL; the points became a property in 0.10."""
     points = space.element.interpolation_points
-    return fem.Expression(expr, points() if callable(points) else points)
+    there = points() if callable(points) else points
+    return _compiling(space.mesh.comm, lambda: fem.Expression(expr, there))
 
 
 def constant(mesh: Mesh, value: float) -> Any:

@@ -7,7 +7,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..core.algebra import Array, Indices, SerialComm, largest
-from ..core.compiled import library
+from ..core.compiled import cholmod, library
 from ..core.contact_last import AT_ONCE, ContactLast, at
 from .petsc_rows import rows_of
 
@@ -15,7 +15,7 @@ from .petsc_rows import rows_of
 def contact_last(comm: Any, mat: Any, last: Indices) -> ContactLast | None:
     """Return the factor of an AIJ matrix on an MpiComm; None without CHOLMOD, and where it cannot: not positive
     definite, which PETSc says better, or too large. Collective."""
-    functions = library(comm)
+    functions = cholmod(comm)
     if functions is None:
         return None
     rows, made = rows_of(mat), None

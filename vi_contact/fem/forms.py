@@ -34,22 +34,25 @@ class ElasticForms:
     Attributes:
         fields: lame, shear, rho, alpha_rho, lame_out times the section's thickness, and beta: functions of DG0, of DG1
             where a material changes inside of cells. Lamé constants are NaN in orthotropic cells.
+        damping: the law of C, as it was given; largest_ratio: the largest xi of the materials, on all ranks.
         damped: whether there is a C; densities: whether ``fields`` tell the mass and its damping, cell by cell.
         materials: (local cells, material) as they were given.
         dilatation: with ``selective``, the mean of tr eps over each cell, which takes its place in K, in C = beta K
             and in stresses (``fem.dilatation``); None otherwise.
-        tells_stress: whether ``stress`` is known; symmetric: whether all matrices are; notes: what comes from where."""
+        tells_stress: whether ``stress`` is known; symmetric: whether all matrices are; notes: what comes from where;
+        own_damping: whether the user gave a form of C."""
 
     boundaries: tuple[Dashpots, ...] = ()  # of the same system
     initial: Any = None  # InitialStrains
     densities = tells_stress = symmetric = True
+    own_damping = False
     notes: tuple[str, ...] = ()
 
     def __init__(
         self, space: FemSpace, materials: list[tuple[Any, Material]], section: Section, damping: Damping,
         *, selective: bool = False,
     ) -> None:
-        self.space, self.section, space.forms = space, section, self
+        self.space, self.section, self.damping, space.forms = space, section, damping, self
         self.dilatation = MeanDilatation(space.V) if selective else None
         self.u, self.v = ufl.TrialFunction(space.V), ufl.TestFunction(space.V)
         self._matrices: dict[str, WeakSet[Any]] = {name: WeakSet() for name in ("M", "C", "K")}
@@ -62,6 +65,8 @@ class ElasticForms:
         self.viscous = found if found and any(found) else None  # (lambda_v, mu_v) [Pa s]
         damped = self.viscous is not None or any(np.any(one) for each in values for one in damping.coefficients(each))
         self.damped = bool(largest(space.comm, damped))  # a ratio may be zero in all cells of some ranks
+        ratios = [_largest_ratio(cells, where, one) for (where, _), one in zip(materials, values, strict=True)]
+        self.largest_ratio = float(largest(space.comm, max(ratios, default=0.0)))
         self.fields = {name: compat.function(cells) for name in names} if materials else {}
         if not self.damped and materials:
             self.fields["alpha_rho"] = self.fields["beta"]  # zeros
@@ -179,7 +184,16 @@ def _constants(space: Any, cells: Any, material: Material) -> Any:
     Collective."""
     if isinstance(material, Heterogeneous):
         return material.at(space, cells)
-    return ElasticValues(np.nan, np.nan, material.rho) if isinstance(material, Orthotropic) else material
+    if isinstance(material, Orthotropic):
+        return ElasticValues(np.nan, np.nan, material.rho, material.xi)
+    return material
+
+
+def _largest_ratio(space: Any, cells: Any, values: Any) -> float:
+    """Return the largest damping ratio of a material in these local cells."""
+    if np.ndim(values.xi):
+        return float(np.max(values.xi[np.ravel(compat.cell_blocks(space)[cells])], initial=0.0))
+    return float(values.xi) if len(cells) else 0.0
 
 
 def _fields(one: Any, section: Section, damping: Damping, dimension: int) -> tuple[Any, ...]:
@@ -224,7 +238,12 @@ def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, Material]]
     for cells, _ in material:
         covered[cells.indices] += 1
     own = covered[: cell_map.size_local]
-    missing, twice = mesh.comm.allreduce(np.array([np.sum(own == 0), np.sum(own > 1)]))
+    counts = [np.sum(np.asarray(cells.indices) < cell_map.size_local) for cells, _ in material]
+    missing, twice, *counts = mesh.comm.allreduce(np.array([np.sum(own == 0), np.sum(own > 1), *counts]))
+    for (cells, _), count in zip(material, counts, strict=True):
+        if not count:
+            raise InputError(f"the cell group '{cells.name}' of a material has no cells: correct the group, or leave "
+                             "its (cells, material) pair out")
     if twice:
         raise InputError(f"{twice} cells have more than one material: give cell groups that do not overlap")
     if missing:

@@ -90,7 +90,7 @@ class Group:
             try:
                 if x.shape[1]:
                     return mask(owner, f"what the marker of '{name}' returned", marker(x), (x.shape[1],))
-            except Exception as error:
+            except Exception as error:  # of a user's function, which may raise anything
                 defects.append(ended(f"{owner}: the marker of '{name}'", error))
             return np.zeros(x.shape[1], dtype=bool)
 
@@ -170,6 +170,7 @@ def node_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
     """Number local geometry nodes (owned, then ghosts) as the input does, from 0: the rank among the nodes in use.
 
     Collective. A part of a mesh (``create_submesh``) knows the numbers of the whole, and is numbered in their order."""
+    instance("node_numbers", "mesh", mesh, Mesh, "give a DOLFINx mesh")
     given = np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)
     if mesh.comm.allreduce(given.max(initial=-1), op=MPI.MAX) < mesh.geometry.index_map().size_global:
         return given

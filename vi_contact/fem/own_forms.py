@@ -63,6 +63,7 @@ class OwnForms(ElasticForms):
         if given.mass is None and not materials:
             raise InputError("assemble: forms=… have no mass; give Forms(…, mass=), or a material for its density")
         self._given, self.tells_stress = given, given.stress is not None
+        self.own_damping = given.damping is not None
         self.densities = given.mass is None and given.damping is None
         rayleigh = damping if isinstance(damping, Rayleigh) else Rayleigh(0.0, 0.0)
         shares = {"M": rayleigh.alpha, "K": rayleigh.beta}

@@ -1,6 +1,7 @@
 """Implement the algebra protocol on PETSc matrices, on any number of ranks; MUMPS factorises, vectors are of numpy."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cached_property
 from typing import Any
 from weakref import WeakValueDictionary
@@ -11,18 +12,14 @@ from petsc4py import PETSc
 
 from ..core.algebra import Array, Factor, Indices, Mask, Matrix, identity_with, total
 from ..core.contact_last import ContactLast
-from ..core.errors import InputError
 from .communicators import MpiComm, give_back
 from .copied_factor import contact_last, product_of_rows
+from .direct import by_mumps, failure, finite, ordering, own_serves
 from .petsc_rows import aij_of, rows_of
 
 PREFIX = "vi_contact_factor_"
-OWN_FACTOR = {"ksp_type": "preonly", "pc_type": "cholesky", "pc_factor_mat_solver_type": "petsc",
-              "pc_factor_mat_ordering_type": "amd"}
-DEFAULTS = ("redundant_", "mat_mumps_icntl_14", "mat_mumps_icntl_20")  # options that are set here
-FULL_ROW = 40.0  # entries of a row: 2D meshes have fewer, 3D meshes more
-FEW_ROWS = 10_000  # with full rows: beyond, MUMPS' dense blocks pay
-COPIED_ROWS = 300_000  # with sparse rows: a copy of the factor on every rank takes about 0.5 GB here
+OWN_FACTOR = {"ksp_type": "preonly", "pc_factor_mat_solver_type": "petsc"}
+TUNING = ("redundant_", "mat_mumps_icntl_14", "mat_mumps_icntl_20")  # options that choose no other factor
 _ENTRY = 8 + np.dtype(PETSc.IntType).itemsize  # bytes of an entry and its column
 RIGHT_SIDES = 64  # right-hand sides per block solve: bounds the memory of the dense blocks
 
@@ -84,9 +81,10 @@ class PetscFactor:
     """Hold a Cholesky factor and its substitutions.
 
     For matrices without contact unknowns, and where CHOLMOD is not to be had: PETSc's own factorisation with minimum
-    degree ordering where it serves (``_own_serves``): its substitutions are 4 to 15 times as fast as those of MUMPS. On
+    degree ordering where it serves (``own_serves``): its substitutions are 4 to 15 times as fast as those of MUMPS. On
     several ranks each keeps a whole copy of it, so that results do not depend on the order of messages, as those of
-    MUMPS do. MUMPS takes the rest: large 3D matrices on several ranks, and what is too large to be copied.
+    MUMPS do. MUMPS takes the rest: large 3D matrices on several ranks, and what is too large to be copied. Where PETSc
+    has no MUMPS its own factorisation takes all, and without SuiteSparse nested dissection orders it; the log says so.
     Options with the prefix vi_contact_factor_ choose otherwise. InputError when the matrix cannot be factorised.
     ``symmetric`` False: LU of MUMPS."""
 
@@ -94,46 +92,48 @@ class PetscFactor:
         mat = matrix.mat
         mat.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)
         kind = "cholesky" if symmetric else "lu"
+        self._mat = mat
         self._b, self._x = mat.createVecs()
         self._pc = PETSc.PC().create(mat.comm)
         self._pc.setOptionsPrefix(PREFIX)
         self._pc.setOperators(mat)
-        self._by_blocks = not symmetric or not _own_serves(mat)
+        self._by_blocks = by_mumps(mat, symmetric=symmetric, own=bool(PETSc.Options(PREFIX).getAll()))
+        defaults: dict[str, object] = {}
         if self._by_blocks:
             self._pc.setType(kind)
             self._pc.setFactorSolverType("mumps")
             # MUMPS may crash on distributed right-hand sides; on busy ranks 20 % of spare room may be too little (-9)
-            _default_options({"mat_mumps_icntl_14": 100, "mat_mumps_icntl_20": 0})
+            defaults = {"mat_mumps_icntl_14": 100, "mat_mumps_icntl_20": 0}
         elif mat.comm.size == 1:
-            self._pc.setType("cholesky")
+            self._pc.setType(kind)
             self._pc.setFactorSolverType("petsc")
-            self._pc.setFactorOrdering("amd")
+            self._pc.setFactorOrdering(ordering())
         else:
             self._pc.setType("redundant")
-            _default_options({f"redundant_{name}": value for name, value in OWN_FACTOR.items()})
-        self._pc.setFromOptions()
-        self._by_blocks = self._by_blocks and self._pc.getType() == kind
-        self._set_up()
+            own = OWN_FACTOR | {"pc_type": kind, "pc_factor_mat_ordering_type": ordering()}
+            defaults = {f"redundant_{name}": value for name, value in own.items()}
+        with _default_options(defaults):
+            self._pc.setFromOptions()
+            self._by_blocks = self._by_blocks and self._pc.getType() == kind
+            self._set_up()
 
     def _set_up(self) -> None:
         try:
             self._pc.setUp()
             self._b.set(1.0)
             self._pc.apply(self._b, self._x)  # PETSc fills it with infinity when the factorisation failed
-            failed = not np.isfinite(self._x.norm())
-        except PETSc.Error:
-            failed = True
-        if failed:
-            raise InputError("the effective matrix cannot be factorised: it is singular or contains NaN: check the "
-                             "materials, and that every part of the body is clamped or has mass")
+            found = finite(self._x)
+        except PETSc.Error as error:
+            raise failure(self._pc, self._mat, error) from error
+        if not found:
+            raise failure(self._pc, self._mat)
 
     @property
     def bytes(self) -> float:
         """Return the bytes of the entries, an equal share on each rank; 0 for factors that tell nothing, as copies."""
-        try:
-            count = self._pc.getFactorMatrix().getInfo()["nz_used"]  # MUMPS counts many in millions, below zero
-        except PETSc.Error:
+        if self._pc.getType() not in ("cholesky", "lu"):
             return 0.0
+        count = self._pc.getFactorMatrix().getInfo()["nz_used"]  # MUMPS counts many in millions, below zero
         return _ENTRY * (count if count >= 0.0 else -1e6 * count) / self._b.comm.size
 
     def solve(self, b: Array) -> Array:
@@ -173,20 +173,18 @@ class PetscFactor:
         return result
 
 
-def _own_serves(mat: Any) -> bool:
-    """Whether PETSc's own factorisation is the better one: sparse rows (2D), or few; on several ranks not too many."""
-    rows = max(mat.getSize()[0], 1)
-    if mat.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"] > FULL_ROW * rows:
-        return bool(rows <= FEW_ROWS)
-    return bool(mat.comm.size == 1 or rows <= COPIED_ROWS)
-
-
-def _default_options(values: Mapping[str, object]) -> None:
-    """PETSc options of the factor that hold unless the user has given them."""
+@contextmanager
+def _default_options(values: Mapping[str, object]) -> Iterator[None]:
+    """PETSc options of the factor that hold while it is made, unless the user has given them: others may differ."""
     database = PETSc.Options(PREFIX)
-    for name, value in values.items():
-        if not database.hasName(name):
-            database[name] = value
+    added = [name for name in values if not database.hasName(name)]
+    for name in added:
+        database[name] = values[name]
+    try:
+        yield
+    finally:
+        for name in added:
+            del database[name]
 
 
 class PetscAlgebra:
@@ -261,8 +259,8 @@ class PetscAlgebra:
 
     def contact_last(self, A: Matrix, last: Indices) -> ContactLast | None:
         mat, given = as_petsc(A).mat, PETSc.Options(PREFIX).getAll()
-        chosen = any(not name.startswith(DEFAULTS) for name in given)  # options of the user choose the factor
-        serves = not chosen and (self.comm.size == 1 or _own_serves(mat))
+        chosen = any(not name.startswith(TUNING) for name in given)  # options of the user choose the factor
+        serves = not chosen and (self.comm.size == 1 or own_serves(mat))
         return contact_last(self.comm, mat, last) if serves else None
 
     def dot(self, x: Array, y: Array) -> float:

@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.algebra import Array, Mask, from_each, largest, max_abs
+from ..core.checks import several
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.state_checks import check_problem_given, check_sizes
@@ -35,7 +36,8 @@ def release(static: ContactProblem, state: State, problem: ContactProblem, *,
     and contact points, and a motion that starts from rest. t = 0. ``earlier``: problems of the stages before
     ``static``, whose supports may be released already. The space of ``problem`` notes where added supports hold it.
     InputError for another mesh or other contact points, or when forces are missing where nothing was released."""
-    for one in (static, problem, *earlier):
+    stages = several("release", "earlier", earlier, "give a list of problems, or leave it out")
+    for one in (static, problem, *stages):
         check_problem_given("release", one)
     check_sizes("release", static, state)
     before, after = _spaces(static, problem)

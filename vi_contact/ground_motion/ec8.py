@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core.algebra import Array
+from ..core.arguments import check_fields, checked
 from ..core.checks import attributes, real
 from ..core.errors import InputError
 
@@ -32,6 +33,7 @@ class EC8Spectrum:
     plateau: float = 2.5
 
     def __post_init__(self) -> None:
+        check_fields(self)
         attributes(self, positive=("ag", "s", "tb", "tc"))
         if not self.tb <= self.tc <= real(self.td):
             raise InputError(f"{self!r}: give periods with tb <= tc <= td")
@@ -39,6 +41,7 @@ class EC8Spectrum:
             raise InputError(f"EC8Spectrum: damping is {self.damping!r}; give a ratio from 0 to below 1, 0.05 for 5 %")
 
     @classmethod
+    @checked
     def on_ground(cls, ground: str, *, ag: float, kind: int = 1, damping: float = 0.05) -> "EC8Spectrum":
         """Return the horizontal spectrum of type `kind` (1, or 2 for weak near earthquakes) on ground "A" to "E"."""
         if kind not in TYPES or ground not in TYPES[kind]["ground"]:
@@ -47,6 +50,7 @@ class EC8Spectrum:
         return cls(ag, s, tb, tc, td, damping=damping)
 
     @classmethod
+    @checked
     def vertical(cls, *, ag: float, kind: int = 1, damping: float = 0.05) -> "EC8Spectrum":
         """Return the vertical spectrum S_ve(T), eqs. 3.8 to 3.11, for every ground; ag is the horizontal one."""
         if kind not in TYPES:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import Array
+from ..core.arguments import checked
 from ..core.errors import InputError
 from ..core.units import STANDARD_GRAVITY
 from .processing import integrated
@@ -14,31 +15,37 @@ from .record import UNITS, Record
 from .spectra import fourier_spectrum, response_spectrum
 
 
+@checked
 def pga(record: Record) -> float:
     """Return the peak ground acceleration, the largest |a| of the samples [m/s²]."""
     return float(np.max(np.abs(record.acceleration)))
 
 
+@checked
 def pga_time(record: Record) -> float:
     """Return the time of the first sample that reaches the peak ground acceleration [s]."""
     return float(np.argmax(np.abs(record.acceleration))) * record.dt
 
 
+@checked
 def pgv(record: Record) -> float:
     """Return the peak ground velocity, the largest |v| at the samples of the integrated record [m/s]."""
     return float(np.max(np.abs(integrated(record)[0])))
 
 
+@checked
 def pgd(record: Record) -> float:
     """Return the peak ground displacement, the largest |u| of the twice integrated samples, with their drift [m]."""
     return float(np.max(np.abs(integrated(record)[1])))
 
 
+@checked
 def arias(record: Record) -> float:
     """Return the Arias intensity pi / (2 g) times the integral of a² over the record, by the trapezoidal rule [m/s]."""
     return float(husid(record)[-1])
 
 
+@checked
 def d5_95(record: Record) -> float:
     """Return the time between 5 % and 95 % of the Arias intensity [s], zero for a record that is all zero.
 
@@ -46,6 +53,7 @@ def d5_95(record: Record) -> float:
     return significant_duration(record, 0.05, 0.95)
 
 
+@checked
 def husid(record: Record) -> Array:
     """Return the Arias intensity accumulated up to each sample, shape (n,) [m/s]."""
     square = record.acceleration**2
@@ -53,6 +61,7 @@ def husid(record: Record) -> Array:
     return math.pi / (2.0 * STANDARD_GRAVITY) * np.concatenate(([0.0], np.cumsum(steps)))
 
 
+@checked
 def significant_duration(record: Record, start: float, end: float) -> float:
     """Return the time between fractions `start` and `end` of the Arias intensity [s]; zero if all is zero."""
     if not 0.0 <= start < end <= 1.0:
@@ -64,6 +73,7 @@ def significant_duration(record: Record, start: float, end: float) -> float:
     return float(last - first)
 
 
+@checked
 def cav(record: Record) -> float:
     """Return the cumulative absolute velocity, the integral of |a| [m/s], exact for straight lines between samples."""
     a, b = np.abs(record.acceleration[:-1]), np.abs(record.acceleration[1:])
@@ -72,6 +82,7 @@ def cav(record: Record) -> float:
     return float(np.sum(0.5 * record.dt * np.where(change, (a**2 + b**2) / total, a + b)))
 
 
+@checked
 def rms(record: Record) -> float:
     """Return the root of the mean of a² over the record, by the trapezoidal rule [m/s²]."""
     return math.sqrt(2.0 * STANDARD_GRAVITY / math.pi * arias(record) / record.duration)
@@ -81,17 +92,20 @@ HOUSNER_PERIODS = np.linspace(0.1, 2.5, 241)  # periods [s] of the trapezoidal r
 PREDOMINANT_PERIODS = np.geomspace(0.02, 10.0, 400)  # periods [s] among which `predominant_period` looks, 1.6 % apart
 
 
+@checked
 def psa(record: Record, period: float, *, damping: float = 0.05) -> float:
     """Return the pseudo-acceleration at one period [m/s²]."""
     return float(response_spectrum(record, np.array([period]), damping=damping).psa[0])
 
 
+@checked
 def housner_intensity(record: Record, *, damping: float = 0.05) -> float:
     """Return Housner's spectrum intensity: integral of the pseudo-velocity over T from 0.1 to 2.5 s [m]."""
     psv = response_spectrum(record, HOUSNER_PERIODS, damping=damping).psv
     return float(np.sum(0.5 * (psv[:-1] + psv[1:]) * np.diff(HOUSNER_PERIODS)))
 
 
+@checked
 def predominant_period(record: Record, *, damping: float = 0.05) -> float:
     """Return the period of the largest pseudo-acceleration from 0.02 (or ten steps of the record) to 10 s [s]."""
     periods = PREDOMINANT_PERIODS[PREDOMINANT_PERIODS / record.dt >= 10.0]
@@ -100,6 +114,7 @@ def predominant_period(record: Record, *, damping: float = 0.05) -> float:
     return float(periods[np.argmax(response_spectrum(record, periods, damping=damping).psa)])
 
 
+@checked
 def mean_period(record: Record) -> float:
     """Return the mean period of Rathje, Abrahamson and Bray (1998) [s]: sum(C²/f) / sum(C²), 0.25 <= f <= 20 Hz.
 
@@ -112,6 +127,7 @@ def mean_period(record: Record) -> float:
     return float(np.sum(power / frequencies[inside]) / np.sum(power))
 
 
+@checked
 def record_info(record: Record) -> str:
     """Return the table of a record: where it comes from, peaks, intensities, what is left at its end,
     what is doubted, notes."""

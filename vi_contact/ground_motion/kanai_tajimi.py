@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.algebra import Array
-from ..core.checks import attributes, counted
+from ..core.arguments import check_fields, checked
+from ..core.checks import attributes, counted, whole
 from ..core.errors import InputError
 from .record import Record
 
@@ -52,6 +53,7 @@ class Envelope:
     decay: float
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if not 0.0 <= self.rise <= self.end < math.inf or not 0.0 <= self.decay < math.inf:
             raise InputError(f"{self!r}: give 0 <= rise <= end in seconds and decay >= 0 in 1/s")
 
@@ -62,6 +64,7 @@ class Envelope:
         return np.where(times < self.rise, rising, falling)
 
 
+@checked
 def synthetic(spectrum: KanaiTajimi, duration: float, dt: float, *, seed: int,
               envelope: Envelope | None = None) -> Record:
     """Make a motion of this density: a = sum sqrt(4 S(w_k) dw) cos(w_k t + phi_k), phi_k uniform from `seed`.
@@ -72,6 +75,7 @@ def synthetic(spectrum: KanaiTajimi, duration: float, dt: float, *, seed: int,
     `scaled_to_pga`; correct the baseline where displacements are prescribed. InputError unless 0 < dt < duration."""
     if not 0.0 < dt < duration < math.inf:
         raise InputError(f"synthetic: duration={duration!r}, dt={dt!r} s; give 0 < dt < duration")
+    seed = whole("synthetic", "seed", seed, most=2**63 - 1)
     counted("synthetic", f"duration={duration!r} and dt={dt!r} s", 4.0 * duration / dt)
     count = math.floor(duration / dt * (1.0 + 1e-12)) + 1
     size = 2 ** math.ceil(math.log2(2 * count))

@@ -9,6 +9,7 @@ from fractions import Fraction
 import numpy as np
 
 from ..core.algebra import Array
+from ..core.arguments import checked
 from ..core.checks import counted, number
 from ..core.errors import InputError
 from .record import Record
@@ -17,12 +18,14 @@ LARGEST_RATIO = 1000  # numerator and denominator of old dt / new dt may not exc
 HIGHEST = 6  # highest degree of a baseline: beyond it a polynomial follows the shaking itself
 
 
+@checked
 def scaled(record: Record, *, factor: float) -> Record:
     """Scale every sample by `factor`; a negative one turns the motion round. Raises InputError unless it is finite."""
     factor = number("scaled", "factor", factor)
     return record.changed(factor * record.acceleration, f"scaled by {factor:.6g}")
 
 
+@checked
 def resampled(record: Record, dt: float) -> Record:
     """Return the record at time step dt [s]: band-limited interpolation up, anti-aliased decimation down.
 
@@ -51,6 +54,7 @@ def resampled(record: Record, dt: float) -> Record:
     return record.changed(samples, f"resampled from {record.dt:g} s to {dt:g} s", dt=float(dt))
 
 
+@checked
 def integrated(record: Record) -> tuple[Array, Array]:
     """Return ground velocity [m/s] and displacement [m] at the samples, both shape (n,) and zero at t = 0.
 
@@ -63,6 +67,7 @@ def integrated(record: Record) -> tuple[Array, Array]:
     return velocity, displacement
 
 
+@checked
 def trimmed(record: Record, start: float = 0.0, end: float | None = None) -> Record:
     """Keep the samples at start <= t <= end [s]; the first one kept becomes t = 0. end: the record's last sample.
 
@@ -79,6 +84,7 @@ def trimmed(record: Record, start: float = 0.0, end: float | None = None) -> Rec
                           f"trimmed to {first:g} ... {float(record.times[inside][-1]):g} s")
 
 
+@checked
 def padded(record: Record, before: float = 0.0, after: float = 0.0) -> Record:
     """Add zeros for `before` seconds ahead of the record and `after` seconds behind it, rounded up to whole steps.
 
@@ -92,6 +98,7 @@ def padded(record: Record, before: float = 0.0, after: float = 0.0) -> Record:
     return record.changed(np.pad(record.acceleration, counts), note)
 
 
+@checked
 def without_mean(record: Record, *, until: float | None = None) -> Record:
     """Subtract the mean of the record, or of the samples at t <= until [s], the quiet before the shaking.
 
@@ -105,6 +112,7 @@ def without_mean(record: Record, *, until: float | None = None) -> Record:
     return record.changed(record.acceleration - mean, f"mean{where} removed: {mean:.6g} m/s2")
 
 
+@checked
 def tapered(record: Record, *, fraction: float = 0.05) -> Record:
     """Bring both ends to zero by half a cosine over `fraction` of the record's duration.
 
@@ -118,6 +126,7 @@ def tapered(record: Record, *, fraction: float = 0.05) -> Record:
     return record.changed(record.acceleration * (window * window[::-1]), note)
 
 
+@checked
 def filtered(record: Record, *, low: float | None = None, high: float | None = None, order: int = 4,
              causal: bool = False) -> Record:
     """Apply a Butterworth high-pass above `low` [Hz], low-pass below `high` [Hz], or band-pass between them.
@@ -154,6 +163,7 @@ def filtered(record: Record, *, low: float | None = None, high: float | None = N
     return record.changed(samples, f"Butterworth {kind} {band} Hz, order {order}, {passes}")
 
 
+@checked
 def baseline_corrected(record: Record, *, degree: int = 2, displacement: bool = False) -> Record:
     """Return the record minus p(t) = sum c_k (t/T)^k, k = 0..degree, T its duration; c fits the integrated motion.
 

@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..core.algebra import Array
-from ..core.checks import array, number
+from ..core.arguments import checked
+from ..core.checks import array, instance, number
 from ..core.errors import InputError
 from ..core.units import STANDARD_GRAVITY
 
@@ -46,6 +47,8 @@ class Record:
     doubts: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        for name in ("title", "source", "format", "units", "sha256", "station", "component"):
+            instance("Record", name, getattr(self, name), str, "give a text")
         owner = self.source or "Record"
         samples = array(owner, "acceleration", self.acceleration, (None,), unit="m/s2")
         if samples.size < 2:
@@ -87,6 +90,7 @@ def known_units(units: str) -> str | None:
     return text if text in UNITS else None
 
 
+@checked
 def canonical_units(source: str, units: str) -> str:
     """Return the key of UNITS that `units` spells ("CM/SEC/SEC", "(g)", "cm/s^2"); InputError if there is none."""
     text = known_units(units) if isinstance(units, str) else None

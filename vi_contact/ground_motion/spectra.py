@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.algebra import Array
+from ..core.arguments import checked
 from ..core.checks import counted
 from ..core.errors import InputError
 from .record import Record
@@ -89,6 +90,7 @@ def _series(time: Array | float, omega: Array, zeta: float, first: int) -> Array
     return np.array([total, rate])
 
 
+@checked
 def response_spectrum(record: Record, periods: Array, *, damping: float = 0.05) -> ResponseSpectrum:
     """Return the peaks of relative displacement, relative velocity and absolute acceleration at each period [s].
 
@@ -111,6 +113,7 @@ def response_spectrum(record: Record, periods: Array, *, damping: float = 0.05) 
     return ResponseSpectrum(row, damping, *peaks)
 
 
+@checked
 def fourier_spectrum(record: Record) -> tuple[Array, Array]:
     """Return the frequencies [Hz] and Fourier amplitudes |A(f)| [m/s], from 0 to the Nyquist frequency.
 

@@ -11,7 +11,7 @@ between the two, so that a stress times a nodal weight becomes either. The slope
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -27,6 +27,7 @@ class Tresca:
     ``threshold``: a number, or one per contact point (then kept as a tuple). Raises InputError when one is negative or
     not a finite number, and, when used, for a wrong count."""
 
+    never_negative: ClassVar[bool] = True  # it has checked its values
     threshold: float | Array | tuple[float, ...]
 
     def __post_init__(self) -> None:
@@ -52,6 +53,7 @@ class Coulomb:
     ``mu`` is a number, or has one per contact point (then kept as a tuple). InputError is raised when one is negative
     or not a finite number, and, when the law is used, if their count is wrong."""
 
+    never_negative: ClassVar[bool] = True  # it has checked its values
     mu: float | Array | tuple[float, ...]
 
     def __post_init__(self) -> None:

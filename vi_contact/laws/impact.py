@@ -68,7 +68,8 @@ class ImpulseUpdate:
 
     def __call__(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
         worth = IN_PLANE if surface.points.shape[1] == 2 else 1
-        is_small = system.cached("small impacts", lambda: small(surface.comm, system.rows, surface.count, worth=worth))
+        is_small = system.cached("small impacts", lambda: small(surface.comm, system.rows, surface.count, worth=worth),
+                                 surface)
         return (self._condensed if is_small else self._iterative)(system, surface, v, target)
 
     def _iterative(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
@@ -83,7 +84,7 @@ class ImpulseUpdate:
         chosen: Indices = np.flatnonzero(~np.isnan(jump))
         if len(chosen) == 0:
             return v
-        flexibility, response = system.cached("impulse update", lambda: _prepared(system, surface))
+        flexibility, response = system.cached("impulse update", lambda: _prepared(system, surface), surface)
         impulse = np.zeros(surface.total)
         impulse[chosen] = np.linalg.solve(flexibility[np.ix_(chosen, chosen)], jump[chosen])
         return np.asarray(v + response(impulse))

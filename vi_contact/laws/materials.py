@@ -6,28 +6,36 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
-from ..core.checks import attributes, number
+from ..core.checks import attributes, number, shown
 from ..core.errors import InputError
 
 EXTREME = 1e100  # beyond it, and below its inverse, squares are no numbers any more
+RATIO = "give ratios from 0 to less than 1, not per cent"
+
+
+def check_ratio(owner: str, xi: Any) -> None:
+    """Raise InputError unless the damping ratio of a material is a number from 0 to less than 1."""
+    if not 0.0 <= number(owner, "the damping ratio xi", xi) < 1.0:
+        raise InputError(f"{owner}: the damping ratio xi is {shown(xi)}; {RATIO}")
 
 
 @dataclass(frozen=True)
 class LinearElastic:
     """Describe isotropic elasticity, sigma = lame_lambda tr(eps) I + 2 shear_modulus eps.
 
-    E: Young's modulus [Pa] > 0; nu: Poisson's ratio, -1 < nu < 1/2; rho: mass density [kg/m³] > 0.
+    E: Young's modulus [Pa] > 0; nu: Poisson's ratio, -1 < nu < 1/2; rho: mass density [kg/m³] > 0; xi: damping ratio,
+    0 <= xi < 1, at the frequency of ``DampingRatio``, the one law that reads it.
     InputError is raised when one of them is outside its range or not finite."""
 
     E: float
     nu: float
     rho: float
-    xi: ClassVar[float] = 0.0  # what DampingRatio asks for
+    xi: float = 0.0
 
     def __post_init__(self) -> None:
-        if any(callable(one) or hasattr(one, "ufl_shape") for one in (self.E, self.nu, self.rho)):
-            raise InputError("LinearElastic: E, nu and rho are numbers; give fem.Heterogeneous(E, nu, rho) where they "
-                             "change from place to place")
+        if any(callable(one) or hasattr(one, "ufl_shape") for one in (self.E, self.nu, self.rho, self.xi)):
+            raise InputError("LinearElastic: E, nu, rho and xi are numbers; give fem.Heterogeneous(E, nu, rho, xi) "
+                             "where they change from place to place")
         number("LinearElastic", "Young's modulus E [Pa]", self.E, positive=True)
         number("LinearElastic", "Poisson's ratio nu", self.nu)
         number("LinearElastic", "the mass density rho [kg/m³]", self.rho, positive=True)
@@ -37,10 +45,11 @@ class LinearElastic:
         if not -1.0 < self.nu < 0.5:
             raise InputError(f"LinearElastic: Poisson's ratio nu is {self.nu!r}; give a number between -1 and 0.5, "
                              "both excluded (nearly incompressible materials need a mixed method)")
+        check_ratio("LinearElastic", self.xi)
 
     @classmethod
-    def from_wave_speeds(cls, c_p: float, c_s: float, rho: float) -> "LinearElastic":
-        """Return the material whose pressure and shear waves travel at c_p and c_s [m/s].
+    def from_wave_speeds(cls, c_p: float, c_s: float, rho: float, xi: float = 0.0) -> "LinearElastic":
+        """Return the material whose pressure and shear waves travel at c_p and c_s [m/s], with the damping ratio xi.
 
         nu = (c_p² - 2 c_s²) / (2 (c_p² - c_s²)), shear_modulus = rho c_s², E = 2 shear_modulus (1 + nu).
         Raises InputError unless c_p > sqrt(4/3) c_s > 0, which is nu > -1."""
@@ -50,7 +59,7 @@ class LinearElastic:
             raise InputError(f"LinearElastic.from_wave_speeds: c_p = {c_p!r} is too slow for c_s = {c_s!r}; "
                              "give c_p > sqrt(4/3) c_s, as an elastic solid has")
         nu = (c_p**2 - 2.0 * c_s**2) / (2.0 * (c_p**2 - c_s**2))
-        return cls(E=2.0 * rho * c_s**2 * (1.0 + nu), nu=nu, rho=rho)
+        return cls(E=2.0 * rho * c_s**2 * (1.0 + nu), nu=nu, rho=rho, xi=xi)
 
     @property
     def lame_lambda(self) -> float:
@@ -218,8 +227,10 @@ class Rayleigh:
 
 @dataclass(frozen=True)
 class DampingRatio:
-    """Damp by the ratio xi of each material at one frequency f1 [Hz], or at two. The ratio is that of
-    ``fem.Heterogeneous``, where it may change from cell to cell, and zero for other materials.
+    """Damp by the ratio xi of each material at one frequency f1 [Hz], or at two.
+
+    Every material has a xi, zero by default; that of ``fem.Heterogeneous`` may change from cell to cell. ``assemble``
+    refuses the law where no material has one, and a ratio of a material without this law.
 
         C = alpha M + beta K,    alpha = 2 xi w1 w2 / (w1 + w2),    beta = 2 xi / (w1 + w2),    w = 2 pi f
 
@@ -267,3 +278,7 @@ class KelvinVoigt:
     def viscosities(self) -> tuple[float, float]:
         """Return (lambda_v, mu_v) [Pa s] of sigma_v = lambda_v tr(eps') I + 2 mu_v eps'."""
         return self.bulk - 2.0 / 3.0 * self.shear, self.shear
+
+
+BLIND_TO_RATIOS = (NoDamping, MassProportional, Rayleigh, KelvinVoigt)
+"""Damping laws that do not read the ratio xi of a material."""

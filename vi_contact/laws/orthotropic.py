@@ -9,7 +9,7 @@ import numpy as np
 from ..core.algebra import Array
 from ..core.checks import array, number
 from ..core.errors import InputError
-from .materials import PlaneStress, Section
+from .materials import PlaneStress, Section, check_ratio
 
 NORMAL, SHEAR = ("1", "2", "3"), ("12", "13", "23")
 DEFINITE = 1e-12  # the least eigenvalue of the scaled compliance, whose diagonal is one
@@ -31,6 +31,7 @@ class Orthotropic:
         nu12, nu13, nu23: Poisson's ratios.
         axes: the angle [rad] from x to axis 1, anticlockwise about z, which is axis 3; or a rotation matrix (3, 3)
             whose columns are the axes 1, 2, 3. A body in the plane needs z among the axes.
+        xi: damping ratio, 0 <= xi < 1, at the frequency of ``DampingRatio``, the one law that reads it.
     Raises:
         InputError: a modulus or density that is not positive, ratios with which some strain would have negative energy,
             axes that are no rotation."""
@@ -46,12 +47,14 @@ class Orthotropic:
     G23: float
     rho: float
     axes: float | Sequence[Sequence[float]] = 0.0
+    xi: float = 0.0
 
     def __post_init__(self) -> None:
         for name in (*(f"E{i}" for i in NORMAL), *(f"G{ij}" for ij in SHEAR), "rho"):
             number("Orthotropic", name, getattr(self, name), positive=True)
         for name in (f"nu{ij}" for ij in SHEAR):
             number("Orthotropic", name, getattr(self, name))
+        check_ratio("Orthotropic", self.xi)
         root = np.sqrt([self.E1, self.E2, self.E3])
         if np.linalg.eigvalsh(root[:, None] * self._compliance * root)[0] < DEFINITE:
             raise InputError(f"Orthotropic: with nu12 = {self.nu12:g}, nu13 = {self.nu13:g} and nu23 = {self.nu23:g} "

@@ -5,11 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..core.algebra import Array, largest, max_abs
 from ..core.checks import array, instance, number, several, whole
 from ..core.errors import InputError
 from ..core.system import SemiDiscreteSystem
 from ..core.units import STANDARD_GRAVITY
 from .free_motions import bodies_in
+
+NOTHING = 1e-9  # of the largest weight of an unknown
+ALIKE = 0.05  # of a weight: what 9.81 for 9.80665, or a rounded unit weight, is off
+SHARE = 0.1  # of the unknowns of a body: a load on so many is no traction
 
 
 def with_weight(system: SemiDiscreteSystem, *, acceleration: float = STANDARD_GRAVITY,
@@ -19,7 +24,8 @@ def with_weight(system: SemiDiscreteSystem, *, acceleration: float = STANDARD_GR
     acceleration: g [m/s²]; direction: where it acts, of length one, (0, -1) or (0, 0, -1) by default, in one dimension
     (-1,). bodies: the numbers of those that have weight (``fem.bodies_of``), all by default. It is the load of
     ``BodyForce`` with the density of every material. InputError for a direction of another length, and a system without
-    ``base_inertia``: it lost the mass at held nodes."""
+    ``base_inertia``: it lost the mass at held nodes; for weight that no unknown feels; and for weight that the system
+    has already, as a constant load of nearly its size: of ``BodyForce``, or of this function. Collective."""
     instance("with_weight", "system", system, SemiDiscreteSystem, "give a system, such as fem.assemble returns")
     number("with_weight", "acceleration", acceleration, unit="m/s²")
     d = system.influence.shape[1]
@@ -36,4 +42,24 @@ def with_weight(system: SemiDiscreteSystem, *, acceleration: float = STANDARD_GR
         given = several("with_weight", "bodies", bodies, "give numbers such as fem.bodies_of returns, or None")
         heavy = [whole("with_weight", "the number of a body", one, most=last) for one in given]
         weight = np.where(np.isin(numbers, heavy), weight, 0.0)
+    if bodies is None or len(bodies):
+        _refuse_vain(system, weight)
     return system.changed(load=replace(system.load, constant=system.load.constant + weight))
+
+
+def _refuse_vain(system: SemiDiscreteSystem, weight: Array) -> None:
+    """Raise InputError, on all ranks, for weight that nothing feels, or that the constant loads hold already."""
+    comm = system.algebra.comm
+    size = largest(comm, max_abs(weight))
+    if not size:
+        raise InputError("with_weight: no unknown feels the weight, as its acceleration is zero or its bodies are held "
+                         "everywhere; leave it out")
+    # Body by body: of how many unknowns the constant load is the weight. Tractions touch few, a weight nearly all.
+    numbers = np.asarray(system.space.bodies)
+    heavy = np.abs(weight) > NOTHING * size
+    alike = heavy & (np.abs(system.load.constant - weight) <= ALIKE * np.abs(weight))
+    count = bodies_in(comm, numbers)
+    having, doubled = comm.sum(np.array([np.bincount(numbers[one], minlength=count) for one in (heavy, alike)], float))
+    if np.any((doubled > 0.0) & (doubled >= SHARE * having)):
+        raise InputError("with_weight: the system has this weight already among its constant loads, as a BodyForce or "
+                         "from an earlier with_weight, and would weigh twice as much; leave one of the two out")

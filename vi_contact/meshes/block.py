@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from vi_contact.core.arguments import check_fields
 from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.grid import Array, Grid, add_grids, lattice
@@ -32,6 +33,7 @@ class BlockMesh:
     angle: float = 0.0
 
     def __post_init__(self) -> None:
+        check_fields(self)
         check_box(self.lengths, self.divisions)
         if self.corner is not None and len(self.corner) != len(self.lengths):
             raise InputError(f"block corner is {self.corner}: give {len(self.lengths)} coordinates, one per length")

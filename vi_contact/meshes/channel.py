@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from vi_contact.core.arguments import check_fields
 from vi_contact.core.checks import MOST_CELLS, attributes, counted
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.extract import MeshArrays, add_arrays
@@ -41,6 +42,7 @@ class ChannelMesh:
     triangles: bool = False
 
     def __post_init__(self) -> None:
+        check_fields(self)
         given = () if self.far is None else ("far",)
         attributes(self, positive=("width", "depth", "outer_width", "height", "wall", "slab", "size", *given))
         if not (2.0 * self.wall < self.outer_width and self.slab < self.height < self.depth):

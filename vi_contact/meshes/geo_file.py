@@ -1,68 +1,77 @@
 """Mesh a Gmsh script (.geo) that holds nothing but geometry, sizes, groups and arithmetic.
 
-Gmsh runs commands of the shell and opens files from scripts, so none is given to it as it stands. The script is cut
-into words, and written anew from those that geo_words.toml lists; names of its own get a prefix, so that none can be a
-command, and texts stand only where groups are named. A process of its own meshes it, for a limited time and in half of
-the machine's memory."""
+``geo_script`` writes the script anew in words that can do no harm. A process of its own meshes it, for a limited time
+and in half of the machine's memory."""
 
 import ctypes
+import logging
 import os
 import re
 import resource
 import signal
 import subprocess
 import sys
-import tomllib
-from collections.abc import Iterator
-from dataclasses import dataclass
-from importlib.resources import files
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from stat import S_ISREG
 from tempfile import TemporaryDirectory
 from typing import Any
 
 from vi_contact.core.checks import number, shown, whole
 from vi_contact.core.errors import InputError
-from vi_contact.meshes.gmsh_session import session
+from vi_contact.meshes.geo_script import PREFIX, allowed
+from vi_contact.meshes.gmsh_session import options, session
 from vi_contact.meshes.mesh_file import safe_copy
 
-LARGEST, MOST = 2_000_000, 8  # bytes of a script; how often it may be refined
-_LISTS = tomllib.loads(files(__package__).joinpath("geo_words.toml").read_text(encoding="utf-8"))
-_WORDS, _OPTIONS, _OF_FIELDS = (frozenset(_LISTS[name].split()) for name in ("words", "options", "fields"))
-_TOKEN = re.compile(
-    r"(?P<blank>[ \t]+|//[^\n]*|/\*.*?\*/|\n)|(?P<open>/\*[^\n]*)|"
-    r"(?P<text>\"[^\"\\\x00-\x1f]*\")|(?P<name>[A-Za-z_]\w*)|"
-    r"(?P<sign>(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?|[-+*/<>=!]=|&&|\|\||\+\+|--|[-+*/%^<>!?:=,;.#(){}\[\]])",
-    re.ASCII | re.DOTALL)
-_SET = re.compile(r"(?<![\w.])([A-Za-z_]\w*)\s*(?:=(?!=)|\[\s*\]\s*=|\(\s*\)\s*=|In\b)", re.ASCII)  # names that are set
-_GROUP = re.compile(r'( Physical\s+(Line|Curve|Surface|Volume)\s+\(\s*(?:"([^"%]*)[^"]*")?[^"()]*\)\s+\+?=)'
-                    r"(?!\s*\{\s*:)((?:[^;{}]|\{(?:[^{}]|\{(?:[^{}]|\{[^{}]*+\})*+\})*+\})*+);")
-_CHECKED = (r' told [ ] =\4; If (#told[] == 0) Error("it is empty, the group \3"); EndIf Printf("in the group \3");'
-            r" told_[] = Boundary{ \2{ told[] }; };\1 told [ ] ;")  # Gmsh leaves out of groups what is not there
-_ARITHMETIC = re.compile(r'"[\w\s.,+*/^()-]*"', re.ASCII)
+MOST = 8  # how often a mesh may be refined
+log = logging.getLogger(__name__)
+_NOT_TRANSFINITE = re.compile(
+    r"Error\s*: ((?:Surface|Volume) \d+) cannot be meshed using the transfinite algo \((.*)\)"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
 class GeoFile:
-    """Describe the mesh of a Gmsh script at ``path``: its physical groups, cells of the highest dimension they have.
+    """Describe the mesh of a Gmsh script: its physical groups, cells of the highest dimension that they have.
 
-    refine: how often Gmsh divides all cells into 2^d, new nodes on the curves of the geometry; time_limit: of the
-    meshing [s]. InputError for words that are not allowed, with their line; when Gmsh fails, or time or memory is over.
+    Statements that change no mesh, such as ``Printf``, ``Save``, ``Mesh 2`` and options of Gmsh's window, are left out,
+    and a warning in the log lists them.
+
+    Args:
+        path: the script.
+        refine: how often Gmsh divides all cells into 2^d; new nodes lie on the curves of the geometry.
+        time_limit: seconds that the meshing may take.
+        numbers: values of names that the script uses and does not set, or sets by DefineConstant alone; as Gmsh's
+            option -setnumber.
+    Raises:
+        InputError: words that are not allowed, all with their lines; numbers without effect; when Gmsh fails, or time
+            or memory is over.
     """
 
     path: Path
     refine: int = 0
     time_limit: float = 300.0
+    numbers: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
         whole("GeoFile", "refine", self.refine, most=MOST)
         number("GeoFile", "time_limit", self.time_limit, positive=True, unit="seconds")
+        if not isinstance(self.numbers, Mapping):
+            raise InputError(f"GeoFile: numbers is {shown(self.numbers)}; give names and their values")
+        for name, value in self.numbers.items():
+            if not (isinstance(name, str) and name.isascii() and name.isidentifier()):
+                raise InputError(f"GeoFile: numbers has the name {shown(name)}; give a name of the script")
+            number("GeoFile", f"numbers of '{name}'", value)
 
     def build(self, gmsh: Any) -> None:
         """Mesh the script beside this process and read the mesh into Gmsh's current model."""
         with TemporaryDirectory(prefix="vi_contact-") as folder:
-            Path(folder, "script.geo").write_text(allowed(self.path), encoding="utf-8")
+            script = allowed(self.path, self.numbers)
+            if script.left_out:
+                places = ", ".join(f"line {line} {words}" for line, words in script.left_out)
+                log.warning("%s: left out, as it changes no mesh: %s", self.path, places)
+            Path(folder, "script.geo").write_text(script.text, encoding="utf-8")
             code = ("import sys; sys.path = sys.argv[1:]; from vi_contact.meshes.geo_file import mesh_here; "
                     f"mesh_here({self.refine}, {self.time_limit})")
             command = [sys.executable, "-c", code, *map(os.path.abspath, sys.path)]
@@ -73,10 +82,13 @@ class GeoFile:
                 raise InputError(f"{self.path}: Gmsh did not end within {self.time_limit:g} s: ask for larger cells, "
                                  "or give a longer time_limit") from None
             if done.returncode:
-                said = (done.stderr.strip().splitlines() or ["it ended, perhaps without memory"])[-1]
+                how = f"signal {-done.returncode}" if done.returncode < 0 else f"status {done.returncode}"
+                said = (done.stderr.strip().splitlines() or [f"it ended without a word, with {how}"])[-1]
                 if said.strip().startswith(("terminate called", "what()")):  # for a text that Gmsh throws
                     said = "it stopped at a formula or size: check Field[…].F, and that Mesh.MeshSize… is positive"
-                raise InputError(f"{self.path}: Gmsh cannot mesh it: {said.replace('own_', '')}")
+                raise InputError(f"{self.path}: Gmsh cannot mesh it: {said.replace(PREFIX, '')}")
+            for note in done.stdout.splitlines():
+                log.warning("%s: %s", self.path, note)
             gmsh.merge(str(safe_copy(Path(folder, "made.msh"), Path(folder))))
 
 
@@ -87,7 +99,7 @@ def mesh_here(refine: int, time_limit: float) -> None:
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
     for limit in (resource.RLIMIT_AS, resource.RLIMIT_FSIZE):
         resource.setrlimit(limit, (memory, memory))
-    with session() as gmsh:
+    with session() as gmsh, options(gmsh, {"General.AbortOnError": 0}):  # errors are read from Gmsh's log
         gmsh.logger.start()
         try:
             gmsh.merge("script.geo")
@@ -101,53 +113,16 @@ def mesh_here(refine: int, time_limit: float) -> None:
                 gmsh.model.mesh.setOrder(int(gmsh.option.getNumber("Mesh.ElementOrder")))
             gmsh.write("made.msh")
         finally:
-            for before, line in pairwise(["", *gmsh.logger.get()]):
-                if line.startswith("Error"):
-                    sys.exit(f"{line} {'in' * (': in the group' in before)}{before.partition(': in')[2]}".rstrip())
+            _tell_errors(gmsh.logger.get())
 
 
-def allowed(path: Path) -> str:
-    """Return the script in listed words alone, each in its line. InputError like ``GeoFile``."""
-    try:
-        if not S_ISREG(os.stat(path).st_mode):
-            raise OSError("it is no file")
-        with open(path, "rb") as file:
-            data = file.read(LARGEST + 1)
-        text = re.sub("\r\n?", "\n", data.decode("utf-8-sig"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"Gmsh script {shown(str(path))} cannot be read ({error}): check the path") from None
-    if len(data) > LARGEST:
-        raise InputError(f"{path}: the script has more than {LARGEST} bytes: mesh it yourself")
-    return _GROUP.sub(_CHECKED, "".join(_written(path, text, set(_SET.findall(text)) - _WORDS))) + "\n"
-
-
-def _written(path: Path, text: str, own: set[str]) -> Iterator[str]:
-    """Yield the words that Gmsh gets; ``own``: names of the script."""
-    words, place, line, level = ["", "", ""], 0, 1, 0  # level: brackets that are open since the last For
-    begins = ends = False  # Gmsh repeats whole lines, from the one below For {…} to that of EndFor: they end there
-    while place < len(text):
-        found = _TOKEN.match(text, place)
-        kind, word = (str(found.lastgroup), found[0]) if found else ("", text[place])
-        place += len(word)
-        line += word.count("\n")
-        attributes = _OPTIONS if words[-2] == "Mesh" else _OF_FIELDS if words[-2] == "]" else ()
-        if kind == "blank":
-            ends = ends and "\n" not in word
-            yield "\n" * word.count("\n")
+def _tell_errors(lines: Sequence[str]) -> None:
+    """Print a note where Gmsh left a transfinite mesh out, and end the process at any other error of its log."""
+    for before, line in pairwise(["", *lines]):
+        if not line.startswith("Error"):
             continue
-        if kind == "text":
-            named = words[-1] == "(" and (words[-2] == "SetFactory" or words[-3] == "Physical")
-            fits = named or (words[-3:] == [".", "F", "="] and bool(_ARITHMETIC.fullmatch(word)))
-        elif kind == "name":
-            fits = word in attributes if words[-1] == "." else word in _WORDS or word in own
-        else:
-            fits = kind == "sign" and (word != "." or words[-1] in ("Mesh", "]"))
-        if not fits:
-            raise InputError(f"{path}: line {line} has {shown(word)}, and only words of geometry, sizes, groups and "
-                             "arithmetic are meshed here: leave it out, or mesh the script yourself and give the .msh")
-        yield "\n" * ends
-        yield f" {'own_' if word in own and words[-1] != '.' else ''}{word}"
-        words.append(word)
-        level = 0 if word == "For" else level + (word in "([{") - (word in ")]}")
-        ends = word == "EndFor" or (begins and level == 0 and word in ")]}")
-        begins = (begins or word == "For") and not ends
+        if match := _NOT_TRANSFINITE.match(line):  # Gmsh itself goes on with a free mesh
+            print(f"{match[1]} is meshed freely, not transfinite: its sides have {match[2]}")
+            continue
+        group = before.partition(": in")[2]
+        sys.exit(f"{line} {'in' if ': in the group' in before else ''}{group}".rstrip())

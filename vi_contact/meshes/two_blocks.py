@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from vi_contact.core.arguments import check_fields
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import SIDES, BlockMesh
 from vi_contact.meshes.grid import Grid, add_grids
@@ -19,6 +20,7 @@ class Blocks:
     blocks: Mapping[str, BlockMesh]
 
     def __post_init__(self) -> None:
+        check_fields(self)
         kinds = {(len(block.lengths), block.simplices) for block in self.blocks.values()}
         if len(kinds) != 1:
             raise InputError("give the blocks of one mesh the same number of lengths and the same kind of cells")

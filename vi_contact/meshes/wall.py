@@ -6,6 +6,7 @@ defaults are the mesh of the published example: 8 x 12 cells, 40 boundary nodes 
 from dataclasses import dataclass
 from typing import Any
 
+from vi_contact.core.arguments import check_fields
 from vi_contact.core.checks import MOST_CELLS, counted
 from vi_contact.core.errors import InputError
 from vi_contact.meshes.block import check_box
@@ -29,6 +30,7 @@ class WallMesh:
     triangles: bool = False
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if self.divisions is not None and self.size is not None:
             raise InputError("a wall has divisions and a cell size: leave one of them out")
         check_box((self.width, self.height), self.divisions or _PUBLISHED)

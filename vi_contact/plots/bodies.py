@@ -4,19 +4,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from textwrap import wrap
 from typing import Any
 
 import numpy as np
 
 from ..core.algebra import Array, Indices
+from ..core.arguments import checked
 from ..core.checks import number, optional
 from ..core.errors import InputError
-from ..core.files import frames_of
+from ..core.files import frames_of, write_output
 from ..run.files.reading import ContactGeometry, RunFolder
 from .deformed import contact_states, nearest, plane_normals, read_frames
 from .faces import Painter, add_polygons, faces_of, leading, limit, moments, name_states, plot_faces, sheet
-from .histories import STYLE, plain, save, scale, scaled, shaken
+from .histories import STYLE, plain, require_matplotlib, save, scale, scaled, shaken
 
 DRAWN = 0.1  # of the size of the bodies: how large their largest displacement is drawn, if it is not larger
 FILM_FRAMES = 48  # at most: a film of two megabytes
@@ -120,6 +122,7 @@ def _round_down(factor: float) -> float:
     return float(max([1.0, *(step * power for step in (1.0, 2.0, 5.0) if step * power <= factor)]))
 
 
+@checked
 def plot_deformed(run: RunFolder, path: str | Path, *, times: Sequence[float] | None = None,
                   magnified: float | None = None, title: str = "Deformed bodies") -> Path:
     """Draw the deformed bodies of a run, coloured by von Mises stress, in the frames next to ``times`` [s].
@@ -149,6 +152,7 @@ def _headed(title: str, scene: Scene) -> str:
     return "\n".join(wrap(plain(title) + told, 64))
 
 
+@checked
 def film(run: RunFolder, path: str | Path, *, times: Sequence[float] | None = None, magnified: float | None = None,
          column: str | None = None, title: str = "", fps: int = 10) -> Path:
     """Write a film of the bodies of a run, a GIF or with ffmpeg an MP4, of the frames next to ``times`` [s].
@@ -157,6 +161,7 @@ def film(run: RunFolder, path: str | Path, *, times: Sequence[float] | None = No
     the bodies. Below them is a ``column`` of the history with the moment marked, and dashed the motion of the ground.
     InputError for another kind of file, .mp4 without ffmpeg, a column that the run does not have, and as
     ``plot_deformed``."""
+    require_matplotlib()
     import matplotlib
     from matplotlib.animation import FFMpegWriter, PillowWriter
     from matplotlib.figure import Figure
@@ -179,20 +184,23 @@ def film(run: RunFolder, path: str | Path, *, times: Sequence[float] | None = No
         scene.stresses.bar(figure, axes[0], extend="max", shrink=0.85)
         if contact is not None:
             scene.pressures.bar(figure, axes[-1], shrink=0.85)
-        with writer.saving(figure, str(path), dpi=95):
-            for k, t in enumerate(scene.times):
-                for axis in axes:
-                    axis.clear()
-                scene.draw(axes[0], k)
-                for axis, face in zip(axes[1:], faces, strict=True):
-                    scene.pressures.draw(axis, face, scene.pressure[k])
-                    axis.set_title(face.name, fontsize=9)
-                marker.set_xdata([t, t])
-                figure.suptitle(_headed(f"{title}, t = {t:.4g} s".removeprefix(", "), scene), fontsize=10)
-                if k == 0:
-                    figure.draw_without_rendering()
-                    figure.set_layout_engine("none")  # the same places in every frame, laid out once
-                writer.grab_frame()
+        with TemporaryDirectory() as place:
+            draft = Path(place) / Path(path).name
+            with writer.saving(figure, str(draft), dpi=95):
+                for k, t in enumerate(scene.times):
+                    for axis in axes:
+                        axis.clear()
+                    scene.draw(axes[0], k)
+                    for axis, face in zip(axes[1:], faces, strict=True):
+                        scene.pressures.draw(axis, face, scene.pressure[k])
+                        axis.set_title(face.name, fontsize=9)
+                    marker.set_xdata([t, t])
+                    figure.suptitle(_headed(f"{title}, t = {t:.4g} s".removeprefix(", "), scene), fontsize=10)
+                    if k == 0:
+                        figure.draw_without_rendering()
+                        figure.set_layout_engine("none")  # the same places in every frame, laid out once
+                    writer.grab_frame()
+            write_output(path, draft.read_bytes())
     return Path(path)
 
 
@@ -222,6 +230,7 @@ def _trace(axis: Any, run: RunFolder, column: str, times: Array) -> Any:
     return axis.axvline(times[0], color="tab:red", lw=1.2)
 
 
+@checked
 def draw_run(run: RunFolder, out: str | Path, *, title: str, times: Sequence[float] | None = None,
              magnified: float | None = None) -> list[Path]:
     """Draw the bodies of a run with fields as deformed.png and, in space with ``Contact()``, its contact faces as

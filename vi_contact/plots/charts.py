@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import Array
+from ..core.checks import provides
 from ..core.errors import InputError
 from ..core.units import STANDARD_GRAVITY
 from ..engineering.floor_spectra import recorded_motion
@@ -198,6 +199,7 @@ def draw_chart(axis: Any, chart: Chart) -> None:
 def plot_overview(run: Run) -> Any:
     """Return a matplotlib Figure of a Solution or RunFolder. It has the displacements of the first 8 probes, the
     contact force, the energy ledger, as far as they were recorded, and the certificate of every step."""
+    provides("plot_overview", "run", run, ("history", "columns", "facts"), "give a Solution, or what read_run returns")
     probes = [name for name in run.history if name.startswith("u_")][:CURVES]
     charts = [of_columns(run, probes, "displacement")] if probes else []
     charts += [of_columns(run, ["contact_resultant"], "contact force")] if "contact_resultant" in run.history else []

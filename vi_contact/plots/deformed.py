@@ -13,9 +13,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..core.algebra import Array, Indices
+from ..core.arguments import checked
 from ..core.checks import array
-from ..core.errors import InputError
+from ..core.errors import InputError, of_machine
 from ..core.files import FIELDS, frames_of, open_hdf5
+from ..core.own_files import inner_folder
 from ..engineering.resultants import Geometry, tangent_vectors
 from ..meshes.rows import SIDES, connected
 from ..run.files.reading import RunFolder, read_run
@@ -43,7 +45,10 @@ class StoredFrames:
         with _opened(path) as file:
             frame, unknown = file[group], np.full(len(self.cells), np.nan)
             stress = frame["von_mises"][:] if "von_mises" in frame else unknown
-            return float(self.t[row]), frame["u"][:, : self.points.shape[1]], stress
+            u = frame["u"][:]
+            if u.shape != (len(self.points), 3) or stress.shape != unknown.shape:
+                raise ValueError("the numbers of nodes or cells are not those of the mesh")
+            return float(self.t[row]), u[:, : self.points.shape[1]], stress
 
     @cached_property
     def bodies(self) -> Indices:
@@ -119,6 +124,7 @@ def stored_tangents(contact: Geometry) -> Array:
     return tangent_vectors(contact.normals, np.unique(contact.points, axis=0, return_inverse=True)[1].ravel())
 
 
+@checked
 def read_frames(run: RunFolder | str | Path) -> StoredFrames:
     """Read the frames from the fields of a run in plane or space. InputError for a folder without them."""
     folder = run.folder if isinstance(run, RunFolder) else Path(run)
@@ -129,8 +135,12 @@ def read_frames(run: RunFolder | str | Path) -> StoredFrames:
         places = {k: places[k] for k in sorted(places) if k in times}  # not those whose rows a killed run has lost
     if not places:
         raise InputError(f"no frames in {folder / FIELDS}: run it with out and fields=fem.XDMF(every=...)")
-    with _opened(folder / FIELDS / "mesh.h5") as file:
+    with _opened(inner_folder(folder, FIELDS) / "mesh.h5") as file:
         points, cells = file["points"][:], file["cells"][:]
+        if points.ndim != 2 or points.shape[1] != 3 or cells.ndim != 2 or cells.dtype.kind not in "iu":
+            raise ValueError("points and cells are no arrays of a mesh")
+        if not np.all(np.isfinite(points)) or not cells.size or cells.min() < 0 or cells.max() >= len(points):
+            raise ValueError("a cell has a point that is not there")
     cells = cells[:, : {6: 3, 9: 4, 10: 4, 27: 8}.get(cells.shape[1])]  # of second order: the vertices
     d = 3 if np.any(points[:, 2]) else 2  # a mesh of the plane is stored with z = 0
     return StoredFrames(points[:, :d], cells, np.array([times[k] for k in places]), tuple(places.values()))
@@ -142,5 +152,10 @@ def _opened(path: Path) -> Iterator[Any]:
     try:
         with open_hdf5(path) as file:
             yield file
-    except (OSError, KeyError, ValueError, IndexError) as error:
-        raise InputError(f"'{path}' is missing or damaged: restore it, or draw without fields") from error
+    except InputError:
+        raise
+    except (OSError, KeyError, ValueError, IndexError, TypeError, AttributeError, RuntimeError) as error:
+        if of_machine(error):
+            raise
+        reason = " ".join(str(error).split())[:200]
+        raise InputError(f"'{path}' is missing or damaged ({reason}): restore it, or draw without fields") from error

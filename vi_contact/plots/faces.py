@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..core.algebra import Array, Indices
+from ..core.arguments import checked
 from ..core.corners import FEATURE_ANGLE
 from ..core.errors import InputError
 from ..core.files import frames_of
@@ -17,7 +18,7 @@ from ..engineering.resultants import Geometry, tangent_vectors
 from ..meshes.rows import connected
 from ..run.files.reading import RunFolder
 from .deformed import OPEN, SAME, SLIP, STICK, contact_states, nearest, read_frames, stored_tangents
-from .histories import STYLE, History, length_unit, plain, save, scale
+from .histories import STYLE, History, length_unit, plain, require_matplotlib, save, scale
 
 ARROW = 0.15  # of the size of the face: how long the longest arrow is
 NEIGHBOURS = 24  # nearest points that make one face if they point the same way
@@ -183,6 +184,7 @@ def moments(history: History) -> list[float]:
     return history["t"][[0, leading(history)[1], -1]].tolist()
 
 
+@checked
 def plot_faces(run: RunFolder, path: str | Path, *, times: Sequence[float] | None = None,
                title: str = "Contact faces") -> Path:
     """Draw the contact faces of a run in space, a column for each of ``times`` [s].
@@ -219,6 +221,7 @@ def plot_faces(run: RunFolder, path: str | Path, *, times: Sequence[float] | Non
 
 def sheet(flat: Sequence[bool], columns: int, size: tuple[float, float]) -> tuple[Any, Array]:
     """Make (figure, axes (rows, columns)), each of a size [inches]; rows that are not flat are in projection."""
+    require_matplotlib()
     import matplotlib
     from matplotlib.figure import Figure
 

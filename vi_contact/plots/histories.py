@@ -2,13 +2,17 @@
 
 matplotlib is imported late, and its state is left alone: neither the user's backend nor his settings change."""
 
+import os
 from collections.abc import Mapping
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..core.algebra import Array
+from ..core.errors import InputError
+from ..core.files import write_output
 from ..run.files.table import WORDS
 
 History = Mapping[str, Array]
@@ -18,6 +22,7 @@ STYLE = {"axes.grid": True, "grid.alpha": 0.3, "axes.spines.top": False, "axes.s
 
 def canvas(rows: int, columns: int, size: tuple[float, float], lattice: bool = True, **more: Any) -> tuple[Any, Any]:
     """Make (figure, its axes (rows, columns)); ``lattice``: whether grid lines are drawn behind the curves."""
+    require_matplotlib()
     import matplotlib
     from matplotlib.figure import Figure
 
@@ -76,12 +81,40 @@ def shaken(history: History) -> list[str]:
 
 
 def save(figure: Any, path: str | Path, title: str | None = None) -> Path:
-    """Save the picture, with a title above all panels if there is one."""
+    """Save the picture, with a title above all panels if there is one. OSError names the file."""
     if title is not None:
         figure.suptitle(title)
     figure.align_ylabels()
-    figure.savefig(path, dpi=130)
-    return Path(path)
+    return write_picture(figure, path)
+
+
+def write_picture(figure: Any, path: str | Path, **more: Any) -> Path:
+    """Write a picture as a whole, in the format that its name ends in; OSError names the file."""
+    path = Path(path)
+    path = path if path.suffix else path.with_suffix(".png")
+    known = sorted(figure.canvas.get_supported_filetypes())
+    if path.suffix.lower()[1:] not in known:
+        endings = ", .".join(known)
+        raise InputError(f"'{path}' is no picture that matplotlib writes: give a name that ends in .{endings}")
+    write_output(path, image_of(figure, path.suffix.lower()[1:], **more))
+    return path
+
+
+def image_of(figure: Any, kind: str = "png", **more: Any) -> bytes:
+    """Return a picture as the bytes of a file of this kind."""
+    image = BytesIO()
+    figure.savefig(image, format=kind, dpi=130, **more)
+    return image.getvalue()
+
+
+def require_matplotlib() -> None:
+    """Raise InputError when the settings of matplotlib keep it from being imported, though it is there."""
+    try:
+        import matplotlib  # noqa: F401
+    except ValueError as error:  # of MPLBACKEND, which it checks although nothing here needs a backend
+        reason = " ".join(str(error).split())[:120]
+        place = "the environment variable MPLBACKEND" if "MPLBACKEND" in os.environ else "the settings of matplotlib"
+        raise InputError(f"matplotlib cannot be imported ({reason}): correct {place}") from error
 
 
 LEDGER = tuple((name, *look) for name, look in WORDS["curves"].items())  # column, label, colour, line

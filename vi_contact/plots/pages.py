@@ -1,12 +1,15 @@
 """Print sections about a run on pages of a PDF."""
 
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
+from ..core.files import write_output
+from ..core.own_files import read_bytes
 from .charts import Chart, draw_chart
-from .histories import STYLE
+from .histories import STYLE, require_matplotlib
 from .maps import Drawing
 from .sections import Section, Table
 
@@ -84,7 +87,7 @@ class _Pages:
         """Place a PNG as wide as the page, or as high as half of it."""
         from matplotlib.image import imread
 
-        image = imread(path)
+        image = imread(BytesIO(read_bytes(path)), format="png")
         wide = min(WIDE, 0.5 * PAGE[1] * image.shape[1] / image.shape[0])
         high = wide * image.shape[0] / image.shape[1]
         self.room(high)
@@ -97,11 +100,13 @@ class _Pages:
 def write_pages(path: Path, title: str, facts: Sequence[tuple[str, str]], sections: Sequence[Section],
                 foot: str) -> Path:
     """Write a PDF: the title, (name, value) of facts, the sections, and a line at the foot of every page."""
+    require_matplotlib()
     import matplotlib
     from matplotlib.backends.backend_pdf import PdfPages
 
     fonts = {"font.size": 7, "axes.titlesize": 8, "axes.labelsize": 7, "text.parse_math": False}
-    with matplotlib.rc_context(STYLE | fonts), PdfPages(path, metadata={"Title": title, "CreationDate": None}) as file:
+    written, about = BytesIO(), {"Title": title, "CreationDate": None}
+    with matplotlib.rc_context(STYLE | fonts), PdfPages(written, metadata=about) as file:
         pages = _Pages(file, foot)
         pages.words(title, 15.0, weight="bold")
         pages.table(Table(("", ""), facts))
@@ -117,4 +122,5 @@ def write_pages(path: Path, title: str, facts: Sequence[tuple[str, str]], sectio
             for picture in section.pictures:
                 pages.picture(picture)
         file.savefig(pages.figure)
+    write_output(path, written.getvalue())
     return path

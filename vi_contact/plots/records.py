@@ -7,23 +7,27 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import Array
+from ..core.arguments import checked
+from ..core.errors import InputError
 from ..core.units import STANDARD_GRAVITY
 from ..engineering.floor_spectra import TransferFunction
 from ..engineering.peak_values import Loop
 from ..ground_motion.ec8 import EC8Spectrum
 from ..ground_motion.intensity import arias, d5_95, husid, pga
 from ..ground_motion.processing import integrated
-from ..ground_motion.record import UNITS, Record
+from ..ground_motion.record import UNITS, Record, canonical_units
 from ..ground_motion.spectra import ResponseSpectrum
 from .histories import canvas, length_unit, panels, plain, plain_numbers, save, scaled
 
 SAMPLES_A_PERIOD = 10  # a spectrum is drawn pale at periods with fewer samples of the record than this
 
 
+@checked
 def plot_motion(record: Record, path: str | Path, *, title: str | None = None, units: str = "m/s2") -> Path:
     """Draw acceleration in `units`, velocity, displacement and the Husid curve, with peaks marked and D5-95 shaded.
 
     title: default the record's. Nothing is corrected: a drift of the record shows."""
+    units = canonical_units("plot_motion: units", units)
     figure, axes = panels(4, (9.0, 8.0))
     velocity, displacement = integrated(record)
     _line(axes[0], record.times, record.acceleration / UNITS[units], f"acceleration [{_pretty(units)}]")
@@ -37,11 +41,15 @@ def plot_motion(record: Record, path: str | Path, *, title: str | None = None, u
     return save(figure, path)
 
 
+@checked
 def plot_spectra(spectra: Mapping[str, ResponseSpectrum], path: str | Path, *, target: EC8Spectrum | None = None,
                  steps: Mapping[str, float] | None = None, title: str = "Response spectra", units: str = "g") -> Path:
     """Draw pseudo-acceleration in `units` and displacement over the period, one line for each label, the target dashed.
 
     steps: time step [s] of the record behind each label; below ten of them its line is pale."""
+    units = canonical_units("plot_spectra: units", units)
+    if not spectra:
+        raise InputError("plot_spectra: spectra is empty; give one response spectrum or more, each with its label")
     figure, ((top,), (bottom,)) = canvas(2, 1, (8.0, 7.5), sharex=True)
     bottom.set_xscale("log")
     plain_numbers(bottom.xaxis)
@@ -71,6 +79,7 @@ def plot_spectra(spectra: Mapping[str, ResponseSpectrum], path: str | Path, *, t
     return save(figure, path)
 
 
+@checked
 def plot_loop(loop: Loop, path: str | Path, *, x: tuple[str, str], y: tuple[str, str],
               title: str | None = None) -> Path:
     """Draw force over deformation; ``x``, ``y``: (name, SI unit) of the two. The title says the work at the end."""
@@ -89,6 +98,7 @@ def plot_loop(loop: Loop, path: str | Path, *, x: tuple[str, str], y: tuple[str,
     return save(figure, path)
 
 
+@checked
 def plot_transfer(found: TransferFunction, path: str | Path, *, title: str) -> Path:
     """Draw the amplitude over frequency, both logarithmic."""
     figure, ((axis,),) = canvas(1, 1, (7.5, 4.5))

@@ -58,6 +58,9 @@ def sections_of(run: RunFolder, model: Mapping[str, Any],
     return [one for one in found if one.sentences or one.tables or one.charts or one.drawings]
 
 
+NOT_SHOWN = ("places", "others", "sides")  # of what model.json tells of a contact
+
+
 def number(value: float) -> str:
     """Return a number with four digits, a dash for none."""
     return "-" if np.isnan(value) else f"{value:.4g}"
@@ -77,7 +80,7 @@ def words(value: Any, depth: int = 9) -> str:
 def table_of(title: str, rows: Any) -> list[Table]:
     """Return the table of objects that a file lists, a column for each of their keys; none for anything else."""
     given = [one for one in rows if isinstance(one, Mapping)] if isinstance(rows, list | tuple) else []
-    header = list(dict.fromkeys(key for one in given for key in one if key != "places"))
+    header = list(dict.fromkeys(key for one in given for key in one if key not in NOT_SHOWN))
     return [Table(header, [[words(one.get(key)) for key in header] for one in given], title)] if given else []
 
 

@@ -10,6 +10,15 @@ from .faces import add_polygons, limit, sheet
 from .histories import plain
 
 LINES = ("tab:green", "tab:blue", "tab:purple", "tab:brown", "tab:olive", "tab:cyan")  # what holds the bodies
+MARKS = {  # kind of node of a contact boundary -> how it is marked
+    "shared by both sides": ("s", "black"),
+    "clamped": ("^", "black"),
+    "prescribed": ("v", "black"),
+    "tied to another": ("D", "black"),
+    "partly covered": ("o", "tab:blue"),
+    "hardly covered": ("P", "tab:red"),
+    "in front of nothing": ("x", "0.5"),
+}
 DOTS = ("tab:red", "tab:orange", "tab:pink", "maroon")  # parts of the contact
 
 
@@ -31,6 +40,12 @@ def sketch(model: Mapping[str, Any]) -> Any:
     for k, one in enumerate(model["contact"]):
         dots = {"ls": "", "marker": "o", "ms": 3.0, "color": DOTS[k % len(DOTS)]}
         axis.plot(*_points(one["places"], d).T, label=plain(f"contact: {one['name']}"), **dots)
+        for kind, places in one.get("others", {}).items():
+            if kind in MARKS:
+                marker, colour = MARKS[kind]
+                marks = {"ls": "", "marker": marker, "ms": 7.0, "mfc": "none", "mec": colour, "mew": 1.4}
+                words = plain(f"{one['name']}: {len(places)} {kind}")
+                axis.plot(*_points(places, d).T, label=words, zorder=5, **marks)
     ends = np.concatenate([_points(one["lines"], d) for one in model["outline"]])
     limit(axis, ends.min(axis=0), ends.max(axis=0), margin=0.06)
     axis.set_title(plain(model["title"]))

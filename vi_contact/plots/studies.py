@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..core.algebra import Array
+from ..core.arguments import checked
 from ..core.units import STANDARD_GRAVITY
 from .histories import canvas, plain, save, scale
 
@@ -27,6 +28,7 @@ class DemandPanel:
     failed: Sequence[float] = ()
 
 
+@checked
 def plot_ida(demands: Sequence[DemandPanel], path: str | Path, *, intensity: str, unit: str) -> Path:
     """Draw a panel for every demand: a grey curve for each record, and the fractiles. Accelerations are in g."""
     figure, ((*axes,),) = canvas(1, len(demands), (1.0 + 4.4 * len(demands), 4.6), sharey=True)
@@ -42,6 +44,7 @@ def plot_ida(demands: Sequence[DemandPanel], path: str | Path, *, intensity: str
     return save(figure, path)
 
 
+@checked
 def plot_fragility(curves: Mapping[str, tuple[Callable[[Array], Array], Array]], path: str | Path, *, intensity: str,
                    unit: str) -> Path:
     """Draw the probability that each limit is passed, (3, n) lower bound, curve, upper bound at intensities (n,), and

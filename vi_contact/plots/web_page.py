@@ -13,9 +13,10 @@ import numpy as np
 
 from ..core.algebra import Array, Indices
 from ..core.errors import InputError, ViContactError
-from ..core.files import sentence, write_atomically
+from ..core.files import sentence, write_output
+from ..core.own_files import read_bytes
 from .charts import Chart
-from .histories import STYLE
+from .histories import STYLE, require_matplotlib
 from .maps import Drawing
 from .sections import Section
 
@@ -51,7 +52,7 @@ def write_web_page(path: Path, title: str, facts: Sequence[tuple[str, str]], sec
     scripts = [get_plotlyjs().replace("\r\n", "\n"), (FOLDER / "report.js").read_text(encoding="utf-8")]
     shown, count = [], 0
     for one in sections:
-        images = [*map(_drawn, one.drawings), *(picture.read_bytes() for picture in one.pictures)]
+        images = [*map(_drawn, one.drawings), *map(read_bytes, one.pictures)]
         shown.append({"own": one, "charts": range(count, count := count + len(one.charts)),
                       "pictures": [f"data:image/png;base64,{b64encode(image).decode()}" for image in images]})
     text = engine.get_template("report.html").render(
@@ -62,7 +63,7 @@ def write_web_page(path: Path, title: str, facts: Sequence[tuple[str, str]], sec
         thinned=f"Curves have at most {most} points, in which extremes are kept; history.csv has all." if thin else "",
     )
     try:
-        write_atomically(path, text.encode())
+        write_output(path, text.encode())
     except OSError as error:
         raise ViContactError(sentence(error)) from error
     return path
@@ -95,6 +96,7 @@ def _numbers(values: Iterable[float], digits: int) -> list[float | None]:
 
 def _drawn(drawing: Drawing) -> bytes:
     """The PNG of a drawing."""
+    require_matplotlib()
     import matplotlib
     from matplotlib.figure import Figure
 

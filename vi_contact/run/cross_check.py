@@ -55,6 +55,9 @@ class CrossChecked:
         check_solver("CrossChecked", self.primary, "the first solver")
         for one in several("CrossChecked", "others", self.others, "give a list of solvers"):
             check_solver("CrossChecked", one, "a solver")
+        if not len(self.others):
+            raise InputError("CrossChecked: others names no solver, so that nothing is compared; give one or more, or "
+                             "the first solver alone")
         self.found = [Disagreement() for _ in self.others]
         self._earlier, self._last = self.found, (-1, 0.0)
 

@@ -82,6 +82,8 @@ class March:
         if solver is None:
             solver = CertifiedSolver(problem, A, step.scale, self.method.solvers, self.method.tolerance)
             self.prepared[dt] = A, solver
+        if problem.surface.watched:
+            problem.surface.refuse_driven(step.t)
         result, certificate, escalated = solver.solve(step)
         if not final and problem.surface.some(result.active & ~state.active):
             return None

@@ -50,6 +50,7 @@ def checked_method(owner: str, problem: ContactProblem, scheme: Scheme | None,
     method = Method(problem, scheme, [Automatic() if first is None else first, *others], dt, tolerance)
     size = step_plan(dt, steps, t_end, start_time(owner, state)).dt(0)
     method.bind()
+    problem.equations.forget_loads()
     scheme.check(problem)
     method.solvers[0].check(problem)
     if state is not None:
@@ -65,6 +66,8 @@ def with_defaults(problem: ContactProblem, scheme: Scheme | None,
     asked for, the Zienkiewicz-Wood-Taylor step at phi = ½, which never gains energy. Without a mass: the scheme's.
     ``others``: the first that has its matrices lends them."""
     check_problem_given("march", problem)
+    for one in several("march", "others", others, "give a list of problems, or leave it out"):
+        check_problem_given("march", one)
     if scheme is None:
         massive = problem.mass is not None and isinstance(problem.mass, ConsistentMass)
         scheme = Trapezoidal() if problem.impact is None and not massive else ZienkiewiczWoodTaylor()

@@ -12,11 +12,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..core.algebra import Array, Indices, total
+from ..core.algebra import Array, Indices, Mask, total
 from ..core.checks import array, attributes, column_name, instance
 from ..core.errors import InputError, StepFailure
 from ..core.problem import ContactProblem
 from ..core.step import AXES, Columns, Report, Row, State
+from ..core.surfaces import ContactSurface
 from ..core.verify import Energies, energies, energy_balance
 from .files.table import WORDS
 
@@ -116,11 +117,21 @@ class Energy:
         return self._row()
 
 
+def told_pressures(surface: ContactSurface) -> Mask | None:
+    """Return the conditions (m,) of this rank whose pressure counts among the largest, None for all of them.
+
+    Where all on all ranks are ``uncovered`` all count. Collective."""
+    uncovered = np.zeros(surface.count, dtype=bool) if surface.uncovered is None else surface.uncovered
+    left_out = total(surface.comm, np.count_nonzero(uncovered))
+    return ~uncovered if 0 < left_out < surface.total else None
+
+
 @dataclass
 class Contact:
     """Record gaps, pressures, forces and slip of the contact. Reactions are mean or end values, as the scheme says.
 
-    gap = gap0 - u_n, plus the shortening of a deformable support. pressure = r_n / weight. The force on the body is
+    gap = gap0 - u_n, plus the shortening of a deformable support. pressure = r_n / weight; the largest is that of
+    points that are covered (``ContactSurface.uncovered``). The force on the body is
     -Σ r_n n, and its point of action is Σ r_n X / Σ r_n (NaN while the contact is open). On rank 0 the arrays (total,)
     have all conditions in the order of their numbers, as the points in ``history.h5``; on other ranks they are empty.
 
@@ -148,6 +159,7 @@ class Contact:
         surface, self._problem, self._frictional = problem.surface, problem, problem.frictional
         self._axes = AXES[: surface.points.shape[1]]
         self._weight = total(surface.comm, surface.weights.sum())
+        self._told = told_pressures(surface)
         self._numbers = [name for name in self.columns() if name not in self._ARRAYS]
         return self._row(state)
 
@@ -165,6 +177,7 @@ class Contact:
         closed, count, resultant, *vectors = sums
         force, place = [0.0 - one for one in vectors[:d]], vectors[d:]  # not -one: no negative zeros
         depth, highest, *farthest = self._largest(gap, pressure, *rubbing[1:])
+        depth = max([depth, *(-one.smallest(state.t) for one in surface.watched)])
         values = [1.0 - closed / self._weight if self._weight else 1.0, int(count), resultant, *force,
                   *[one / resultant if resultant else np.nan for one in place], -depth, highest]
         values += [*self._friction_force(state), *farthest] if self._frictional else []
@@ -186,7 +199,8 @@ class Contact:
         if not self._problem.surface.total:
             return [np.nan] * (2 + len(slip))
         some = len(gap) > 0
-        tops = [-gap.item(gap.argmin()), pressure.item(pressure.argmax())] if some else [-np.inf] * 2
+        told = pressure if self._told is None else pressure[self._told]
+        tops = [-gap.item(gap.argmin()) if some else -np.inf, told.item(told.argmax()) if len(told) else -np.inf]
         tops += [float(np.linalg.norm(one, axis=1).max()) if some else -np.inf for one in slip]
         return tops if self._problem.surface.comm.size == 1 else self._problem.surface.comm.max(np.array(tops)).tolist()
 

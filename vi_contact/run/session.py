@@ -18,6 +18,7 @@ from ..core.checks import on_all
 from ..core.errors import InputError, Interrupted, OutOfTime
 from ..core.stages import done
 from ..core.step import Recorder, Report, State, StepResult
+from ..engineering.damping import NOT_COMPUTED, damping_in_words
 from .files.checkpoint import RestartPoint
 from .files.identity import identity
 from .files.log import Progress, versions
@@ -35,6 +36,9 @@ from .wall_time import WallTime
 log = logging.getLogger(__name__)
 T = TypeVar("T")
 TIMED = 10_000  # the last steps, of which seconds_per_step is the median
+ENDED: dict[type[BaseException], str] = {
+    KeyboardInterrupt: "interrupted by the user", GeneratorExit: "its steps were not asked for any more",
+}
 LINEAR_STEPS = 21  # repetitions of the plain linear step that the step is compared with
 
 
@@ -89,7 +93,7 @@ class Session:
                 "solver": repr(solver if self.cross_check is None else getattr(solver, "primary", solver)),
                 "dt": described(method.dt), "tolerance": method.tolerance, "ranks": self._comm.size,
                 "unknowns": problem.system.space.unknowns, "contact_points": problem.surface.total,
-                "boundaries": list(problem.system.notes),
+                "boundaries": list(problem.system.notes), "damping": damping_in_words(problem, unknown=NOT_COMPUTED),
                 "sampling": sampling_warning(problem.excitations, max(pieces_of(method.dt))[0]) or ""}
 
     @property
@@ -113,9 +117,9 @@ class Session:
             self._checkpoint(writer)
             self._measure()
             linear = self._seconds_per_linear_step()
-        except BaseException as error:
+        except BaseException as error:  # whatever ends a run, what it has is saved; the error is raised again
             interrupted = isinstance(error, KeyboardInterrupt | GeneratorExit)
-            reason = str(error) or ("interrupted by the user" if interrupted else type(error).__name__)
+            reason = str(error) or ENDED.get(type(error), type(error).__name__)
             self._rescue(writer, "interrupted" if interrupted else "failed", reason, time.perf_counter() - begin)
             if isinstance(error, Interrupted):  # on all ranks: none ends before the first has written
                 self._comm.bcast(None)
@@ -218,6 +222,7 @@ class Session:
 
     def _rescue(self, writer: Writer, status: str, reason: str, seconds: float) -> None:
         """Save what there is. A checkpoint of the last base step only on one rank: others might not come."""
+        # Of any kind: the error that ended the run is the one to tell, and it may keep each of these from working.
         with suppress(Exception):
             writer.flush(alone=True)
         with suppress(Exception):

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from ..core.algebra import Comm
-from ..core.checks import flag, function, instance, optional, provides, several, whole
+from ..core.arguments import check
+from ..core.checks import flag, function, optional, provides, several, whole
 from ..core.errors import InputError
 from ..core.files import on_root
 from ..core.problem import ContactProblem
@@ -83,6 +84,9 @@ def opened(problem: ContactProblem, scheme: Scheme | None, solver: Solver | None
     optional(function, "simulate", "callback", callback, "give a function of a state and a report, or None")
     if wall_time is not None and out is None:
         raise InputError("wall_time needs a folder from which the run continues: give out")
+    if changed and restart is False:
+        raise InputError("changed=True is for a run that is continued, and this one begins anew: give restart too, or "
+                         "leave it out")
     end = WallTime(wall_time, runs)
     problem, scheme = with_defaults(problem, scheme, others)
     method = checked_method("simulate", problem, scheme, (solver, escalation), dt, steps=steps, t_end=t_end,
@@ -113,8 +117,8 @@ def _check_outputs(record: Any, out: Any, restart: Any, checkpoint_every: Any, f
     owner = "simulate"
     for one in () if record is None else several(owner, "record", record, "give a list of recorders, or None"):
         provides(owner, "a recorder", one, ("columns", "start", "row"), "give Energy(), Contact(), Probe(…) or another")
-    optional(instance, owner, "out", out, (str, Path), "give a path, or None")
-    instance(owner, "restart", restart, (bool, str, Path), "give True, False or the path of a run folder")
+    check(owner, "out", out, str | Path | None)
+    check(owner, "restart", restart, bool | str | Path)
     whole(owner, "checkpoint_every", checkpoint_every, least=1)
     for meaning, value in zip(("progress", "changed"), flags, strict=True):
         flag(owner, meaning, value)

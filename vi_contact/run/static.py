@@ -9,23 +9,28 @@ so that t only orders the loads: histories of ``Traction`` and ``BodyForce``, ``
 obstacles that move. Without friction every stage is the equilibrium of its own loads. Slip between stages has no rate,
 so a law that asks for one is refused: its value at rest would be wrong for points in motion wherever it jumps there."""
 
+import logging
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from itertools import accumulate, islice
 
 import numpy as np
 
-from ..core.algebra import EffectiveMatrix
-from ..core.checks import number, real, shown
+from ..core.algebra import EffectiveMatrix, from_each, largest, max_abs
+from ..core.checks import at, number, real, shown
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.state_checks import check_problem_given, check_sizes, initial_state
 from ..core.step import Solver, State, StepProblem, StepResult
 from ..solvers.automatic import Automatic
-from ..solvers.certified import TOLERANCE, CertifiedSolver, refuse_nan
+from ..solvers.certified import TOLERANCE, CertifiedSolver
+from ..solvers.door import refuse_matrix, refuse_nan
 from .method import check_methods
 from .proximal import Proximal
 
+log = logging.getLogger(__name__)
+OPEN = 0.05  # of the area that touches at the start: so much may be open at rest without a warning
+TOUCHING = 1e-9  # of the largest coordinate: a gap that is none
 ADVICE = "try another solver, or smaller load steps, and check the data"
 
 
@@ -44,7 +49,29 @@ def static_equilibrium(problem: ContactProblem, *, solver: Solver | None = None,
     check_problem_given(owner, problem)
     check_methods(owner, solver, (), tolerance)
     t = number(owner, "t", t, unit="s")
-    return Equilibria(problem, solver=solver, tolerance=tolerance).after(initial_state(problem, t), t)
+    state = Equilibria(problem, solver=solver, tolerance=tolerance).after(initial_state(problem, t), t)
+    _warn_if_open(problem, state)
+    return state
+
+
+def _warn_if_open(problem: ContactProblem, state: State) -> None:
+    """Warn, on rank 0, where much of a contact that touches at the start, and is pressed, is open at rest. Collective.
+
+    The place is that of the open point with the lowest number."""
+    surface = problem.surface
+    touching = surface.gap0 <= TOUCHING * largest(surface.comm, max_abs(surface.points))
+    opened = touching & ~state.active
+    pressed, area, lost = surface.comm.sum(
+        np.array([state.r_n.sum(), surface.weights[touching].sum(), surface.weights[opened].sum()])
+    )
+    if pressed <= 0.0 or lost <= OPEN * area:
+        return
+    own = [(int(surface.slots[row]), surface.points[row]) for row in np.flatnonzero(opened)[:1]]
+    first = min((one for part in from_each(surface.comm, own) for one in part), key=lambda one: one[0])
+    if surface.comm.rank == 0:
+        log.warning("at rest at t = %g s %.3g %% of the contact area that touches at the start is open, from %s on: "
+                    "loads that lift a body do that; so does a side 1 with smaller facets than a softer side 2, which "
+                    "should be meshed as finely or be side 1", state.t, 100.0 * lost / area, at(first[1]))
 
 
 class Equilibria:
@@ -55,6 +82,7 @@ class Equilibria:
         self._problem = problem
         self._K = EffectiveMatrix(system.K, system.algebra, space=system.space, inertia=(0.0, system.M))
         self._solve: Callable[[StepProblem], StepResult]
+        refuse_matrix(problem, self._K)
         if system.floating:
             self._solve = Proximal(problem, self._K, solver, tolerance).solve
         else:
@@ -64,10 +92,11 @@ class Equilibria:
     def after(self, old: State, t: float) -> State:
         """Return the equilibrium at time t of a body that rubs and slides from where ``old`` was; its number too."""
         problem = self._problem
+        problem.surface.refuse_driven(t)
         step = StepProblem(A=self._K, b=problem.static_load.load.at_rest(t), bound=problem.surface.gap(t), scale=1.0,
                            surface=problem.surface, guess=old.u, active=old.active, t=t, k=old.k,
                            friction=problem.friction, slip0=problem.slip_origin(old.u, old.t, t))
-        refuse_nan(step)
+        refuse_nan(step, lambda: problem.static_load)
         result = self._solve(step)
         return State(t, old.k, result.x, np.zeros_like(old.u), result.r_n, result.active, r_t=result.r_t)
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import ViContactError
+from ..core.errors import InputError, ViContactError
 from ..core.products import frozen
 from ..core.step import Balance, Report, State, StepProblem, StepResult
 from ..core.verify import kkt_residuals
@@ -139,6 +139,10 @@ class Group:
         many = scheme.step(problem, self._many, self._A, dt)
         if not np.isfinite(many.b.sum()) and len(wrong := np.flatnonzero(~np.isfinite(many.b).all(axis=-1))):
             return [runs[row] for row in wrong]
+        try:
+            problem.surface.refuse_driven(many.t)
+        except InputError:
+            return list(runs)  # each says so alone
         if self._solver is None:
             method = runs[0].method
             self._solver = CertifiedSolver(problem, self._A, many.scale, method.solvers, self._tolerance)

@@ -85,7 +85,7 @@ def check_balance(name: str, problem: ContactProblem) -> None:
                          "problem: leave the law out, or give the problem mass=ConsistentMass()")
     if massless or not surface.some(~surface.bilateral & surface.rigid):
         return
-    told = problem.equations.cached(f"told of {name}", list)
+    told = problem.equations.cached(f"told of {name}", list, surface)
     if not told and surface.comm.rank == 0:
         log.warning("%s with consistent mass can gain energy whenever a contact opens: leave out "
                     "mass=ConsistentMass(), or take ContactStabilisedNewmark() or Midpoint()", name)

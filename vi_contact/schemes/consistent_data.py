@@ -66,7 +66,7 @@ def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float
                        surface=rigid_part(surface), scale=1.0, guess=np.zeros_like(force), active=resting, t=state.t,
                        k=state.k, friction=problem.friction, slip0=None if rate is None else -rate / dt, rate_factor=dt)
     solver: PreparedSolver = problem.equations.cached("resting contacts", lambda: solver_beside_steps(
-        step.A, step.surface).prepare(step.A, step.surface, 1.0))
+        step.A, step.surface).prepare(step.A, step.surface, 1.0), surface)
     result = solver.solve(step)
     return result.x, springs + surface.reaction_load(result.r_n, len(force), result.r_t)
 

@@ -87,10 +87,11 @@ def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tu
     bounds: ContactProblem = system.cached(  # springs are not bounds here, and nothing rubs
         "admissible predictor, bounds",
         lambda: replace(problem, surface=rigid_part(surface), friction=Frictionless()),
+        surface,
     )
     M = mass_matrix(problem)
     solver: CertifiedSolver = system.cached("admissible predictor", lambda: CertifiedSolver(
-        bounds, M, 1.0, [solver_beside_steps(M, bounds.surface)], TOLERANCE))
+        bounds, M, 1.0, [solver_beside_steps(M, bounds.surface)], TOLERANCE), surface)
     step = StepProblem(A=M, b=np.zeros_like(u), bound=gap, surface=bounds.surface, scale=1.0, guess=np.zeros_like(u),
                        active=closed, t=state.t + dt, k=state.k + 1)
     try:

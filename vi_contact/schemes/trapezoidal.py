@@ -17,6 +17,7 @@ from typing import ClassVar
 
 from ..core.algebra import Array, EffectiveMatrix
 from ..core.checks import provides
+from ..core.errors import InputError
 from ..core.problem import ContactProblem
 from ..core.protocols import MassLaw
 from ..core.step import Balance, State, StepProblem, StepResult
@@ -38,7 +39,11 @@ class Trapezoidal:
         provides("Trapezoidal", "mass", self.mass, ("apply",), remedy, lacks=("target",))
 
     def check(self, problem: ContactProblem) -> None:
-        """Raise InputError for an impact law on massless contact nodes; warn when they have mass."""
+        """Raise InputError for an impact law on massless contact nodes, and a mass of its own beside that of the
+        problem; warn when contact nodes have mass."""
+        if self.mass not in (Redistributed(), problem.mass):
+            raise InputError(f"Trapezoidal: mass={self.mass} is not read, as the problem has mass={problem.mass}: "
+                             "leave one of the two out")
         check_balance("Trapezoidal()", problem)
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:

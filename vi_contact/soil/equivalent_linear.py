@@ -25,6 +25,7 @@ from .curves import SoilCurves
 from .soil_column import SoilColumn
 
 T = TypeVar("T")
+ROCK_DAMPING = 0.01
 Layer = tuple[float, LinearElastic, SoilCurves]  # its thickness [m], its material at small strains, its curves
 
 
@@ -55,7 +56,7 @@ class SiteResponse:
 
 
 def equivalent_linear(layers: Sequence[Layer], record: Record, *, rock: LinearElastic | None = None,
-                      rock_damping: float = 0.01, ratio: float = 0.65, tolerance: float = 0.01,
+                      rock_damping: float = ROCK_DAMPING, ratio: float = 0.65, tolerance: float = 0.01,
                       frequency: float | None = None, most: int = 50) -> SiteResponse:
     """Return the response of layers to a record along the surface.
 
@@ -74,10 +75,19 @@ def equivalent_linear(layers: Sequence[Layer], record: Record, *, rock: LinearEl
         number(owner, "the thickness [m]", thickness, positive=True)
         instance(owner, "the material", material, LinearElastic, remedy)
         instance(owner, "the curves", curves, SoilCurves, remedy)
+        if material.xi:
+            raise InputError(f"{owner}: the material of a layer has the damping ratio xi = {material.xi:g}, and the "
+                             "curves of the layer give its damping; leave xi out")
     instance(owner, "record", record, Record, "give a Record, such as read_record returns")
     optional(instance, owner, "rock", rock, LinearElastic, "give a LinearElastic, or None")
-    optional(number, owner, "frequency", frequency, positive=True)
     number(owner, "rock_damping", rock_damping, not_negative=True)
+    if rock is None and rock_damping not in (0.0, ROCK_DAMPING):
+        raise InputError(f"{owner}: rock_damping = {shown(rock_damping)} has no rock to damp; give rock too, or leave "
+                         "it out")
+    if rock is not None and rock.xi:
+        raise InputError(f"{owner}: the rock has the damping ratio xi = {rock.xi:g}, which is not read here; give "
+                         "rock_damping, and leave xi out")
+    optional(number, owner, "frequency", frequency, positive=True)
     number(owner, "ratio", ratio, positive=True)
     n = next_fast_len(2 * record.acceleration.size)
     w = 2.0 * np.pi * np.fft.rfftfreq(n, record.dt)

@@ -80,7 +80,8 @@ class BaseMotion(GroundFrame):
         tangential = np.array([surface.tangential_values(r) for r in rigid])
         moved = surface.moving(lambda t: -self.at(t)[0] @ normal,
                                lambda t: np.tensordot(self.at(t)[0], tangential, axes=1))
-        return replace(moved, companions=(*surface.companions, self.path))
+        watched = tuple(one.carried(lambda t: self.at(t)[0]) for one in surface.watched)
+        return replace(moved, companions=(*surface.companions, self.path), watched=watched)
 
 
 def base_motion(excitation: Excitation | Sequence[Excitation]) -> BaseMotion:

@@ -6,16 +6,17 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from ..core.algebra import Array
+from ..core.algebra import Array, largest
 from ..core.checks import at, function, instance, number, refuse, several
 from ..core.errors import InputError
 from ..fem import compat
 from ..fem.communicators import MpiComm
-from ..fem.forms import Materials, cell_constants
+from ..fem.forms import KINDS, Materials, cell_constants
 from ..fem.groups import cells_of
 from ..fem.heterogeneous import Heterogeneous
 from ..fem.mesh import Cells
 from ..fem.output.largest_strain import LargestStrain
+from ..laws.materials import LinearElastic
 from .curves import SoilCurves
 from .equivalent_linear import iterated
 
@@ -56,6 +57,7 @@ def strain_compatible(mesh: Any, material: Materials, curves: Sequence[tuple[Cel
               remedy)) for cells, one in several(OWNER, "curves", curves, remedy)]
     named = np.concatenate([np.zeros(0, dtype=int), *(cells for cells, _ in pairs)])
     refuse([f"{OWNER}: some cells have two curves: give one" if len(np.unique(named)) < len(named) else ""], comm)
+    _refuse_lost_ratios(material, pairs, comm)
     space = compat.cell_space(mesh)
     place, (E, nu, rho, xi) = compat.cell_blocks(space)[:, 0], cell_constants(space, material)
     refuse([f"{OWNER}: Orthotropic has several G: give a LinearElastic" if np.isnan(E).any() else ""], comm)
@@ -86,3 +88,15 @@ def strain_compatible(mesh: Any, material: Materials, curves: Sequence[tuple[Cel
     worst = [(one, cells[strain[cells].argmax()]) for cells, one in pairs if len(cells)]
     refuse([one.beyond(strain[cell], f"at {at(middles[cell])}") for one, cell in worst], comm)
     return StrainCompatible(*found, changes)
+
+
+def _refuse_lost_ratios(material: Materials, pairs: Sequence[tuple[Any, SoilCurves]], comm: MpiComm) -> None:
+    """Raise InputError for a material with a damping ratio whose cells all have curves, which give it another one."""
+    if isinstance(material, KINDS):
+        return  # of a whole mesh: cells beside the curves keep its ratio
+    named = np.concatenate([np.zeros(0, dtype=int), *(cells for cells, _ in pairs)])
+    for cells, one in material:
+        outside = len(np.setdiff1d(cells.indices, named))
+        if not largest(comm, outside) and isinstance(one, LinearElastic) and one.xi:
+            raise InputError(f"{OWNER}: the material of '{cells.name}' has the damping ratio xi = {one.xi:g}, and the "
+                             "curves of its cells give another one; leave xi out there")

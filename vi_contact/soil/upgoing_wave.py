@@ -22,6 +22,9 @@ class UpgoingVelocity:
     Exact where a is a straight line between multiples of dt: v(k dt + s) = v_k + a_k s + (a_{k+1} - a_k) s²/(2 dt)."""
 
     def __init__(self, excitation: Excitation, dt: float, share: float) -> None:
+        number("UpgoingVelocity", "dt", dt, positive=True, unit="s")
+        number("UpgoingVelocity", "share", share)
+        provides("UpgoingVelocity", "excitation", excitation, ("acceleration", "direction"), "give GroundMotion(…)")
         self.excitation, self.dt, self.share = excitation, dt, share
         self._a, self._v = [excitation.acceleration(0.0)], [0.0]
 

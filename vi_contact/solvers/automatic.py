@@ -13,7 +13,7 @@ from typing import Any
 
 from ..core.algebra import EffectiveMatrix, Matrix, SerialMatrix, total
 from ..core.checks import provides
-from ..core.compiled import library
+from ..core.compiled import cholmod
 from ..core.problem import ContactProblem
 from ..core.sizes import small
 from ..core.step import PreparedSolver, Solver, StepProblem, StepResult
@@ -57,7 +57,7 @@ class Automatic:
         if isinstance(matrix, SerialMatrix):
             return self.condensed
         dimension, comm = surface.points.shape[1], surface.comm
-        alone = comm.size == 1 and library(comm) is not None
+        alone = comm.size == 1 and cholmod(comm) is not None
         large = dimension == 3 and total(comm, matrix.rows) >= (ALONE_IN_SPACE if alone else IN_SPACE)
         if not large and surface.total * (dimension if frictional else 1) <= DENSE[dimension]:
             return self.condensed

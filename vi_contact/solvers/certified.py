@@ -4,11 +4,10 @@ An answer whose certificate comes near the tolerance, as round-off makes it wher
 stiffness, is corrected by what it leaves over (``correction``) before it is judged."""
 
 from collections.abc import Sequence
-from math import isfinite
 
 import numpy as np
 
-from ..core.algebra import EffectiveMatrix, largest, max_abs
+from ..core.algebra import EffectiveMatrix
 from ..core.certificate import Certificate
 from ..core.checks import on_all
 from ..core.errors import InputError, StepFailure
@@ -19,6 +18,7 @@ from ..core.step import PreparedSolver, Solver, StepProblem, StepResult
 from ..core.surfaces import ContactSurface
 from ..core.verify import kkt_residual
 from .correction import corrected
+from .door import refuse_matrix, refuse_nan
 
 TOLERANCE = 1e-9
 NEAR = 1e-2  # of the tolerance: round-off of ordinary steps stays a hundred times below, and is left as it is
@@ -36,6 +36,8 @@ class CertifiedSolver:
         self._surface, self._A, self._scale, self._advice = surface or problem.surface, A, scale, advice
         self._solvers, self._tolerance = solvers, tolerance
         self._prepared: dict[int, PreparedSolver] = {}
+        refuse_matrix(problem, A)
+        self._problem = problem
         self._get(0)
 
     @property
@@ -52,7 +54,7 @@ class CertifiedSolver:
 
     def solve(self, step: StepProblem) -> tuple[StepResult, Certificate, bool]:
         """Return (result, certificate, escalated) of the first method below tolerance; StepFailure if there is none."""
-        refuse_nan(step)
+        refuse_nan(step, lambda: self._problem.equations)
         tried = []
         for rank in range(len(self._solvers)):
             try:
@@ -82,10 +84,3 @@ def check_laws(owner: str, problem: ContactProblem, *, unsymmetric: bool = False
     if problem.frictional and surface.tangents.shape[1] == 0:
         raise InputError(f"{owner} cannot use {law}: a body in one dimension cannot slide, so use Frictionless()")
     on_all(surface.comm, "the friction law", lambda: law.limit(np.zeros(surface.count), surface.weights, 1.0))
-
-
-def refuse_nan(step: StepProblem) -> None:
-    """Raise StepFailure for a NaN, which would spread silently; asked of all ranks, so that all stop."""
-    if largest(step.surface.comm, not isfinite(max_abs(step.b))):
-        raise StepFailure(f"the load of step {step.k} at t = {step.t:.6g} s contains NaN or infinite values: check the "
-                          "excitation, the tractions and the initial data")

@@ -6,7 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from ..core.arguments import check
+from ..core.checks import shown
 from ..core.errors import InputError, ViContactError
+from ..core.own_files import inner_folder, is_own
 from ..engineering.peak_values import GROWS, peaks
 from ..plots.sections import SAY, Section, Table, number
 from ..run.files.folder import CHECKPOINT, HISTORY_CSV
@@ -27,19 +30,20 @@ def refine(folder: str | Path, comm: Any, *, allow: Sequence[str] = (), progress
     InputError for a folder without case file or whose run has not finished. ``allow``: as of ``read_case``."""
     from .cases.case import read_case  # late: finite elements
 
+    check("refine", "folder", folder, str | Path)
     run, failed = read_run(folder), {}
-    if not (run.folder / COPY).is_file():
+    if not is_own(run.folder / COPY):
         raise InputError(f"'{folder}' holds no {COPY}, the case that is to be refined: give the folder of a case's run")
     if run.facts.get("status") != "finished":
         raise InputError(f"the run in '{folder}' has not finished: continue it with --restart, then refine it")
     for name in NAMES:
-        out = run.folder / FOLDER / name
         try:
+            out = inner_folder(run.folder, FOLDER, name)
             same, settings = _same(run, name), [*copied_settings(run.folder), *_halved(run, name)]
             if not (same and _status(out) == "finished"):
                 case = read_case(run.folder / COPY, settings, allow=allow)
-                case.run(comm, out=out, restart=same and (out / CHECKPOINT).is_file(), progress=progress)
-        except (ViContactError, TypeError) as error:  # a number written as a text has no half
+                case.run(comm, out=out, restart=same and is_own(out / CHECKPOINT), progress=progress)
+        except ViContactError as error:
             failed[name] = str(error)
     return failed
 
@@ -47,7 +51,7 @@ def refine(folder: str | Path, comm: Any, *, allow: Sequence[str] = (), progress
 def _same(run: RunFolder, name: str) -> bool:
     """Whether the refined run is of the case that the run folder holds."""
     wanted = with_settings(read_copy(run.folder), list(_halved(run, name)))
-    return read_copy(run.folder / FOLDER / name) == wanted
+    return read_copy(inner_folder(run.folder, FOLDER, name)) == wanted
 
 
 def _halved(folder: RunFolder, name: str) -> Iterator[str]:
@@ -67,13 +71,20 @@ def _halved(folder: RunFolder, name: str) -> Iterator[str]:
         for k, stage in enumerate([tables, *tables.get("stage", ())]):
             key, own = f"stage.{k}.run" if k else "run", stage.get("run", {})
             if k and "dt" in own:
-                yield f"{key}.dt={0.5 * own['dt']!r}"
+                yield f"{key}.dt={0.5 * _plain(own['dt'], f'{key}.dt')!r}"
             if "steps" in own:
-                yield f"{key}.steps={2 * own['steps']}"
+                yield f"{key}.steps={2 * _plain(own['steps'], f'{key}.steps')}"
+
+
+def _plain(value: Any, key: str) -> Any:
+    """A number of the case; InputError for one that is written as a text, which has no half."""
+    if isinstance(value, int | float):
+        return value
+    raise InputError(f"{key} is {shown(value)}, which has no half: write it as a number in the case, in SI units")
 
 
 def _status(folder: Path) -> str:
-    return str(read_run(folder).facts.get("status")) if (folder / HISTORY_CSV).is_file() else ""
+    return str(read_run(folder).facts.get("status")) if is_own(folder / HISTORY_CSV) else ""
 
 
 def refinement(run: RunFolder, failed: Mapping[str, str]) -> Section:
@@ -81,8 +92,10 @@ def refinement(run: RunFolder, failed: Mapping[str, str]) -> Section:
     ``failed``: name -> why, of ``refine``."""
     found = {}
     for name in NAMES:
-        out = run.folder / FOLDER / name
-        if name not in failed and _status(out) == "finished" and _same(run, name):
+        if name in failed:
+            continue
+        out = inner_folder(run.folder, FOLDER, name)
+        if _status(out) == "finished" and _same(run, name):
             other = read_run(out)
             found[name] = {one.name: one for one in peaks(other.history, other.columns)}
     said = [f"The run with {NAMES[name]} failed: {why}." for name, why in failed.items()]

@@ -5,19 +5,23 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import InputError
+from ..core.arguments import checked
+from ..core.errors import InputError, ViContactError
+from ..core.files import sentence, write_output
+from ..core.own_files import is_own
 from ..core.version import __version__
 from ..engineering import checks
 from ..engineering.checks.comparison import Check, Comparison
 from ..engineering.peak_values import peaks, write_peaks
 from ..plots.bodies import draw_run
+from ..plots.histories import image_of
 from ..plots.pages import write_pages
 from ..plots.sections import HEADERS, Section, Table, header_facts, number, sections_of
 from ..plots.sketch import sketch
 from ..plots.web_page import MISSING, can_write, write_web_page
 from ..run.files.folder import MODEL
 from ..run.files.reading import read_object, read_run
-from .cases.library import COPY, read_copy, refuse_retired
+from .cases.library import COPY, read_copy
 from .cases.parsing import Words, read
 from .cases.table_calls import Spot, build, callee
 from .refinement import refinement
@@ -25,6 +29,7 @@ from .refinement import refinement
 WRITERS = {".html": write_web_page, ".pdf": write_pages}
 
 
+@checked
 def report(folder: str | Path, *, out: str | Path | None = None, title: str | None = None,
            columns: Sequence[Sequence[str]] | None = None,
            failed: Mapping[str, str] | None = None) -> tuple[Section, list[Path]]:
@@ -35,7 +40,8 @@ def report(folder: str | Path, *, out: str | Path | None = None, title: str | No
     ``columns``: groups of columns of one unit, a chart each, in place of those that move; ``failed``: what ``refine``
     returned. What has no data is left out. InputError as of ``read_run``, for a run of one row, columns that do not
     exist, another kind of file, .html without jinja2 and plotly, and a damaged model.json."""
-    refuse_retired(case := read_copy(folder := Path(folder)))
+    folder = Path(folder)
+    case = read_copy(folder)
     run = read_run(folder)
     heading = str(title or case.get("title") or f"Run {folder.resolve().name}")
     pages = [Path(out)] if out is not None else [folder / f"report.{end}" for end in ("pdf", "html")[: 1 + can_write()]]
@@ -56,16 +62,23 @@ def report(folder: str | Path, *, out: str | Path | None = None, title: str | No
 
 def _model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Path]]:
     """What model.json says, and its sketch; nothing where there is none."""
-    if not (folder / MODEL).is_file():
+    if not is_own(folder / MODEL):
         return {}, []
     try:
         model = read_object(folder / MODEL)
-        sketch(model).savefig(picture, dpi=130, bbox_inches="tight")
-        return model, [picture]
-    except (OSError, KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
-        raise InputError(f"'{folder / MODEL}' is damaged ({str(error)[:200]}): restore it, or delete it") from error
+        image = image_of(sketch(model), bbox_inches="tight")
+    except InputError:
+        raise
+    except OSError as error:
+        raise ViContactError(sentence(error)) from error
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:  # of what the file says
+        reason = " ".join(str(error).split())[:200]
+        raise InputError(f"'{folder / MODEL}' is damaged ({reason}): restore it, or delete it") from error
+    write_output(picture, image)
+    return model, [picture]
 
 
+@checked
 def comparisons(folder: str | Path) -> tuple[Comparison, ...]:
     """Return the comparisons of a run folder, one for each [[check]] of the case it keeps; InputError without a run."""
     folder = Path(folder)

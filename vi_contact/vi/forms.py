@@ -7,7 +7,7 @@ import numpy as np
 import ufl
 from ufl.algorithms import expand_derivatives
 
-from ..core.algebra import Array, Mask
+from ..core.algebra import Array, Mask, largest, max_abs, total
 from ..core.checks import at, refuse, shown
 from ..core.errors import InputError
 from ..fem import compat
@@ -15,10 +15,10 @@ from ..fem.communicators import MpiComm, kept
 from ..fem.form_checks import refuse_not_linear
 from ..fem.petsc_algebra import PetscAlgebra, PetscMatrix, as_petsc
 from ..fem.petsc_rows import moved
+from .rounding import OFF, size_of_field
 
 KINDS = ("functional", "linear form", "bilinear form")
 FORMS = "give a UFL form F(u; v), or (a, L) with a(u, v) bilinear and L(v) linear"
-OFF = 1e-12  # of the bounds' size: prescribed values that miss a bound by round-off keep it
 
 
 def refused(sentence: str) -> InputError:
@@ -42,6 +42,18 @@ def split(form: Any, u: Any, J: Any) -> tuple[Any, Any]:
     return ufl.action(a, u) - L, a
 
 
+def derivatives(energy: Any, u: Any) -> tuple[Any, Any]:
+    """Return (F, J), the first and second derivative of a functional of u; InputError for others."""
+    if not isinstance(energy, ufl.Form) or energy.arguments():
+        what = f"a form of rank {len(energy.arguments())}" if isinstance(energy, ufl.Form) else shown(energy)
+        raise refused(f"energy is {what}, and a functional is needed; give a UFL form of rank 0, such as "
+                      "0.5 * ufl.inner(ufl.grad(u), ufl.grad(u)) * ufl.dx, or the form F(u; v) in its place")
+    if not contains(energy, u):
+        raise refused("energy does not depend on u: write it with the Function that is solved for")
+    F = ufl.derivative(energy, u)
+    return F, ufl.derivative(F, u)
+
+
 def checked(name: str, form: Any, rank: int, u: Any) -> Any:
     """Return a form that has so many arguments, on the space of u; else InputError."""
     if not isinstance(form, ufl.Form) or len(form.arguments()) != rank:
@@ -58,24 +70,37 @@ def contains(form: Any, u: Any) -> bool:
 
 
 class Problem:
-    """Evaluate F and J at the present u; vectors are of the unknowns of this rank that are ``free``, no Dirichlet
-    condition holds them. ``constant``: whether J is the same at every u, the problem linear."""
+    """Evaluate F, its Jacobian J and the energy at the present u.
 
-    def __init__(self, form: Any, u: Any, bcs: Sequence[Any], J: Any) -> None:
-        F, J = split(form, u, J)
+    Vectors are of the unknowns of this rank that are ``free``: no Dirichlet condition holds them. The others are
+    *held*. Their values go from those of the first guess to the prescribed ones along a straight line, of which the
+    share ``left`` is still to come: 0.0 where the conditions are met.
+
+    Attributes:
+        constant: whether J is the same at every u, so that the problem is linear.
+        given: the values of u before the first step (of a part of the change, see ``aim``), those of ghosts too."""
+
+    def __init__(self, form: Any, u: Any, bcs: Sequence[Any], J: Any, energy: Any = None) -> None:
+        if energy is None:
+            F, J = split(form, u, J)
+        else:
+            F, J = derivatives(energy, u)
         self.u, space = u, u.function_space
         self.comm = MpiComm(kept(space.mesh.comm))
         self.owned = space.dofmap.index_map_bs * space.dofmap.index_map.size_local
         if not isinstance(bcs, list | tuple) or not all(compat.constrains(bc, space) for bc in bcs):
             raise refused("bcs is wrong: give a list of dirichletbc objects on the space of u or its components")
-        self._clamped, self._values = np.zeros(len(u.x.array), dtype=bool), np.zeros(len(u.x.array))
+        self.given = self._first = np.array(u.x.array)
+        self._held, self._values = np.zeros(len(self.given), dtype=bool), np.zeros(len(self.given))
         for bc in bcs:
             held, values = compat.bc_values(bc, len(self._values))
-            self._clamped[held], self._values[held] = True, values
-        self.free: Mask = ~self._clamped[: self.owned]
+            self._held[held], self._values[held] = True, values
+        self._prescribed = self._values
+        self.free: Mask = ~self._held[: self.owned]
         for one in (F, J):
             refuse_not_linear("vi.solve: F or J", one)
         self._F, self._J = compat.compile_form(F), compat.compile_form(J)
+        self._energy = None if energy is None else compat.compile_form(energy)
         self.constant = not contains(expand_derivatives(J), u)
         self._jacobian: PetscMatrix | None = None
 
@@ -84,28 +109,83 @@ class Problem:
         """Return the free unknowns of u."""
         return np.array(self.u.x.array[: self.owned][self.free], dtype=float)
 
-    def put(self, x: Array) -> None:
-        """Write the free unknowns into u, and the prescribed ones; ghosts follow."""
+    @property
+    def change(self) -> Array:
+        """Return the prescribed values less those of the first guess, 0 at free unknowns; ghosts too."""
+        return np.where(self._held, self._values - self.given, 0.0)
+
+    def put(self, x: Array, left: float = 0.0) -> None:
+        """Write the free unknowns into u, and the held ones but for the share ``left`` of their change. Collective."""
         values = self.u.x.array
-        values[self._clamped] = self._values[self._clamped]
+        values[self._held] = self._values[self._held]
+        if left:
+            values[self._held] -= left * self.change[self._held]
         values[: self.owned][self.free] = x
         self.u.x.scatter_forward()
 
+    def dot(self, x: Array, y: Array) -> float:
+        """Return x·y over all ranks. Collective."""
+        return total(self.comm, x @ y)
+
+    def count(self, mask: Mask) -> int:
+        """Return how many entries of a mask are True, over all ranks. Collective."""
+        return round(total(self.comm, np.count_nonzero(mask)))
+
+    def all(self, here: bool) -> bool:
+        """Say whether something is true on every rank. Collective."""
+        return not largest(self.comm, not here)
+
+    def places(self) -> Array:
+        """Return (n, 4) where the free unknowns are: coordinates as shares of the body's box, and the component as a
+        share of their number. Collective."""
+        space, width = self.u.function_space, self.u.function_space.dofmap.index_map_bs
+        x = space.tabulate_dof_coordinates()[: self.owned // width]
+        low = -self.comm.max(-np.min(x, axis=0, initial=np.inf))
+        high = self.comm.max(np.max(x, axis=0, initial=-np.inf))
+        shares = np.repeat((x - low) / np.where(high > low, high - low, 1.0), width, axis=0)
+        component = np.tile(np.arange(width) / width, len(x))
+        return np.column_stack([shares, component])[self.free]
+
+    def put_back(self) -> None:
+        """Write the first guess into u, with the held values that it had, as if nothing had been done."""
+        self.u.x.array[:] = self.given = self._first
+        self._values = self._prescribed
+
+    def aim(self, share: float) -> None:
+        """Take the present u for the first guess, and as prescribed values those that are so far on the way from the
+        values of the very first guess."""
+        self.given = np.array(self.u.x.array)
+        way = self._prescribed - self._first
+        self._values = self._prescribed if share == 1.0 else self._first + share * way
+
     def residual(self) -> Array:
-        """Return F at u."""
+        """Return F at u. Collective."""
         vector = compat.assemble_vector(self._F)
         values = np.array(vector.array_r[: self.owned])[self.free]
         vector.destroy()
         return values
 
+    def energy(self) -> float:
+        """Return the energy at u, infinity where it is no number. Collective."""
+        found = total(self.comm, compat.assemble_scalar(self._energy))
+        return found if np.isfinite(found) else np.inf
+
     def jacobian(self) -> PetscMatrix:
         """Return J at u on the free unknowns; what it returned before is freed. Collective."""
-        if self._jacobian is None or not self.constant:
+        return self.linearised(0.0)[0]
+
+    def linearised(self, left: float) -> tuple[PetscMatrix, Array]:
+        """Return (J at u on the free unknowns, what F of these will gain, to first order, by the share ``left`` of the
+        change of the held ones); the J that it returned before is freed. Collective."""
+        gain = np.zeros(np.count_nonzero(self.free))
+        if self._jacobian is None or left or not self.constant:
             self.close()
             whole = moved(compat.assemble_matrix(self._J), self.comm.mpi)
+            if left:
+                gain = (PetscMatrix(whole) @ (left * self.change[: self.owned]))[self.free]
             self._jacobian = as_petsc(PetscAlgebra(self.comm.mpi).block(PetscMatrix(whole), self.free))
             whole.destroy()
-        return self._jacobian
+        return self._jacobian, gain
 
     def spread(self, values: Array) -> Any:
         """Return values of the free unknowns as a Function, zero elsewhere. Collective."""
@@ -121,14 +201,18 @@ class Problem:
         self._jacobian = None
 
     def bounds(self, lower: Any, upper: Any) -> tuple[Array, Array]:
-        """Return (lower, upper) of the free unknowns; InputError, on all ranks, for what contradicts."""
+        """Return (lower, upper) of the free unknowns; InputError, on all ranks, for what contradicts.
+
+        What misses by rounding (``rounding``) contradicts nothing: a prescribed value that is beyond a bound stays as
+        it is, and where lower is above upper the unknown is held at lower."""
         low, high = self._bound("lower", lower, -np.inf), self._bound("upper", upper, np.inf)
-        u, space = np.array(self.u.x.array[: self.owned]), self.u.function_space
-        off = OFF * np.max([np.where(np.isfinite(one), np.abs(one), 0.0) for one in (low, high, u)], axis=0)
+        u, space = np.where(self._held, self._values, self.given)[: self.owned], self.u.function_space
+        self.size = size_of_field(np.nan_to_num(u, nan=np.inf), low, high, self.comm)
+        off = OFF * self.size
         defects = (
             (~np.isfinite(u), "the first guess or bcs are NaN or infinite: correct them"),
             (np.isnan(low) | np.isnan(high), "a bound is not a number: give None where there is none"),
-            (low > high, "lower is above upper: give lower <= upper"),
+            (low > high + off, "lower is above upper: give lower <= upper"),
             ((low == np.inf) | (high == -np.inf), "no number is allowed: give finite bounds, or None"),
             (~self.free & ((u < low - off) | (u > high + off)), "bcs prescribe a value beyond a bound: correct it"),
         )
@@ -139,7 +223,14 @@ class Problem:
             return f"vi.solve: {where}, where u is {u[i]:g} in [{low[i]:g}, {high[i]:g}]: {words}"
 
         refuse((said(int(np.argmax(wrong)), words) for wrong, words in defects if np.any(wrong)), self.comm)
-        return low[self.free], high[self.free]
+        return low[self.free], np.maximum(low, high)[self.free]
+
+    def moves(self, low: Array, high: Array) -> bool:
+        """Say whether conditions or bounds change the first guess by more than rounding; after ``bounds``. Collective.
+        """
+        x = self.given[: self.owned][self.free]
+        most = max(max_abs(self.change), max_abs(x - np.clip(x, low, high)))
+        return largest(self.comm, most) > OFF * self.size
 
     def _bound(self, name: str, given: Any, none: float) -> Array:
         """A bound at the owned unknowns."""

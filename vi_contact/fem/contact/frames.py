@@ -18,6 +18,7 @@ from ...core.corners import PARALLEL, at_right_angles, corner_of
 from ...core.errors import InputError
 from ...core.surfaces import ContactSurface, nodal_blocks, nodal_frames, same_node, tangential_columns
 from ..nodal_space import NodalSpace
+from .borrowing import Borrowed
 from .nodes import Nodes, asked, joined_nodes
 
 INDEPENDENT = 0.01  # least singular value of a node's directions: two that turn by 0.8° (CHOSEN; T has 1 over it)
@@ -35,13 +36,14 @@ class Facing:
 class NodalConditions:
     """Hold this rank's conditions u·direction <= gap at nodes, u being relative to what they are ``facing`` if that
     deforms too, and less what the ``bubbles`` of edges add where displacements have them (``.bubbles``);
-    ``slots``: their numbers among those of all ranks, ascending."""
+    ``slots``: their numbers among those of all ranks, ascending. ``borrowed``: pressures of nodes without one."""
 
     nodes: Nodes
     directions: Array
     slots: Indices
     facing: Facing | None = None
     bubbles: tuple[Facing, ...] = ()
+    borrowed: Borrowed | None = None
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

@@ -31,9 +31,16 @@ def joined_surfaces(*surfaces: ContactSurface) -> ContactSurface:
         raise InputError("joined_surfaces: give surfaces of fem.contact_surface and contact_pair of one system")
     names = ("gap0", "weights", "bilateral", "compliance")
     data: dict[str, Any] = {name: np.concatenate([getattr(surface, name) for surface in made]) for name in names}
+    if any(surface.uncovered is not None for surface in made):
+        data["uncovered"] = np.concatenate([
+            np.zeros(surface.count, dtype=bool) if surface.uncovered is None else surface.uncovered
+            for surface in made
+        ])
     parts = [part for surface in made for part in surface.parts]
     joined = surface_of(made[0].space, parts, motion=_joined([(surface.motion, (surface.count,)) for surface in made]),
-                        companions=tuple(one for surface in made for one in surface.companions), **data)
+                        companions=tuple(one for surface in made for one in surface.companions),
+                        watched=tuple(one for surface in made for one in surface.watched),
+                        censuses=tuple(one for surface in made for one in surface.censuses), **data)
     joined = replace(joined, slide=_slide(made))
     return joined.with_frictionless_corners() if all(one.frictionless_corners for one in made) else joined
 

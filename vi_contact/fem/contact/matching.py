@@ -2,8 +2,8 @@
 
 The rows of P sum to one, so that a common translation of both bodies opens and closes nothing."""
 
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from ...core.algebra import Array, Indices, Mask
 from ...core.checks import at, attributes
 from ...core.errors import InputError
-from .nodes import Nodes, Rows
+from .nodes import Nodes
 
 NEARBY = 8  # nodes of side 2 that are looked at first
 EDGE_ON = 0.01  # cosine of the angle between a normal and what it is seen from: under less no side faces another
@@ -36,15 +36,39 @@ def common_nodes(one: Side, two: Side) -> Indices:
 
 
 @dataclass(frozen=True, eq=False)
-class Matched(Rows):
-    """Hold the m nodes of side 1 that face side 2: ``rows`` among those of side 1, P (m, nodes of side 2), the weights
-    [m] or [m²] of their shares of the interface, and by how much the sides may overlap there [m] and count as touching.
-    """
+class Matched:
+    """Hold the m nodes of side 1 that face side 2.
+
+    Attributes:
+        rows: their rows among those of side 1; P: (m, nodes of side 2).
+        weights: (m,) of their shares of the interface [m] or [m²].
+        overlap: (m,) by how much the sides may overlap there [m] and count as touching.
+        covered: (m,) share of the facets around a node that is in front of side 2, where the node itself is not; 1 for
+            all others, and by default.
+        carried: rows of further nodes whose shares those of others contain, so that they have no condition."""
 
     rows: Indices
     P: sp.csr_matrix
     weights: Array
     overlap: Array
+    covered: Array | None = None
+    carried: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    @property
+    def shares(self) -> Array:
+        """Return ``covered``, ones by default."""
+        return np.ones(len(self.rows)) if self.covered is None else self.covered
+
+    def pick(self, rows: Any) -> "Matched":
+        """Return what is in these rows."""
+        return Matched(
+            rows=self.rows[rows],
+            P=self.P[rows],
+            weights=self.weights[rows],
+            overlap=self.overlap[rows],
+            covered=self.shares[rows],
+            carried=self.carried,
+        )
 
 
 class Matching(Protocol):

@@ -10,7 +10,8 @@ see ``mortar_in_space``. On each segment
 
     psi = A phi,   A = diag(∫ phi_k) (∫ phi phiᵀ)⁻¹
 
-over its part in front of side 2, so that ∫ psi_s phi_k = 0 for the other node k (biorthogonal) and sum_s psi_s = 1.
+over its part in front of side 2 (``covering``: at the edge of what is covered, whole segments carry parts of others),
+so that ∫ psi_s phi_k = 0 for the other node k (biorthogonal) and sum_s psi_s = 1.
 Then every linear field is matched exactly (P x_2 = x_1 on fitting sides) and a uniform pressure passes through exactly
 (the patch test). Nodes t of both sides, at the tip of a crack or beside a weld, have no function; the other nodes of a
 facet share theirs and, which keeps P x_2 = x_1, pass ∫ psi_t to u_t: pressure is uniform up to the weld, which carries
@@ -26,12 +27,14 @@ from typing import ClassVar
 import numpy as np
 import scipy.sparse as sp
 
-from ...core.algebra import Array
+from ...core.algebra import Array, Indices, Mask
 from ...core.errors import InputError
+from .covering import Carried, Coupled, Covered, coupled, extrapolation
 from .matching import EDGE_ON, Matched, Side, common_nodes, refuse_same_way
-from .mortar_in_space import LEAST_COVERED, handed_over, in_space
+from .mortar_in_space import ROUND_OFF, handed_over, in_space
 
 POINTS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)  # of Gauss, on [0, 1], weights ½
+AT_NODE = 1e-9  # of a segment: round-off of where its covered part ends
 CURVED = 0.05  # of a facet: what polygons of one curve may overlap
 
 
@@ -39,7 +42,8 @@ CURVED = 0.05  # of a facet: what polygons of one curve may overlap
 class DualMortar:
     """Match sides of plane and solid bodies with any meshes by the mortar method with dual Lagrange multipliers.
 
-    Nodes of side 1 at the ends of what is in front of side 2 keep their conditions, in the mean over that part.
+    A node of side 1 beyond the edge of side 2 keeps its condition, in the mean over what is covered, where that is at
+    least half of its share of the facets around it; else the nodes inside carry it, and it has none (``covering``).
     Initial gaps are means too; where polygons of the same curve overlap by up to 5 % of a facet the gap is zero.
     InputError for bars, for sides that do not face each other, in space for facets that are slivers or not convex."""
 
@@ -52,12 +56,13 @@ class DualMortar:
         if max(one.facets.shape[1], two.facets.shape[1]) > (2 if d == 2 else 4):
             raise InputError(f"DualMortar joins facets of first order and those of '{one.name}' and '{two.name}' have "
                              "mid-points (degree=2): mesh both sides alike for matching=NodeToNode(), or use degree=1")
-        D, M, longest = in_space(one, two) if d == 3 else _in_plane(one, two)
-        rows = np.flatnonzero(D > 0.0)
-        if not len(rows):
+        found = in_space(one, two) if d == 3 else _in_plane(one, two)
+        D = found.D
+        if not (D > 0.0).any():
             _refuse(one, two)
-        P = sp.csr_matrix(sp.diags([1.0 / D[rows]], [0]) @ M[rows])
-        return Matched(rows, P, D[rows], CURVED * longest[rows])
+        rows, carried = np.flatnonzero(D > 0.0), np.flatnonzero(found.carried)
+        P = sp.csr_matrix(sp.diags([1.0 / D[rows]], [0]) @ found.M[rows])
+        return Matched(rows, P, D[rows], CURVED * found.longest[rows], found.share[rows], carried)
 
 
 def _refuse(one: Side, two: Side) -> None:
@@ -69,30 +74,97 @@ def _refuse(one: Side, two: Side) -> None:
                      "two boundaries between the bodies")
 
 
-def _in_plane(one: Side, two: Side) -> tuple[Array, sp.csr_matrix, Array]:
-    """D (m,), M (m, n) and the length (m,) of the longest segment in front of side 2 of each node of side 1."""
+@dataclass(frozen=True, eq=False)
+class _Segment:
+    """Hold a segment of side 1 in front of side 2: nodes, ends, pieces, ∫ phi phiᵀ (2, 2), and by segment of side 2
+    ∫ phi_i phi_j (2, 2)."""
+
+    nodes: Array
+    ends: Array
+    pieces: list[tuple[float, float, int, Array]]
+    own: Array
+    mixed: dict[int, Array]
+
+    @property
+    def length(self) -> float:
+        return float(np.linalg.norm(self.ends[1] - self.ends[0]))
+
+    def places(self, points: Array) -> Array:
+        """Return the coordinates of points (k, 2) along the segment, 0 and 1 at its ends."""
+        along = self.ends[1] - self.ends[0]
+        return np.asarray((points - self.ends[0]) @ along / (along @ along))
+
+
+def _in_plane(one: Side, two: Side) -> Coupled:
+    """Integrate the coupling of sides of plane bodies."""
     ends1, ends2 = one.nodes.points[one.facets], two.nodes.points[two.facets]
     normals1, normals2 = (_normals(side, ends) for side, ends in ((one, ends1), (two, ends2)))
-    m, n = len(one.nodes.points), len(two.nodes.points)
-    D, M, longest, partner = np.zeros(m), sp.lil_matrix((m, n)), np.zeros(m), common_nodes(one, two)
+    segments = []
     for facet, ends, normal in zip(one.facets, ends1, normals1, strict=True):
         pieces = list(_pieces(ends, normal, ends2, normals2))
-        if sum(high - low for low, high, *_ in pieces) <= LEAST_COVERED:
+        if sum(high - low for low, high, *_ in pieces) > ROUND_OFF:
+            length = float(np.linalg.norm(ends[1] - ends[0]))
+            segments.append(_Segment(facet, ends, pieces, *_integrals(pieces, length)))
+    covered = _covered(segments, common_nodes(one, two) >= 0)
+    return coupled(covered, lambda carried: _assembled(one, two, segments, carried))
+
+
+def _covered(segments: list[_Segment], common: Mask) -> Covered:
+    """What is covered of these segments; ``common``: nodes (m,) of both sides."""
+    ends = np.array([[min(piece[0] for piece in one.pieces), max(piece[1] for piece in one.pieces)]
+                     for one in segments]).reshape(-1, 2)
+    corners = np.array([one.ends for one in segments]).reshape(-1, 2, 2)
+    weights = np.array([one.own.sum(axis=1) for one in segments]).reshape(-1, 2)
+    lengths = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
+    return Covered(
+        facets=np.array([one.nodes for one in segments], dtype=np.int64).reshape(-1, 2),
+        middles=corners[:, 0] + ends.mean(axis=1)[:, None] * (corners[:, 1] - corners[:, 0]),
+        weights=weights,
+        full=np.repeat(0.5 * lengths[:, None], 2, axis=1),
+        inside=np.column_stack([ends[:, 0] < AT_NODE, ends[:, 1] > 1.0 - AT_NODE]),
+        parts=np.array([sum(piece[1] - piece[0] for piece in one.pieces) for one in segments]),
+        common=common,
+    )
+
+
+def _assembled(one: Side, two: Side, segments: list[_Segment], carried: Carried) -> tuple[Array, sp.csr_matrix, Array]:
+    """D (m,), M (m, n) and the length (m,) of the longest segment in front of side 2 of each node of side 1."""
+    m, n = len(one.nodes.points), len(two.nodes.points)
+    D, M, longest, partner = np.zeros(m), sp.lil_matrix((m, n)), np.zeros(m), common_nodes(one, two)
+    for part, by, used in zip(segments, carried.by, carried.used, strict=True):
+        if not used:
             continue
-        length = float(np.linalg.norm(ends[1] - ends[0]))
-        own, mixed = _integrals(pieces, length)
+        facet, own = part.nodes, part.own
+        longest[facet] = np.maximum(longest[facet], part.length)
+        if carried.nodes[facet].any():
+            _carry(D, M, one.nodes.points, two.facets, part, by, carried.nodes)
+            continue
         dual = np.diag(own.sum(axis=1)) @ np.linalg.inv(own)
         common = partner[facet]
         dual, own_D, forces = (a[0] for a in handed_over(dual[None], own.sum(axis=1)[None], common[None] >= 0))
         D[facet] += own_D
-        longest[facet] = np.maximum(longest[facet], length)
-        for segment, values in mixed.items():
+        for segment, values in part.mixed.items():
             for j, column in zip(two.facets[segment], (dual @ values).T, strict=True):
                 for i, value in zip(facet, column, strict=True):
                     M[i, j] += value
         for j in np.flatnonzero(common >= 0):
             M[facet[1 - j], common[j]] -= forces[1 - j, j]
     return D, sp.csr_matrix(M), longest
+
+
+def _carry(D: Array, M: sp.lil_matrix, points: Array, facets2: Indices, part: _Segment, by: Indices,
+           carried: Mask) -> None:
+    """Add to D and M what a segment adds of which some node is carried by the nodes of another (``covering``)."""
+    weights, inverse = part.own.sum(axis=1), np.linalg.inv(part.own)
+    there = part.places(points[by])[None, :, None]
+    shares = extrapolation(there, part.places(part.ends)[None, :, None])[0]
+    for i, (node, weight) in enumerate(zip(part.nodes, weights, strict=True)):
+        for k, share in zip(by, shares[i], strict=True) if carried[node] else ((node, 1.0),):
+            place = float(part.places(points[k]))
+            D[k] += share * weight
+            psi = share * weight * _hats(place) @ inverse  # of the functions of the segment, which span (1, x)
+            for segment, values in part.mixed.items():
+                M[k, facets2[segment]] = M[k, facets2[segment]].toarray().ravel() + psi @ values
 
 
 def _normals(side: Side, ends: Array) -> Array:

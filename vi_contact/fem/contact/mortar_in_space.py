@@ -10,17 +10,19 @@ with b = phi if that is all of it (biorthogonal functions, of distorted quadrila
 part: bilinear functions, carried on from a strip of a facet to its far nodes, grow without bound as the strip thins.
 Both keep sum_s psi_s = 1, ∫ psi_s = D_s > 0 and ∫ psi_s x = D_s x_s, and are the same on triangles."""
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from ...core.algebra import Array, Indices, Mask
 from .clipping import areas, hats, rule, triangles, turns
+from .covering import Carried, Coupled, Covered, coupled, extrapolation
 from .matching import Side, common_nodes
-from .sight import WHOLE, Looks, Pieces, facets_of, looks_of, opposite
+from .sight import WHOLE, Facets, Looks, Pieces, facets_of, looks_of, opposite
 
-LEAST_COVERED = 1e-3  # of a facet: less of it in front of side 2 is no contact
+ROUND_OFF = 1e-6  # of a facet: less of it in front of side 2 is nothing
 BLOCK = 512  # facets that are cut at once
 MOST_POINTS = 20  # of Gauss a way
 POINTS = 2**18  # at which functions are held at once, a few for each triangle of a piece
@@ -66,14 +68,20 @@ def summed(place: Indices, values: Array, count: int) -> Array:
 
 def dual(looks: Looks, own: Array, whole: Mask) -> Array:
     """Return A (looks, v, v) of the functions psi = A phi of looks."""
+    linear, inverse, _ = linear_functions(looks, own)
+    A = linear @ inverse @ linear.swapaxes(1, 2)
+    A[whole] = np.linalg.inv(own[whole])
+    return own.sum(axis=2)[:, :, None] * A
+
+
+def linear_functions(looks: Looks, own: Array) -> tuple[Array, Array, Array]:
+    """Return b at the nodes of looks (looks, v, 3), (∫ b bᵀ)⁻¹ (looks, 3, 3), and where b = (1, 0, 0): the middles
+    (looks, 1, 2) of what is in front of side 2. Lengths are over the reach of the facet."""
     D = own.sum(axis=2)
     middle = np.einsum("kv,kvc->kc", D, looks.polygons) / D.sum(axis=1)[:, None]
     linear = np.concatenate([np.ones((*D.shape, 1)), looks.polygons - middle[:, None, :]], axis=2)
     linear[:, :, 1:] /= looks.reach[:, None, None]
-    across = linear.swapaxes(1, 2)
-    A = linear @ np.linalg.inv(across @ own @ linear) @ across
-    A[whole] = np.linalg.inv(own[whole])
-    return D[:, :, None] * A
+    return linear, np.linalg.inv(linear.swapaxes(1, 2) @ own @ linear), middle[:, None, :]
 
 
 def entries(values: Array, rows: Indices, columns: Indices, m: int, n: int) -> sp.coo_matrix:
@@ -94,35 +102,132 @@ def handed_over(functions: Array, D: Array, common: Mask) -> tuple[Array, Array,
     return functions * ~common[:, :, None] + share[:, :, None] * lost[:, None, :], D * ~common, forces
 
 
-def in_space(one: Side, two: Side) -> tuple[Array, sp.csr_matrix, Array]:
-    """Return D (m,), M (m, n) and the size (m,) [m] of the largest facet in front of side 2 of each node of side 1."""
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """Hold some looks with something in front of them: what they share with side 2 (``pieces``), the covered share
+    (looks,) of each, and ``integrals`` of the functions of side 1, and of both sides."""
+
+    looks: Looks
+    pieces: Pieces
+    covered: Array
+    own: Array
+    mixed: Array
+
+    def inside(self) -> Mask:
+        """Return which nodes (looks, v) of the facets are in front of side 2 themselves."""
+        phi = hats(self.looks.polygons[self.pieces.look], self.pieces.polygons)
+        found = np.zeros(self.looks.nodes.shape)
+        np.maximum.at(found, self.pieces.look, phi.max(axis=1))
+        return np.asarray(found >= 1.0 - WHOLE)
+
+    def middles(self) -> Array:
+        """Return the middles (looks, 3) of the covered parts: means of those of the pieces, weighted with areas."""
+        size, looks = areas(self.pieces.polygons), self.looks
+        seen = summed(self.pieces.look, size[:, None] * self.pieces.polygons.mean(axis=1), len(looks.nodes))
+        seen /= summed(self.pieces.look, size[:, None], len(looks.nodes))
+        return looks.middles + np.einsum("kic,kc->ki", looks.frames, seen)
+
+
+def in_space(one: Side, two: Side) -> Coupled:
+    """Integrate the coupling of sides of solid bodies."""
     ours, theirs = facets_of(one, 1), facets_of(two, -1)
     from scipy.spatial import cKDTree  # late: it takes a while
 
     tree, looks = cKDTree(theirs.middles), looks_of(ours, one.nodes)
-    m, n, partner = len(one.nodes.points), len(two.nodes.points), common_nodes(one, two)
-    D, longest, parts = np.zeros(m), np.zeros(m), [sp.coo_matrix((m, n))]
+    blocks = []
     for rows in np.array_split(np.arange(len(looks.nodes)), 1 + len(looks.nodes) // BLOCK):
         if not len(rows):
             continue
         some = looks.pick(rows)
         pieces, covered = opposite(some, theirs, tree)
-        pieces = pieces.pick(np.flatnonzero((covered > LEAST_COVERED)[pieces.look]))
+        pieces = pieces.pick(np.flatnonzero((covered > ROUND_OFF)[pieces.look]))
         kept, look = np.unique(pieces.look, return_inverse=True)
         if not len(kept):
             continue
         some = some.pick(kept)
         pieces = replace(pieces, look=look.ravel())
-        own, mixed = integrals(some, pieces)
-        common, asking = partner[some.nodes], some.asking[:, :, None]
-        functions = dual(some, own, covered[kept] >= 1.0 - WHOLE)
+        blocks.append(_Block(some, pieces, covered[kept], *integrals(some, pieces)))
+    covered_parts = _covered(ours, blocks, common_nodes(one, two) >= 0)
+    return coupled(covered_parts, lambda carried: _assembled(one, two, theirs, blocks, carried))
+
+
+def _covered(ours: Facets, blocks: Sequence[_Block], common: Mask) -> Covered:
+    """What is covered of the looks of these blocks, of each for the nodes that ask; ``common``: nodes (m,) of both
+    sides."""
+    v = ours.nodes.shape[1]
+    weights, full, inside = [], [], []
+    for block in blocks:
+        looks = block.looks
+        weights.append(block.own.sum(axis=2) * looks.asking)
+        full.append(_whole_weights(looks) * looks.asking)
+        inside.append(block.inside() & looks.asking)
+    nodes = [block.looks.nodes for block in blocks]
+    none = np.zeros((0, v))
+    return Covered(
+        facets=np.concatenate([none.astype(np.int64), *nodes]),
+        middles=np.concatenate([np.zeros((0, 3)), *(block.middles() for block in blocks)]),
+        weights=np.concatenate([none, *weights]),
+        full=np.concatenate([none, *full]),
+        inside=np.concatenate([none > 0.0, *inside]),
+        parts=np.concatenate([none[:, 0], *(block.covered for block in blocks)]),
+        common=common,
+    )
+
+
+def _whole_weights(looks: Looks) -> Array:
+    """Integrals (looks, v) of the functions of the nodes over whole facets."""
+    k, v = looks.nodes.shape
+    piece, corners = triangles(looks.polygons)
+    places, weights = rule(3)
+    phi = hats(looks.polygons[piece], np.einsum("qc,kcx->kqx", places, corners))
+    sizes = areas(corners) / looks.slant[piece]
+    return summed(piece, np.einsum("q,kqv,k->kv", weights, phi, sizes), k).reshape(k, v)
+
+
+def _assembled(one: Side, two: Side, theirs: Facets, blocks: Sequence[_Block],
+               carried: Carried) -> tuple[Array, sp.csr_matrix, Array]:
+    """D (m,), M (m, n) and the size (m,) [m] of the largest facet in front of side 2 of each node of side 1."""
+    m, n, partner = len(one.nodes.points), len(two.nodes.points), common_nodes(one, two)
+    D, longest, parts, start = np.zeros(m), np.zeros(m), [sp.coo_matrix((m, n))], 0
+    for block in blocks:
+        some, pieces, own = block.looks, block.pieces, block.own
+        rows = slice(start, start + len(some.nodes))
+        by, used = carried.by[rows], carried.used[rows, None]
+        start = rows.stop
+        borne = carried.nodes[some.nodes] & some.asking
+        common, asking = partner[some.nodes], (some.asking & used & ~borne)[:, :, None]
+        functions = dual(some, own, (block.covered >= 1.0 - WHOLE) & ~borne.any(axis=1))
         functions, own_D, forces = handed_over(functions, own.sum(axis=2), common >= 0)
-        values = (functions * asking)[pieces.look] @ mixed
+        values = (functions * asking)[pieces.look] @ block.mixed
         parts.append(entries(values, some.nodes[pieces.look], theirs.nodes[pieces.facet], m, n))
         if (common >= 0).any():
             parts.append(entries(-forces * asking, some.nodes, common, m, n))
-        np.add.at(D, some.nodes, own_D * some.asking)
+        np.add.at(D, some.nodes, own_D * asking[:, :, 0])
         reach = np.maximum(some.reach[pieces.look], theirs.reach[pieces.facet])
         np.maximum.at(longest, some.nodes[pieces.look], 2.0 * reach[:, None] * some.asking[pieces.look])
+        if borne.any():
+            parts.append(_carry(D, one.nodes.points, theirs, block, by, borne, n))
     values, *places = (np.concatenate([getattr(part, name) for part in parts]) for name in ("data", "row", "col"))
     return D, sp.csr_matrix((values, tuple(places)), shape=(m, n)), longest
+
+
+def _carry(D: Array, points: Array, theirs: Facets, block: _Block, by: Indices, borne: Mask, n: int) -> sp.coo_matrix:
+    """Add to D what the nodes ``by`` (looks, v) of other facets carry of nodes (looks, v) that are ``borne``, and
+    return what belongs to it in M (``covering``)."""
+    looks, pieces = block.looks, block.pieces
+    rows = np.flatnonzero(borne.any(axis=1))
+    some, place = looks.pick(rows), np.full(len(looks.nodes), -1)
+    place[rows] = np.arange(len(rows))
+    own, there = block.own[rows], points[by[rows]] - some.middles[:, None, :]
+    seen = np.einsum("kvi,kic->kvc", there, some.frames)
+    shares = extrapolation(seen, some.polygons) * borne[rows][:, :, None]
+    weights = np.einsum("kpv,kp->kv", shares, own.sum(axis=2))
+    np.add.at(D, by[rows], weights)
+    # psi_k = D_k b(x)ᵀ G⁻¹ b(x_k), in the functions of the facet: b(x) = sum_i b(x_i) phi_i
+    nodal, inverse, offset = linear_functions(some, own)
+    beyond = np.concatenate([np.ones((*seen.shape[:2], 1)), (seen - offset) / some.reach[:, None, None]], axis=2)
+    functions = weights[:, :, None] * (beyond @ inverse @ nodal.swapaxes(1, 2))
+    among = np.flatnonzero(place[pieces.look] >= 0)
+    look = place[pieces.look[among]]
+    values = functions[look] @ block.mixed[among]
+    return entries(values, by[rows][look], theirs.nodes[pieces.facet[among]], len(points), n)

@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
-from ...core.algebra import Array, Mask
+from ...core.algebra import Array, Indices, Mask
 from ...core.checks import at, optional, provides
 from ...core.corners import FEATURE_ANGLE
 from ...core.errors import InputError
@@ -26,12 +26,16 @@ from ...core.system import SemiDiscreteSystem
 from ...meshes.rows import number_alike
 from ..mesh import Facets
 from ..space import FemSpace
+from .borrowing import Borrowed, borrowed
 from .bubbles import averaged
+from .counting import census_of_all, tell
+from .covering import LEAST_SHARE
 from .faces import Boundary, boundary, checked_angle, split, tell_corners
 from .frames import Facing, NodalConditions, snapped, surface_of
 from .matching import Matched, Matching, NodeToNode, Side
 from .nodes import Nodes, everywhere, joined_nodes
 from .surface import contact_space, listed, merged, nodes_on, prescribed_motion
+from .watching import Watched, clamped_or_prescribed, watched_nodes
 
 log = logging.getLogger(__name__)
 
@@ -43,8 +47,12 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
     """Make the contact conditions between two boundaries of deformable bodies, or two faces of a crack.
 
     Each node of side 1 has a condition, with the normals, weights (times the section's thickness) and forces of side 1;
-    r_n / weights is the pressure. Side 1 should be the smaller and finer one, or the softer body. Initial gaps are
-    measured along the normals of side 1. Nodes that both sides share, at the tip of a crack, have no condition, and
+    r_n / weights is the pressure. Either side may be the first. Pressures are smoothest where side 1 is that of the
+    softer body, or its facets are the smaller ones: those of a stiff side with facets a little larger than those of a
+    soft side 2 zigzag. A body that rocks turns about its own edge where its base is side 1; where the ground is, about
+    the ground's node next to this edge. With ``DualMortar`` nodes of side 1 beyond the edge of side 2 have no condition
+    where less than half of their share is covered: the nodes inside carry it. Initial gaps are measured along the
+    normals of side 1. Nodes that both sides share, at the tip of a crack, have no condition, and
     nodes that are clamped on both sides have none either. Nodes that are tied to one another share one. Prescribed
     nodes of side 2 move as they are prescribed, like a moving obstacle.
 
@@ -73,25 +81,44 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
     around = boundary(space, facets1, beyond=angle)
     faces = _faces(space, one, boundary(space, facets1) if len(around.vertices) else around, angle)
     nodes, matched = _by_face(faces, two, NodeToNode() if matching is None else matching, space.size)
+    opposite = np.concatenate([nodes.numbers, matched.carried])
+    carried = np.setdiff1d(matched.carried, nodes.numbers)
     kept = ~np.isin(nodes.numbers, two.nodes.numbers)
     nodes, matched = nodes.pick(kept), matched.pick(kept)
     free = _unclamped(space, one.name, nodes, two, matched)
+    kinds = _kinds(one, shared, opposite, nodes.numbers[~free])
+    kinds |= _sorted_out(space, one, kinds["clamped"])
+    watched = _watched(space, one, two, nodes.pick(~free), matched.pick(~free)) if points is None else ()
+    kinds["partly covered"] = np.isin(one.nodes.numbers, carried)
+    little = nodes.numbers[free & (matched.shares < LEAST_SHARE)]
+    kinds["hardly covered"] = np.isin(one.nodes.numbers, little)
+    _warn_of_coarse(space, one, two, little)
     nodes, matched = nodes.pick(free), matched.pick(free)
     if points is not None:
         chosen = listed(space, nodes, points, one.name)
         rows = np.concatenate([np.flatnonzero(nodes.numbers == number) for number in chosen])
+        kinds["not listed"] = np.isin(one.nodes.numbers, np.setdiff1d(nodes.numbers, chosen))
         nodes, matched = nodes.pick(rows), matched.pick(rows)
+    alone = nodes.numbers
     directions = snapped(nodes.normals)
     gap, P = _gap(space, one.name, two, nodes, directions, matched), matched.P
     if len(space.tied_nodes):
         nodes, directions, shares = merged(space, one.name, nodes, directions, angle)
         gap, P = shares @ gap, sp.csr_matrix(shares @ P)
+        kinds["tied to another"] = np.isin(one.nodes.numbers, np.setdiff1d(alone, nodes.numbers))
+    uncovered = np.isin(nodes.numbers, little)
+    census = census_of_all(one.name, one.nodes, kinds, len(nodes.numbers))
+    tell(space.comm, census)
     slots = np.flatnonzero(space.blocks_of(nodes.numbers) >= 0)  # from here on every rank has its own nodes of side 1
     nodes = nodes.pick(slots)
     tell_corners(space, one.name, nodes, slots, angle)
     bubbles = averaged(space, facets1, nodes) + averaged(space, facets2, two.nodes, P[slots])
-    conditions = NodalConditions(nodes, directions[slots], slots, Facing(two.nodes, P[slots]), bubbles)
-    surface = surface_of(space, [conditions], gap0=gap[slots], weights=nodes.weights * space.forms.section.thickness)
+    beside = _borrowed(space, facets1, one, kinds, nodes.numbers[~uncovered[slots]])
+    conditions = NodalConditions(nodes, directions[slots], slots, Facing(two.nodes, P[slots]), bubbles, beside)
+    weights = nodes.weights * space.forms.section.thickness
+    surface = surface_of(space, [conditions], gap0=gap[slots], weights=weights, censuses=(census,), watched=watched)
+    if uncovered.any():
+        surface = replace(surface, uncovered=uncovered[slots])
     return replace(surface, **prescribed_motion(space, conditions))
 
 
@@ -101,6 +128,53 @@ def side_of(space: FemSpace, facets: Facets) -> Side:
     rows = np.concatenate(space.comm.bcast(space.comm.gather(space.corners_of_facets(facets.indices))))
     _, first = np.unique(np.sort(rows, axis=1), axis=0, return_index=True)
     return Side(facets.name, nodes, np.searchsorted(nodes.numbers, rows[first]))
+
+
+def _kinds(one: Side, shared: Mask, opposite: Indices, clamped: Indices) -> dict[str, Mask]:
+    """Kind -> mask of the nodes of side 1 without a condition; ``opposite``, ``clamped``: numbers of those in front of
+    side 2, and of those that are clamped."""
+    numbers = one.nodes.numbers
+    return {
+        "shared by both sides": shared,
+        "clamped": np.isin(numbers, clamped),
+        "in front of nothing": ~(shared | np.isin(numbers, opposite)),
+    }
+
+
+def _warn_of_coarse(space: FemSpace, one: Side, two: Side, little: Indices) -> None:
+    """Warn, on rank 0, of nodes with a condition around which little of side 1 is covered."""
+    if len(little) and space.comm.rank == 0:
+        where = at(one.nodes.points[np.searchsorted(one.nodes.numbers, little[0])])
+        log.warning("%d contact nodes of '%s', the first at %s, have hardly anything of '%s' in front of their facets, "
+                    "and no whole facet is near: their pressures are left out of the largest ones; make '%s' the first "
+                    "side, or mesh '%s' finer", len(little), one.name, where, two.name, two.name, one.name)
+
+
+def _sorted_out(space: FemSpace, one: Side, clamped: Mask) -> dict[str, Mask]:
+    """Kind -> mask of the nodes of side 1 that are held in every component, at rest or moved. Collective."""
+    sorted_out = clamped_or_prescribed(space, one.nodes, clamped)
+    moved = space.comm.max(sorted_out["prescribed"].astype(float)) > 0.0
+    return {"clamped": clamped & ~moved, "prescribed": clamped & moved}
+
+
+def _watched(space: FemSpace, one: Side, two: Side, nodes: Nodes, matched: Matched) -> tuple[Watched, ...]:
+    """What watches nodes of side 1, given of all ranks, that are held in every component in front of others that are.
+    Collective."""
+    known = np.asarray(matched.P @ (~two.nodes.held.all(axis=1)).astype(float)) == 0.0
+    nodes, matched = nodes.pick(known), matched.pick(np.flatnonzero(known))
+    if not len(nodes.numbers):
+        return ()
+    directions = snapped(nodes.normals)
+    gap = _gap(space, one.name, two, nodes, directions, matched)
+    own = np.flatnonzero(space.blocks_of(nodes.numbers) >= 0)
+    opposite = Facing(two.nodes, sp.csr_matrix(matched.P[own]))
+    return watched_nodes(space, one.name, nodes.pick(own), directions[own], gap[own], opposite, two.name)
+
+
+def _borrowed(space: FemSpace, facets: Facets, one: Side, kinds: dict[str, Mask], having: Indices) -> Borrowed | None:
+    """What nodes of side 1 without a pressure of their own take of neighbours, not those in front of nothing."""
+    nothing = [mask for kind, mask in kinds.items() if kind not in ("in front of nothing", "not listed")]
+    return borrowed(space, facets, one.nodes.numbers[np.any(nothing, axis=0)], having)
 
 
 def _refuse_common(one: Side, two: Side) -> None:
@@ -132,8 +206,10 @@ def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[t
 
 
 def _by_face(faces: Sequence[tuple[Side, Array]], two: Side, matching: Matching, size: float) -> tuple[Nodes, Matched]:
-    """(nodes with the normals and weights of their faces, what they face), ordered by number. Faces in front of nothing
-    are left out where the matching leaves out parts of sides, unless all are."""
+    """(nodes with the normals and weights of their faces, what they face), ordered by number; ``carried`` are numbers
+    of nodes then.
+
+    Faces in front of nothing are left out where the matching leaves out parts of sides, unless all are."""
     refusal, found = None, []
     for side, mean in faces:
         try:
@@ -143,15 +219,15 @@ def _by_face(faces: Sequence[tuple[Side, Array]], two: Side, matching: Matching,
                 raise
             refusal = refusal or error
         else:
-            found.append((side.nodes.pick(matched.rows), matched))
+            found.append((side.nodes.pick(matched.rows), replace(matched, carried=side.nodes.numbers[matched.carried])))
     if refusal is not None and not found:
         raise refusal
     nodes = joined_nodes([nodes for nodes, _ in found])
     order = np.argsort(nodes.numbers, kind="stable") if len(found) > 1 else np.arange(len(nodes.numbers))
     P = sp.csr_matrix(sp.vstack([matched.P for _, matched in found]))
-    weights, overlap = (np.concatenate([getattr(matched, name) for _, matched in found])
-                        for name in ("weights", "overlap"))
-    whole = Matched(np.arange(len(order)), P, weights, overlap)
+    weights, overlap, shares, carried = (np.concatenate([getattr(matched, name) for _, matched in found])
+                                         for name in ("weights", "overlap", "shares", "carried"))
+    whole = Matched(np.arange(len(order)), P, weights, overlap, shares, carried)
     return replace(nodes, weights=weights).pick(order), whole.pick(order)
 
 

@@ -19,10 +19,14 @@ from ...core.system import SemiDiscreteSystem
 from ..groups import facets_of
 from ..mesh import Facets
 from ..space import FemSpace, space_of
+from .borrowing import borrowed
 from .bubbles import averaged
+from .counting import census_on_ranks, tell
 from .faces import boundary, checked_angle, in_symmetry_planes, integrals, split, tell_corners
 from .frames import NodalConditions, NodalFrames, given, snapped, surface_of
+from .matching import EDGE_ON
 from .nodes import Nodes, asked, everywhere, joined_nodes, slots_of
+from .watching import Watched, clamped_or_prescribed, watched_nodes
 
 log = logging.getLogger(__name__)
 
@@ -35,7 +39,8 @@ def contact_surface(system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obs
 
     Nodal weights are ∫ phi_i times the thickness of the section, so that r_n / weights is in Pa. Nodal normals have the
     direction of ∫ phi_i n over the facets; on rollers (a symmetry plane) the held component is left out. Nodes that are
-    clamped in every component, where the boundary meets a clamped part, are left out. Nodes that move as one
+    prescribed in every component, where the boundary meets a clamped or a moved part, have no condition; a motion that
+    drives one of them into the obstacle is refused when it does. Nodes that move as one
     (``fem.Tied`` in all components) have one condition with the weights of all. P2 tetrahedra have their conditions at
     the vertices, for means of the gap around them (``fem.contact.bubbles``).
 
@@ -53,12 +58,15 @@ def contact_surface(system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obs
     space = contact_space("contact_surface", system, {"facets": facets}, points)
     optional(provides, "contact_surface", "obstacle", obstacle, ("directions", "gap"), "give HalfSpace(…) or another")
     angle = checked_angle("contact_surface", feature_angle)
-    comm, whole = space.comm, nodes_on(space, facets)
+    comm, every = space.comm, nodes_on(space, facets)
+    whole = every
     chosen = None if points is None else listed(space, everywhere(comm, whole), points, facets.name)
     whole = free_nodes(space, whole, facets.name) if chosen is None else whole.pick(_rows_of(whole, chosen))
-    nodes, _ = split(space, boundary(space, facets, beyond=angle), whole, angle)
+    around = boundary(space, facets, beyond=angle)
+    nodes, _ = split(space, around, whole, angle)
     slots = slots_of(comm, _places(nodes, chosen))
-    directions, gap = asked(comm, slots, _obstacle(obstacle, space.size), nodes.points, nodes.normals)
+    ask = _obstacle(obstacle, space.size, facets.name, angle, round(total(comm, len(slots))))
+    directions, gap = asked(comm, slots, ask, nodes.points, nodes.normals)
     nodes, directions, gap = one_per_direction(whole, nodes, directions, gap)
     nodes, directions, gap = with_ties(space, facets.name, nodes, directions, gap, angle)
     order = np.argsort(_places(nodes, chosen), kind="stable")
@@ -66,8 +74,20 @@ def contact_surface(system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obs
     slots = slots_of(comm, _places(nodes, chosen))
     weights = nodes.weights * space.forms.section.thickness
     tell_corners(space, facets.name, nodes, slots, angle)
-    conditions = NodalConditions(nodes, directions, slots, bubbles=averaged(space, facets, nodes))
-    surface = surface_of(space, [conditions], gap0=gap, weights=weights)
+    beside = borrowed(space, facets, every.numbers if chosen is None else every.numbers[:0], nodes.numbers)
+    conditions = NodalConditions(
+        nodes, directions, slots, bubbles=averaged(space, facets, nodes), borrowed=beside
+    )
+    held, kept = every.held.all(axis=1), np.isin(every.numbers, whole.numbers)
+    kinds = dict(clamped_or_prescribed(space, every, held))
+    kinds |= {"not listed": ~(held | kept), "tied to another": kept & ~np.isin(every.numbers, nodes.numbers)}
+    watched: tuple[Watched, ...] = ()
+    if chosen is None:
+        lost, _ = split(space, around, every.pick(held), angle)
+        watched = _watched(space, facets.name, lost, obstacle)
+    census = census_on_ranks(comm, facets.name, every, kinds, len(slots))
+    tell(comm, census)
+    surface = surface_of(space, [conditions], gap0=gap, weights=weights, censuses=(census,), watched=watched)
     return replace(surface, **prescribed_motion(space, conditions))
 
 
@@ -104,13 +124,42 @@ def moved_by_held(space: FemSpace, conditions: Sequence[NodalConditions]) -> Cal
     return moved
 
 
-def _obstacle(obstacle: Obstacle | None, size: float) -> Callable[[Array, Array], tuple[Array, Array]]:
-    """What an obstacle answers: directions and initial gaps at points with these normals."""
+def _obstacle(obstacle: Obstacle | None, size: float, name: str, angle: float,
+              count: int) -> Callable[[Array, Array], tuple[Array, Array]]:
+    """What an obstacle answers: directions and initial gaps at points with these normals, of all ``count`` of a
+    boundary or of those of a rank."""
     def ask(points: Array, normals: Array) -> tuple[Array, Array]:
         if not len(points):  # users' functions need not cope with none
             return np.zeros_like(points), np.zeros(0)
-        directions, gap = facing(Touching() if obstacle is None else obstacle, points, normals)
+        way = Touching() if obstacle is None else obstacle
+        directions, gap = facing(way, points, normals, name=name, angle=angle, alone=len(points) == count)
         return snapped(directions), admissible_gap(gap, points, size)
+
+    return ask
+
+
+def _watched(space: FemSpace, name: str, nodes: Nodes, obstacle: Obstacle | None) -> tuple[Watched, ...]:
+    """What watches nodes of this rank that are prescribed in every component, at each of their faces that looks towards
+    the obstacle. InputError where such a face is in the obstacle at the start. Collective."""
+    slots = slots_of(space.comm, nodes.numbers)
+    directions, gap = asked(space.comm, slots, _looking(obstacle, space.size), nodes.points, nodes.normals)
+    rows = np.flatnonzero(directions.any(axis=1))
+    return watched_nodes(space, name, nodes.pick(rows), directions[rows], gap[rows])
+
+
+def _looking(obstacle: Obstacle | None, size: float) -> Callable[[Array, Array], tuple[Array, Array]]:
+    """What an obstacle answers at points with these normals, directions of zero where they do not lead out of the body
+    or the obstacle has no answer."""
+    def ask(points: Array, normals: Array) -> tuple[Array, Array]:
+        directions, gap = np.zeros_like(points), np.zeros(len(points))
+        try:
+            found = facing(Touching() if obstacle is None else obstacle, points, normals) if len(points) else None
+        except InputError:
+            found = None
+        if found is not None:
+            rows = np.flatnonzero(np.sum(found[0] * normals, axis=1) > EDGE_ON * np.linalg.norm(found[0], axis=1))
+            directions[rows], gap[rows] = snapped(found[0][rows]), admissible_gap(found[1][rows], points[rows], size)
+        return directions, gap
 
     return ask
 

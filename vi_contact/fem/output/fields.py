@@ -6,6 +6,7 @@ moment, also while the run goes on or after it was killed. Nothing in the files 
 What a frame holds: docs/reference/files.md. In the first one a is zero, and with friction all closed nodes stick."""
 
 import logging
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -16,7 +17,18 @@ import numpy as np
 
 from ...core.algebra import Array, Indices, Mask, from_each, on_first
 from ...core.checks import attributes
-from ...core.files import FIELDS, FIELDS_INDEX, frames_of, hdf5_atomically, on_root, open_hdf5, write_atomically
+from ...core.files import (
+    FIELDS,
+    FIELDS_INDEX,
+    FRAME,
+    FRAMES,
+    frames_of,
+    hdf5_atomically,
+    on_root,
+    open_hdf5,
+    write_atomically,
+)
+from ...core.own_files import inner_folder, make_inner_folder, remove
 from ...core.problem import ContactProblem
 from ...core.step import Report, State
 from ..nodal_space import NodalSpace
@@ -113,8 +125,7 @@ class FrameWriter:
 
     def _start(self, points: Array, cells: Array, kept: Mapping[int, float]) -> None:
         """Rank 0: the mesh, the index of the frames that are kept, and then no others."""
-        folder = self._folder / FIELDS
-        folder.mkdir(exist_ok=True)
+        folder = make_inner_folder(self._folder, FIELDS)
 
         def fill(file: Any) -> None:
             file["points"], file["cells"] = points, cells
@@ -136,17 +147,17 @@ class FrameWriter:
             for k in steps:
                 path, group = self._places[k]
                 with open_hdf5(path) as one:
-                    one.copy(group, file, name=f"{k:06d}")
+                    one[group].copy_to(file, f"{k:06d}")
 
         hdf5_atomically(target, fill)
         self._places |= {k: (target, f"/{k:06d}") for k in steps}
 
     def _remove_others(self) -> None:
-        """Remove files that hold no frame of the index."""
-        known = {path for path, _ in self._places.values()}
-        for path in (self._folder / FIELDS).glob("frame*_*.h5"):
-            if path not in known:
-                path.unlink()
+        """Remove files of frames that hold none of the index; files of others stay."""
+        known, folder = {path for path, _ in self._places.values()}, inner_folder(self._folder, FIELDS)
+        for name in os.listdir(folder):
+            if folder / name not in known and (FRAME.fullmatch(name) or FRAMES.fullmatch(name)):
+                remove(folder / name)
 
     def write(self, state: State, acceleration: Array, report: Report | None = None) -> None:
         """Write a frame of state, acceleration of its step (both in the rotated basis) and report. Collective."""
@@ -186,7 +197,7 @@ class FrameWriter:
             if stress is not None:
                 file["von_mises"] = stress
 
-        path = self._folder / FIELDS / f"frame_{state.k:06d}.h5"
+        path = inner_folder(self._folder, FIELDS) / f"frame_{state.k:06d}.h5"
         hdf5_atomically(path, fill)
         self._times[state.k], self._places[state.k] = state.t, (path, "/")
         single = [k for k, (_, group) in self._places.items() if group == "/"]
@@ -229,14 +240,20 @@ class FrameWriter:
 def nodal_contact(problem: ContactProblem, state: State, status: Array) -> tuple[Array, Array]:
     """Return (contact pressure, status), (k, 1) at the owned nodes, of those of the conditions: of several faces of a
     node the pressure of the one that is pressed most, and the highest status. Collective."""
-    space, surface = cast(NodalSpace, problem.system.space), problem.surface
-    blocks = space.blocks_of(space.ids[surface.owned] // space.dimension)
+    space, blocks = cast(NodalSpace, problem.system.space), blocks_of_conditions(problem)
+    surface = problem.surface
     pressure, highest = np.zeros((2, len(space.nodes), 1))
     each = state.r_n / surface.weights
     order = np.argsort(np.abs(each), kind="stable")
     pressure[blocks[order], 0] = each[order]
     np.maximum.at(highest[:, 0], blocks, status)
     return between(problem, pressure), between(problem, highest, np.min)
+
+
+def blocks_of_conditions(problem: ContactProblem) -> Indices:
+    """Return the owned nodes (m,), by their places, of this rank's conditions."""
+    space = cast(NodalSpace, problem.system.space)
+    return np.asarray(space.blocks_of(space.ids[problem.surface.owned] // space.dimension))
 
 
 def between(problem: ContactProblem, nodal: Array, mean: Any = np.mean) -> Array:

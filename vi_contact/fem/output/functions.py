@@ -4,7 +4,8 @@ u and v are on the space of the system, ``system.space.V``, with the components 
 sigma(u), without viscous parts, is the L2 projection onto discontinuous fields: constant in a cell of triangles and
 tetrahedra, where that of P1 is so, (bi)linear in others; of P2 and Q2 one degree higher. The contact pressure
 r_n / weight is nodal, zero off the contact surface; of several faces of a node it is that of the one which is pressed
-most."""
+most. Nodes of the contact boundary without a condition (held ones, and those that both sides share) and those that are
+hardly covered take the mean of their neighbours on its facets: there ∫ p is more than the sum of reactions."""
 
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -16,14 +17,15 @@ from petsc4py import PETSc
 
 from ...core.algebra import Array, Indices
 from ...core.checks import flag, instance, number, optional, refuse, shown
-from ...core.errors import InputError
-from ...core.files import FIELDS, FIELDS_INDEX, on_root, open_hdf5
+from ...core.errors import InputError, of_machine
+from ...core.files import FIELDS, FIELDS_INDEX, frames_of, on_root, open_hdf5
+from ...core.own_files import inner_folder, is_own, read_bytes
 from ...core.problem import ContactProblem
 from ...core.state_checks import check_problem_given, check_sizes
 from ...core.step import State
 from .. import compat
 from ..space import FemSpace, known_matrices, space_of
-from .fields import nodal_contact
+from .fields import between, blocks_of_conditions, nodal_contact
 
 NAMES = ("u", "v", "stress", "contact_pressure")
 ACCURACY = 1e-13  # of a projection, in its residual
@@ -33,6 +35,9 @@ SAME = 1e-9  # of the size of the mesh, and of the longest time
 def as_function(problem: ContactProblem, state: State, name: str, *, continuous: bool = False) -> Any:
     """Return a state as a DOLFINx Function: "u" [m], "v" [m/s], "stress" [Pa] (d, d) or "contact_pressure" [Pa].
 
+    Where a node of the contact boundary has no pressure of its own, as one that is held, the function has the mean of
+    those of its neighbours, so that the error of a right pressure falls with the size of the facets there too.
+
     ``state``: of simulate, march, static_equilibrium or quasi_static of this problem. ``continuous``: the stress
     projected onto P1, Q1, P2 or Q2, ∫ sigma_h : tau = ∫ sigma(u) : tau. Every call makes a Function of its own.
     Collective. InputError for a state of another problem, and a system without a mesh."""
@@ -41,7 +46,26 @@ def as_function(problem: ContactProblem, state: State, name: str, *, continuous:
     if name != "contact_pressure":
         x, derivative = (state.v, 1) if name == "v" else (state.u, 0)
         return _function(problem, name, space.expand(problem.cartesian(x), state.t, derivative), state.t, continuous)
-    return _function(problem, name, nodal_contact(problem, state, np.ones(len(state.r_n)))[0][:, 0], state.t)
+    pressure = nodal_contact(problem, state, np.ones(len(state.r_n)))[0]
+    return _function(problem, name, with_borrowed(problem, pressure)[:, 0], state.t)
+
+
+def with_borrowed(problem: ContactProblem, pressure: Array) -> Array:
+    """Return nodal contact pressures (k, 1) in which the nodes of contact boundaries that have none of their own take
+    the mean of those of their neighbours (``contact.borrowing``). Collective."""
+    space, surface = space_of("contact_pressure", problem.system), problem.surface
+    blocks = blocks_of_conditions(problem)
+    told = np.zeros(len(space.nodes), dtype=bool)
+    told[blocks if surface.uncovered is None else blocks[~surface.uncovered]] = True
+    found = np.zeros_like(pressure)
+    for part in getattr(surface, "parts", ()):
+        if part.borrowed is not None:
+            rows = space.blocks_of(part.borrowed.numbers)
+            values = part.borrowed.values(space, pressure)
+            found[rows[~told[rows]]] = values[~told[rows]]
+    kept = pressure.copy()
+    kept[blocks[~told[blocks]]] = 0.0
+    return kept + between(problem, found)
 
 
 def read_function(problem: ContactProblem, folder: str | Path, name: str, *, t: float | None = None,
@@ -58,7 +82,9 @@ def read_function(problem: ContactProblem, folder: str | Path, name: str, *, t: 
     fits = len(points) > np.max(space.nodes, initial=-1)
     fits = fits and np.max(np.abs(points[space.nodes, :d] - space.points), initial=0.0) <= SAME * space.size
     refuse(["" if fits else f"the fields in '{folder}' are of another mesh: give the problem of that run"], comm)
-    return _function(problem, name, values[space.nodes] if values.ndim == 1 else values[space.nodes, :d], t, continuous)
+    if name == "contact_pressure":
+        return _function(problem, name, with_borrowed(problem, values[space.nodes, None])[:, 0], t)
+    return _function(problem, name, values[space.nodes, :d], t, continuous)
 
 
 def _checked(owner: str, problem: Any, name: Any, continuous: Any) -> FemSpace:
@@ -129,17 +155,22 @@ class Stress:
 
 def _stored(folder: Path, name: str, t: float | None, frame: int | None) -> tuple[Array, Array, float]:
     """Points of the mesh, a quantity of a frame at them, and its time."""
-    if not (folder / FIELDS_INDEX).is_file():
+    if not is_own(folder / FIELDS_INDEX):
         raise InputError(f"'{folder}' has no {FIELDS_INDEX}: run again with out and fields=fem.XDMF(every=10)")
     try:
-        index: Any = ET.parse(folder / FIELDS_INDEX)
+        index: Any = ET.fromstring(read_bytes(folder / FIELDS_INDEX))
         places = sorted((float(grid.find("Time").get("Value")), grid.find(f"Attribute[@Name='{name}']/DataItem").text)
                         for grid in index.findall(".//Grid[@GridType='Uniform']"))
         time, place = places[_chosen([time for time, _ in places], t, frame)]
         file, path = place.split(":")
-        with open_hdf5(folder / FIELDS / "mesh.h5") as mesh, open_hdf5(folder / file) as fields:
+        known = {str(one.relative_to(folder)): one for one, _ in frames_of(folder).values()}
+        with open_hdf5(inner_folder(folder, FIELDS) / "mesh.h5") as mesh, open_hdf5(known[file]) as fields:
             return mesh["points"][()], fields[path][()], time
-    except (ET.ParseError, OSError, KeyError, AttributeError, TypeError) as error:
+    except InputError:
+        raise
+    except (ET.ParseError, OSError, KeyError, AttributeError, TypeError, ValueError, RuntimeError) as error:
+        if of_machine(error):
+            raise
         raise InputError(f"the fields in '{folder}' are incomplete or damaged ({error}): run again") from error
 
 

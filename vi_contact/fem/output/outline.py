@@ -26,6 +26,19 @@ def longest_edge(mesh: Any, cells: Indices) -> float:
     return float(np.max(np.linalg.norm(corners[:, ends[0]] - corners[:, ends[1]], axis=2), initial=0.0))
 
 
+def facets_with_cells(mesh: Any, facets: Indices) -> tuple[Array, Array, Indices]:
+    """Return middles (k, d), mean distances of their corners (k,) [m] and cells (k,) of those local facets whose cell
+    this rank owns."""
+    tdim = mesh.topology.dim
+    cell_of = mesh.topology.connectivity(tdim - 1, tdim)
+    cells = cell_of.array[cell_of.offsets[:-1][facets]]
+    own = cells < mesh.topology.index_map(tdim).size_local
+    corners = mesh.geometry.x[compat.entities_to_geometry(mesh, tdim - 1, facets[own])][..., : mesh.geometry.dim]
+    v = corners.shape[1]
+    apart = np.linalg.norm(corners[:, :, None] - corners[:, None], axis=3).sum(axis=(1, 2))
+    return corners.mean(axis=1), apart / max(v * (v - 1), 1), cells[own]
+
+
 def outline(space: FemSpace, tags: Mapping[str, Any], regions: Sequence[Indices]) -> list[dict[str, Any]]:
     """Return on rank 0 the lines (x0, y0, x1, y1) [m] of the boundary, group "", and of each group of it; in space and
     on a line the edges of a box around each region of local cells. The same on any ranks. Collective."""

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...core.arguments import checked
 from ...core.checks import number
 from ...core.errors import InputError
 from ...core.units import STANDARD_GRAVITY
@@ -20,6 +21,7 @@ DOUBTED = 1e-3 * STANDARD_GRAVITY, 3.0 * STANDARD_GRAVITY  # a peak outside of t
 STEPS = 1e-6, 100.0  # shortest and longest time step [s] of a file; that of seismographs is 0.001 to 0.05
 
 
+@checked
 def read_record(path: str | os.PathLike[str], units: str | None = None, *, dt: float | None = None,
                 resample_dt: float | None = None, channel: int | str | None = None,
                 largest: float = LARGEST_PEAK) -> Record:

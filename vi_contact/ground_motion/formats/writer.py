@@ -2,12 +2,15 @@
 
 import os
 
+from ...core.arguments import checked
 from ...core.errors import InputError
+from ...core.files import write_output
 from ..record import UNITS, Record, canonical_units
 
 DIGITS = 9  # significant digits of a written sample; what is read back differs by half a unit in the last of them
 
 
+@checked
 def write_columns(record: Record, path: str | os.PathLike[str], units: str) -> None:
     """Write time [s] and acceleration in `units`, after comment lines "#" with title, units, time step and notes."""
     samples, name = _samples(record, units)
@@ -16,6 +19,7 @@ def write_columns(record: Record, path: str | os.PathLike[str], units: str) -> N
     _write(path, [" ".join(["#", *comment.split()]) for comment in comments if comment] + rows)
 
 
+@checked
 def write_at2(record: Record, path: str | os.PathLike[str], units: str = "g") -> None:
     """Write PEER AT2: four header lines with units, NPTS and DT, then five values a row."""
     samples, name = _samples(record, units)
@@ -26,6 +30,7 @@ def write_at2(record: Record, path: str | os.PathLike[str], units: str = "g") ->
     _write(path, header + rows)
 
 
+@checked
 def write_path_series(record: Record, path: str | os.PathLike[str], units: str) -> None:
     """Write one value a line, as `timeSeries Path -filePath` of OpenSees reads; it needs -dt and units."""
     _write(path, _samples(record, units)[0])
@@ -39,7 +44,7 @@ def _samples(record: Record, units: str) -> tuple[list[str], str]:
 
 def _write(path: str | os.PathLike[str], lines: list[str]) -> None:
     try:
-        with open(path, "w", encoding="utf-8", newline="\n") as file:
-            file.write("\n".join(lines) + "\n")
+        write_output(path, ("\n".join(lines) + "\n").encode("utf-8"))
     except OSError as error:
-        raise InputError(f"{os.fspath(path)}: cannot be written ({error.strerror}); check the folder") from None
+        raise InputError(f"{os.fspath(path)}: cannot be written ({error.strerror or error}); give another file, or "
+                         "mend what the system says") from error

@@ -9,18 +9,25 @@ import hashlib
 import io
 import json
 import logging
+import math
+import os
+import struct
+import tokenize
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.lib import format as npy
 
 from ...core.algebra import largest
 from ...core.checks import array, number, shown, whole
-from ...core.errors import InputError
+from ...core.errors import InputError, of_machine
 from ...core.files import on_root, write_atomically
+from ...core.own_files import is_own, open_to_read
 from ...core.problem import ContactProblem
 from ...core.step import Scheme, State
 from ..time_steps import TimeSteps
@@ -32,6 +39,9 @@ Arrays = dict[str, Any]
 MEMORY = "memory_"
 CONTACT = ("r_n", "active", "r_t")  # arrays of the conditions
 SAID = 200  # characters of a foreign reason
+DAMAGE = (OSError, ValueError, LookupError, TypeError, AttributeError, RuntimeError, EOFError, ArithmeticError,
+          SyntaxError, tokenize.TokenError, struct.error, zlib.error, zipfile.BadZipFile)
+"""What a damaged archive makes the readers of zip, numpy and json raise."""
 
 
 @dataclass(frozen=True)
@@ -159,12 +169,14 @@ def _damaged(file: Path, why: Any) -> InputError:
 
 def _read(file: Path, problem: ContactProblem) -> tuple[dict[str, Any], Arrays]:
     """Description and whole arrays of a checkpoint that fits the problem in its sizes."""
-    if not file.is_file():
+    if not is_own(file):
         raise InputError(f"there is no checkpoint '{file}' to restart from: give the folder of a run")
     try:
         about, arrays = _unpacked(file)
-    except Exception as error:  # whatever a damaged archive makes the readers of numpy and zip do
-        raise _damaged(file, error or type(error).__name__) from error
+    except DAMAGE as error:
+        if of_machine(error):
+            raise
+        raise _damaged(file, str(error) or type(error).__name__) from error
     check_format(file, about.get("format"))
     try:
         _check_sizes(problem, about, arrays)
@@ -175,13 +187,16 @@ def _read(file: Path, problem: ContactProblem) -> tuple[dict[str, Any], Arrays]:
 
 def _unpacked(file: Path) -> tuple[dict[str, Any], Arrays]:
     """ValueError and others when it is not what was written."""
-    size = file.stat().st_size
-    with zipfile.ZipFile(file) as archive:
-        for one in archive.infolist():
-            if one.compress_type != zipfile.ZIP_STORED or one.file_size > size:
-                raise ValueError(f"{one.filename} is compressed, or larger than the file")
-    with np.load(file, allow_pickle=False) as stored:
-        arrays = {name: stored[name] for name in stored.files}
+    with open_to_read(file) as opened:
+        size = os.fstat(opened.fileno()).st_size
+        with zipfile.ZipFile(opened) as archive:
+            for one in archive.infolist():
+                if one.compress_type != zipfile.ZIP_STORED or one.file_size > size:
+                    raise ValueError(f"{one.filename} is compressed, or larger than the file")
+                _check_header(archive, one)
+        opened.seek(0)
+        with np.load(opened, allow_pickle=False) as stored:
+            arrays = {name: stored[name] for name in stored.files}
     wanted = arrays.pop("checksum", None)
     about = json.loads(str(arrays["about"]))
     if not isinstance(about, dict) or not isinstance(about.get("run"), dict):
@@ -190,6 +205,18 @@ def _unpacked(file: Path) -> tuple[dict[str, Any], Arrays]:
         raise ValueError("its checksum is wrong")
     del arrays["about"]
     return about, arrays
+
+
+def _check_header(archive: zipfile.ZipFile, one: zipfile.ZipInfo) -> None:
+    """ValueError for an array that announces more numbers than the archive holds of it, before memory is taken."""
+    with archive.open(one) as file:
+        version = npy.read_magic(file)
+        read = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}.get(version)
+        if read is None:
+            raise ValueError(f"{one.filename} has a header of an unknown version")
+        shape, _, kind = read(file)
+    if math.prod(shape) * kind.itemsize > one.file_size:
+        raise ValueError(f"{one.filename} announces more numbers than it holds")
 
 
 def _check_sizes(problem: ContactProblem, about: dict[str, Any], arrays: Arrays) -> None:

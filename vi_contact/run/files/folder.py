@@ -1,12 +1,16 @@
 """Make and lock the folder a run writes into, so that no data are lost and no rank waits for another for ever.
 
 Only rank 0 touches the disk. Whatever it does there goes through ``on_root``: a failure is told to all ranks, which
-then raise the same sentence together. Files that must be whole are written beside their name and renamed."""
+then raise the same sentence together. Files that must be whole are written beside their name and renamed.
+
+A run takes a folder by writing ``format.json`` into it. Only in a folder with this mark are files replaced or deleted
+that were there before, and of those only the ones with names that runs write. All others are left alone."""
 
 import fcntl
 import json
 import logging
 import os
+import re
 import socket
 import threading
 from collections.abc import Iterator
@@ -18,28 +22,51 @@ from typing import Any
 from ...core.algebra import Comm
 from ...core.checks import shown
 from ...core.errors import InputError
-from ...core.files import FIELDS, FIELDS_INDEX, on_root, write_atomically
+from ...core.files import FIELDS, FIELDS_INDEX, FRAME, FRAMES, on_root, sentence, to_json, write_atomically
+from ...core.own_files import (
+    inner_folder,
+    is_own,
+    make_inner_folder,
+    names,
+    open_lock,
+    open_to_read,
+    read_text,
+    remove,
+    same_file,
+)
+from ...core.version import __version__
 
 log = logging.getLogger(__name__)
+FIRST = b"t,k,iterations,certificate,escalated"  # how every history.csv begins
 FORMAT = 1  # of run folders and checkpoints
 
 ABOUT = "format.json"
 CHECKPOINT = "checkpoint.npz"
 COLUMNS = "columns.json"
+COPY = "case.toml"
+FOLLOWS = "follows.txt"
 HISTORY_CSV = "history.csv"
 HISTORY_H5 = "history.h5"
 JOURNAL = "history.journal"
 LOCK = ".lock"
 LOG = "run.log"
+MESH = "mesh.h5"
+STAGES = "stages"  # the folder of the runs of stages before the last one
 MODEL = "model.json"
 SUMMARY = "summary.json"
 FILES = (ABOUT, CHECKPOINT, COLUMNS, FIELDS_INDEX, HISTORY_CSV, HISTORY_H5, JOURNAL, LOG, MODEL,
          SUMMARY)  # of a run
+_OF_CASES = (COPY, FOLLOWS, "strain_compatible.json", "row.json", "failure.txt")  # beside them, by cases and studies
+_OF_REPORTS = ("report.pdf", "report.html", "peaks.csv", "model.png", "deformed.png", "faces.png", "film.gif",
+               "film.mp4")
+_TRIAL = re.compile(r"\.writable-\d+")
 _held: dict[Path, int] = {}  # locks that this process has -> the thread that took them
 
 
 def run_folder(comm: Comm, path: str | Path) -> Path:
-    """Make the folder, with parents, and try to write into it, before any work is done; InputError if not."""
+    """Make the folder, with parents, and try to write into it, before any work is done; InputError if not.
+
+    InputError also when files of others have names that a run replaces."""
     folder = Path(path)
     if find_spec("h5py") is None:
         raise InputError(f"output folder '{folder}' needs h5py, which is missing here: install it, or run without")
@@ -49,13 +76,64 @@ def run_folder(comm: Comm, path: str | Path) -> Path:
             folder.mkdir(parents=True, exist_ok=True)
             trial = folder / f".writable-{os.getpid()}"
             write_atomically(trial, b"vi_contact")
-            trial.unlink()
+            remove(trial)
         except OSError as error:
             reason = error.strerror or str(error)
             raise InputError(f"output folder '{folder}' cannot be written ({reason}): choose another one") from error
+        refuse_files_of_others(folder)
 
     on_root(comm, make)
     return folder
+
+
+def is_marked(folder: Path) -> bool:
+    """Return whether a run has taken this folder: it has the mark, or a history as only runs write it."""
+    if is_own(folder / ABOUT):
+        return True
+    if not is_own(folder / HISTORY_CSV):
+        return False
+    with open_to_read(folder / HISTORY_CSV) as file:
+        return bool(file.read(len(FIRST)) == FIRST)
+
+
+def refuse_files_of_others(folder: Path) -> None:
+    """Raise InputError for a file that a run would replace, in a folder that no run has taken."""
+    if is_marked(folder):
+        return
+    for path in _written_by_runs(folder):
+        raise InputError(f"'{path}' is not of a run of vi_contact (there is no {ABOUT} in '{folder}'), and a run would "
+                         "replace it: choose another output folder, or move the file")
+
+
+def take(folder: Path) -> None:
+    """Write the mark of runs into a folder, with its lock; InputError as of ``refuse_files_of_others``."""
+    refuse_files_of_others(folder)
+    about = {"format": FORMAT, "vi_contact": __version__}
+    write_atomically(folder / ABOUT, (to_json(about) + "\n").encode())
+
+
+def _written_by_runs(folder: Path) -> list[Path]:
+    """What is in a folder under names that runs write, but for the copy of a case, which has a mark of its own."""
+    fields = inner_folder(folder, FIELDS)
+    files = [folder / name for name in (*FILES, FOLLOWS) if name != MODEL or not _is_model(folder / MODEL)]
+    return [path for path in [*files, *_frames(fields)] if os.path.lexists(path)]
+
+
+def _is_model(path: Path) -> bool:
+    """Whether a file describes a model, as ``vi-contact run --check`` writes it into a folder without a run."""
+    if not is_own(path):
+        return False
+    try:
+        found = json.loads(read_text(path))
+    except (OSError, ValueError, RecursionError):
+        return False
+    return isinstance(found, dict) and {"title", "dimension", "unknowns"} <= set(found)
+
+
+def _frames(fields: Path) -> list[Path]:
+    """The files in the folder of fields that have names of ours."""
+    known = sorted(os.listdir(fields)) if fields.is_dir() else []
+    return [fields / name for name in known if name == MESH or FRAME.fullmatch(name) or FRAMES.fullmatch(name)]
 
 
 def check_format(file: Path, found: Any) -> None:
@@ -67,27 +145,92 @@ def check_format(file: Path, found: Any) -> None:
 
 def check_folder_format(folder: Path) -> None:
     """Raise InputError likewise for a run folder; one without a number, of which files were copied, is not asked."""
-    try:
-        found = json.loads((folder / ABOUT).read_text(encoding="utf-8"))["format"]
-    except FileNotFoundError:
+    if not is_own(folder / ABOUT):
         return
-    except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
+    try:
+        found = json.loads(read_text(folder / ABOUT))["format"]
+    except OSError as error:
+        raise InputError(sentence(error)) from error
+    except (ValueError, TypeError, KeyError, RecursionError) as error:  # of json, and of what it has read
         raise InputError(f"'{folder / ABOUT}' is damaged ({error}): restore it or remove it") from error
     check_format(folder, found)
 
 
 def clear(folder: Path) -> None:
-    """Remove what an earlier run left in the folder and a new one could be mistaken for; histories are overwritten."""
-    for name in (ABOUT, CHECKPOINT, JOURNAL, HISTORY_H5, SUMMARY, FIELDS_INDEX):
-        (folder / name).unlink(missing_ok=True)
-    for frame in (folder / FIELDS).glob("*.h5"):
-        frame.unlink()
+    """Remove what an earlier run left in the folder and a new one could be mistaken for; histories are overwritten.
+
+    The mark of runs stays. Nothing is removed from a folder without it."""
+    if not is_marked(folder):
+        return
+    for name in (CHECKPOINT, JOURNAL, HISTORY_H5, SUMMARY, FIELDS_INDEX):
+        remove(folder / name)
+    for frame in _frames(inner_folder(folder, FIELDS)):
+        remove(frame)
+
+
+def remove_run(folder: Path) -> None:
+    """Remove the files of a run with its reports, and the folder if nothing else is in it. A folder that no run has
+    taken, and all files of others, stay as they are."""
+    if not is_marked(folder):
+        return
+    fields, stages = inner_folder(folder, FIELDS), inner_folder(folder, STAGES)
+    for stage in _inside(stages):
+        remove_run(stage)
+    for frame in _frames(fields):
+        remove(frame)
+    remove_litter(folder)
+    for name in (*FILES, *_OF_CASES, *_OF_REPORTS, LOCK):
+        if name != ABOUT:
+            remove(folder / name)
+    remove(folder / ABOUT)  # last: what an interruption leaves is still known as a run's
+    for one in (fields, stages, folder):
+        remove_if_empty(one)
+
+
+def move_run(folder: Path, target: Path) -> None:
+    """Move the files of a run, with its fields and stages, into another folder; files of others stay."""
+    fields, stages = inner_folder(folder, FIELDS), inner_folder(folder, STAGES)
+    for stage in filter(is_marked, _inside(stages)):
+        os.replace(stage, make_inner_folder(target, STAGES) / stage.name)
+    for frame in _frames(fields):
+        os.replace(frame, make_inner_folder(target, FIELDS) / frame.name)
+    names = [name for name in (*FILES, *_OF_CASES, *_OF_REPORTS) if name != ABOUT]
+    for name in (*names, ABOUT):  # last: what an interruption leaves is still known as a run's
+        if os.path.lexists(folder / name):
+            os.replace(folder / name, target / name)
+    for one in (fields, stages):
+        remove_if_empty(one)
+
+
+def _inside(folder: Path) -> list[Path]:
+    """The folders inside a folder; no links."""
+    found = [folder / name for name in sorted(os.listdir(folder))] if folder.is_dir() else []
+    return [one for one in found if one.is_dir() and not one.is_symlink()]
+
+
+def remove_if_empty(folder: Path) -> None:
+    """Remove a folder with nothing in it; any other stays."""
+    if folder.is_dir() and not os.listdir(folder):
+        folder.rmdir()
 
 
 def remove_litter(folder: Path) -> None:
     """Remove what killed processes left of files they were about to replace; with the folder's lock only."""
-    for path in [*folder.glob(".*.*[0-9].tmp"), *(folder / FIELDS).glob(".*.*[0-9].tmp")]:
-        path.unlink(missing_ok=True)
+    for place in (folder, inner_folder(folder, FIELDS)):
+        for name in os.listdir(place) if place.is_dir() else ():
+            if _is_temporary(name) or (_TRIAL.fullmatch(name) and place is folder):
+                remove(place / name)
+
+
+def _is_temporary(name: str) -> bool:
+    """Whether this is the name of a file that was to take the place of one of a run: ".NAME.PROCESS.tmp"."""
+    inside, _, process = name.removesuffix(".tmp").removeprefix(".").rpartition(".")
+    return name == f".{inside}.{process}.tmp" and process.isdecimal() and _is_name_of_runs(inside)
+
+
+def _is_name_of_runs(name: str) -> bool:
+    known = (*FILES, *_OF_CASES, *_OF_REPORTS, MESH)
+    return bool(name in known or FRAME.fullmatch(name) or FRAMES.fullmatch(name) or _TRIAL.fullmatch(name))
 
 
 @contextmanager
@@ -102,7 +245,7 @@ def locked(comm: Comm, folder: Path | None, name: str = LOCK) -> Iterator[None]:
     finally:
         if mine is not None and folder is not None:  # removed while locked: who opens it meanwhile makes a new one
             _held.pop(folder.resolve() / name, None)
-            (folder / name).unlink(missing_ok=True)
+            remove(folder / name)
             mine.close()
 
 
@@ -111,7 +254,7 @@ def _take(folder: Path, name: str) -> Any:
     if _held.get(folder.resolve() / name) == threading.get_ident():
         return None
     while True:
-        file = open(folder / name, "a+b", buffering=0)  # noqa: SIM115
+        file = open_lock(folder / name)
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -120,9 +263,11 @@ def _take(folder: Path, name: str) -> Any:
         except OSError as error:
             log.warning("'%s' is on a file system without locks (%s): make sure that no other run writes there",
                         folder, error.strerror)
-        if _is_there(folder / name, file):
+        if names(file) > 1 and same_file(folder / name, file):
+            remove(folder / name)  # its other name, a hard link, keeps what it holds
+        if same_file(folder / name, file):
             break
-        file.close()  # the run that had it has removed it since
+        file.close()  # it has been removed since, by the run that had it
     file.truncate(0)
     file.write(f"process {os.getpid()} on {socket.gethostname()}".encode())
     _held[folder.resolve() / name] = threading.get_ident()
@@ -134,11 +279,3 @@ def _owner(file: Any) -> str:
     with file:
         file.seek(0)
         return " ".join(file.read(200).decode(errors="replace").split()) or "it has only begun"
-
-
-def _is_there(path: Path, file: Any) -> bool:
-    """Whether the file that is open is still the one of that name."""
-    try:
-        return os.path.samestat(os.stat(path), os.fstat(file.fileno()))
-    except FileNotFoundError:
-        return False

@@ -8,7 +8,6 @@
 
 import hashlib
 import os
-import shutil
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import closing, suppress
@@ -18,13 +17,13 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.files import hdf5_atomically, open_hdf5, push, to_json, write_all, write_atomically
+from ...core.files import STRIDE, copy_start, hdf5_atomically, open_hdf5, push, to_json, write_all, write_atomically
+from ...core.own_files import open_new, open_to_append, open_to_read, remove
 from ...core.step import Row
 from .folder import COLUMNS, FORMAT, HISTORY_CSV, HISTORY_H5, JOURNAL
 from .stored_rows import StoredArrays, StoredRows, lines_of, read_blocks, records_of
 from .table import Block, Table
 
-STRIDE = 2**20  # bytes that are copied at once
 GEOMETRY = {"points": "m", "normals": "-", "weights": "m²", "gap0": "m", "bilateral": "-"}  # of contact points, units
 PUSH, SAVE = 1.0, 10.0  # seconds after which rows are pushed onto the medium, and history.h5 is rewritten, again
 GROWTH = 1.25  # history.h5 is rewritten when it has grown by this factor: what is written stays in proportion
@@ -46,7 +45,7 @@ class HistoryFiles:
         columns = {name: {"unit": unit, "meaning": meaning} for name, (unit, meaning) in table.columns.items()}
         write_atomically(folder / COLUMNS, (to_json(columns) + "\n").encode())
         if stored is None:
-            self._csv = open(folder / HISTORY_CSV, "wb", buffering=0)  # noqa: SIM115
+            self._csv = open_new(folder / HISTORY_CSV)
             _append((self._csv, (",".join(table.numbers) + "\n").encode()))
             self._tail = self._csv.tell()
             self._open_journal()
@@ -58,10 +57,11 @@ class HistoryFiles:
         self._rows = self._table.count
         self._replace(stored.blocks())
         self._hash, self._last, csv = stored.hash.copy(), stored.k, self._folder / HISTORY_CSV
-        with suppress(shutil.SameFileError):
-            shutil.copyfile(stored.folder / HISTORY_CSV, csv)
-        os.truncate(csv, stored.length)
-        self._csv = open(csv, "ab", buffering=0)  # noqa: SIM115
+        if stored.folder.resolve() != self._folder.resolve():
+            copy_start(stored.folder / HISTORY_CSV, csv, stored.length)
+        self._csv = open_to_append(csv)
+        self._csv.truncate(stored.length)
+        self._csv.seek(stored.length)
         self._tail = stored.length
         self._open_journal()
 
@@ -69,7 +69,7 @@ class HistoryFiles:
         if self._journal is not None:
             self._journal.close()
         if self._table.arrays:
-            self._journal = open(self._folder / JOURNAL, "wb", buffering=0)  # noqa: SIM115
+            self._journal = open_new(self._folder / JOURNAL)
 
     def append(self, *rows: Row) -> None:
         """Write rows onto the disk; those that it has no room for are taken back, all of them."""
@@ -109,7 +109,7 @@ class HistoryFiles:
             self._replace(iter([{name: values[self._saved :] for name, values in known.items()}]), self._saved)
         else:
             path, stored = self._folder / HISTORY_CSV, StoredArrays(self._folder, self._table)
-            with open(path, "rb") as csv, closing(stored) as arrays:
+            with open_to_read(path) as csv, closing(stored) as arrays:
                 csv.seek(self._tail)
                 since = read_blocks(csv, self._table, arrays, first=self._saved)
                 self._replace((block for _, block in since), self._saved)
@@ -151,7 +151,7 @@ class HistoryFiles:
             for file in filter(None, (self._csv, self._journal)):
                 with suppress(OSError):
                     file.close()
-        (self._folder / JOURNAL).unlink(missing_ok=True)
+        remove(self._folder / JOURNAL)
 
 
 def _append(*pairs: tuple[Any, bytes]) -> None:
@@ -167,4 +167,4 @@ def _append(*pairs: tuple[Any, bytes]) -> None:
             with suppress(OSError):
                 one.truncate(start)
                 one.seek(start)
-        raise OSError(error.errno, error.strerror, file.name) from error
+        raise OSError(error.errno, error.strerror, str(file.name)) from error

@@ -11,6 +11,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, ClassVar
 
+from ...core.files import write_all
+from ...core.own_files import open_new, open_to_append
 from ...core.version import __version__
 
 LOGGER = logging.getLogger("vi_contact")
@@ -18,14 +20,29 @@ log = logging.getLogger(__name__)
 SHARE, SECONDS = 0.1, 30.0  # a line in the log for every tenth of the run, or this often
 
 
-class _LogFile(logging.FileHandler):
-    """Keep the error of a line that could not be written, for the run to raise on all ranks."""
+class _LogFile(logging.Handler):
+    """Write lines into a file of the run folder, and keep the error of one that could not be written, for the run to
+    raise on all ranks."""
 
-    error: OSError | None = None
+    def __init__(self, path: Path, *, append: bool) -> None:
+        super().__init__()
+        self.path = path
+        self.error: OSError | None = None
+        self._file = open_to_append(path, make=True) if append else open_new(path)
 
-    def handleError(self, record: logging.LogRecord) -> None:
-        failure = sys.exc_info()[1]
-        self.error = failure if isinstance(failure, OSError) else None
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write a line through to the disk."""
+        try:
+            write_all(self._file, (self.format(record) + "\n").encode("utf-8", "backslashreplace"))
+        except OSError as error:
+            self.error = error
+        except (TypeError, ValueError):  # a line whose words and arguments do not fit
+            self.handleError(record)
+
+    def close(self) -> None:
+        """Close the file; OSError when the disk refuses what the system still holds of it."""
+        super().close()
+        self._file.close()
 
 
 class RunLog:
@@ -42,7 +59,7 @@ class RunLog:
         if not RunLog._open:
             RunLog._before = LOGGER.level, LOGGER.propagate
         own = RunLog.turn
-        self._file = _LogFile(path, mode="a" if append else "w", encoding="utf-8")
+        self._file = _LogFile(path, append=append)
         self._terminal = logging.StreamHandler()
         self._terminal.setLevel(logging.WARNING)
         self._file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
@@ -56,7 +73,7 @@ class RunLog:
     def check(self) -> None:
         """Raise the OSError of a line that could not be written."""
         if error := self._file.error:
-            raise OSError(error.errno, error.strerror, self._file.baseFilename)
+            raise OSError(error.errno, error.strerror, str(self._file.path))
 
     def close(self) -> None:
         """Give the logger back as it was."""
@@ -98,7 +115,7 @@ class Progress:
         self._begin = self._told = time.monotonic()
         self._next = SHARE * total
         self._bar: Any = None
-        if shown and sys.stderr.isatty():
+        if shown and sys.stderr is not None and sys.stderr.isatty():
             from tqdm import tqdm
 
             self._bar = tqdm(total=total, unit="step", dynamic_ncols=True)

@@ -1,24 +1,26 @@
 """Read what a run left in its folder: histories, units, facts and the geometry of the contact points."""
 
 import json
-import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from textwrap import shorten
-from typing import Any
+from typing import Any, TypeVar
 
-import h5py
 import numpy as np
 
 from ...core.algebra import Array, Mask
+from ...core.arguments import checked
 from ...core.checks import SHOWN, shown
-from ...core.errors import InputError
+from ...core.errors import InputError, of_machine
+from ...core.files import open_hdf5, sentence
+from ...core.hdf5 import StoredFile
+from ...core.own_files import is_own, open_to_read, read_bytes
 from .folder import COLUMNS, HISTORY_CSV, HISTORY_H5, SUMMARY, check_folder_format
 from .stored_rows import numbers_of
 
+T = TypeVar("T")
 BYTES = 100_000_000  # of a JSON file
-DENSEST = 1100  # bytes in memory for one on disk: zeros that are packed
 _NEEDED = ("t", "k", "iterations", "certificate", "escalated")  # columns of every run
 _NUMBER = (int, float)
 _KINDS: dict[str, type | tuple[type, ...]] = {  # of the entries of summary.json that are used
@@ -55,24 +57,34 @@ class RunFolder:
     contact: ContactGeometry | None
 
 
+@checked
 def read_run(folder: str | Path) -> RunFolder:
     """Read a run folder of ``simulate``. For a run that is still going on or was killed, return what is there.
 
     Numbers come from history.csv, which has every step. Arrays come from history.h5, when it has all steps too (it does
     once the run has ended). InputError when there is no history, or a file is damaged."""
     folder = Path(folder)
-    if not (folder / HISTORY_CSV).is_file():
+    if not is_own(folder / HISTORY_CSV):
         raise InputError(f"'{folder}' has no {HISTORY_CSV}: give the output folder of a run")
     check_folder_format(folder)
     history = _numbers(folder / HISTORY_CSV)
-    try:
-        columns = _columns(read_object(folder / COLUMNS), history)
-        facts = _facts(read_object(folder / SUMMARY)) if (folder / SUMMARY).is_file() else {}
-        arrays, contact = _arrays(folder / HISTORY_H5, len(history["t"]))
-    except (OSError, ValueError, KeyError, TypeError, RuntimeError, AttributeError) as error:
-        reason = _short(error)
-        raise InputError(f"a file of the run in '{folder}' is missing or damaged ({reason}): restore it") from error
+    columns = _of(folder / COLUMNS, lambda path: _columns(read_object(path), history))
+    facts = _of(folder / SUMMARY, lambda path: _facts(read_object(path)) if is_own(path) else {})
+    _check_rows(folder, history, facts)
+    arrays, contact = _of(folder / HISTORY_H5, lambda path: _arrays(path, history))
     return RunFolder(folder, history | arrays, columns, facts, contact)
+
+
+def _of(path: Path, read: Callable[[Path], T]) -> T:
+    """What is read from a file of a run; InputError that names the file when it is missing or damaged."""
+    try:
+        return read(path)
+    except InputError:
+        raise
+    except (OSError, ValueError, KeyError, TypeError, RuntimeError, AttributeError) as error:  # of json and h5py
+        if of_machine(error):
+            raise
+        raise InputError(f"a file of the run, '{path}', is missing or damaged ({_short(error)}): restore it") from error
 
 
 def _short(error: Exception) -> str:
@@ -82,10 +94,12 @@ def _short(error: Exception) -> str:
 
 def read_object(path: Path) -> dict[str, Any]:
     """Return the JSON object of a file; ValueError for anything else, NaN, and texts that cannot be printed."""
-    if path.stat().st_size > BYTES:
+    with open_to_read(path) as file:
+        data = file.read(BYTES + 1)
+    if len(data) > BYTES:
         raise ValueError(f"{path.name} is larger than {BYTES:.0e} bytes")
     try:
-        found = json.loads(path.read_text(encoding="utf-8"), parse_constant=lambda word: [])
+        found = json.loads(data.decode("utf-8"), parse_constant=lambda word: [])
     except RecursionError:
         raise ValueError(f"{path.name} is nested too deep") from None
     if not isinstance(found, dict):
@@ -127,7 +141,7 @@ def _fits(value: Any, kinds: type | tuple[type, ...]) -> bool:
 def _numbers(path: Path) -> dict[str, Array]:
     """Columns of history.csv; a last line that a crash cut short is left out."""
     try:
-        header, *lines = [line for line in path.read_bytes().splitlines(keepends=True) if line.endswith(b"\n")]
+        header, *lines = [line for line in read_bytes(path).splitlines(keepends=True) if line.endswith(b"\n")]
         names = header.decode().strip().split(",")
         history = dict(zip(names, numbers_of(str(path), lines, len(names), 0).T, strict=True))
         if not lines or len(history) != len(names):
@@ -139,37 +153,53 @@ def _numbers(path: Path) -> dict[str, Array]:
     except InputError:
         raise
     except OSError as error:
-        raise InputError(f"'{path}' cannot be read ({error.strerror}): check its permissions") from error
+        raise InputError(sentence(error)) from error
     except ValueError as error:
         raise InputError(f"'{path}' is damaged ({_short(error)}): restore it or run again") from error
     return history
 
 
-def _arrays(path: Path, rows: int) -> tuple[dict[str, Array], ContactGeometry | None]:
+def _check_rows(folder: Path, history: Mapping[str, Array], facts: Mapping[str, Any]) -> None:
+    """InputError when history.csv has lost rows: numbers of steps follow each other, up to the one of the summary."""
+    rows, steps = len(history["t"]), facts.get("steps")
+    gaps = np.flatnonzero(np.diff(history["k"]) != 1.0)
+    if len(gaps):
+        raise InputError(f"'{folder / HISTORY_CSV}' is damaged (the steps k after line {gaps[0] + 2} do not follow "
+                         "each other): restore it or run again")
+    if isinstance(steps, int) and rows < steps + 1:
+        raise InputError(f"'{folder / HISTORY_CSV}' is damaged ({rows} rows are there, {SUMMARY} tells of {steps} "
+                         "steps and the initial state): restore it or run again")
+
+
+def _compare(path: Path, file: StoredFile, history: Mapping[str, Array]) -> None:
+    """InputError when history.csv and history.h5, which hold the same numbers, differ in a row that both have."""
+    for name, own in history.items():
+        if name not in file or file[name].ndim != 1:
+            raise ValueError(f"{HISTORY_H5}: the column {shown(name)} is missing")
+        other = file[name][: len(own)]
+        differ = np.flatnonzero(~((other == own[: len(other)]) | (np.isnan(other) & np.isnan(own[: len(other)]))))
+        if len(differ):
+            csv = path.with_name(HISTORY_CSV)
+            raise InputError(f"'{csv}' and '{path}' differ in {name}, line {differ[0] + 2}: one of them is damaged or "
+                             f"was changed; restore it, or move {HISTORY_H5} away to read the other alone")
+
+
+def _arrays(path: Path, history: Mapping[str, Array]) -> tuple[dict[str, Array], ContactGeometry | None]:
     """(array columns when they have all rows, geometry of the contact points)."""
-    if not path.is_file():
+    rows = len(history["t"])
+    if not is_own(path):
         return {}, None
-    with h5py.File(path, "r") as file:
+    with open_hdf5(path) as file:
+        _compare(path, file, history)
         group = file["contact"]
-        geometry = ContactGeometry(*(_values(group, name) for name in ContactGeometry.__dataclass_fields__))
+        geometry = ContactGeometry(*(group[name][()] for name in ContactGeometry.__dataclass_fields__))
         count = len(geometry.weights)
         shapes = {np.shape(getattr(geometry, name)) for name in ("weights", "gap0", "bilateral")}
         points = np.shape(geometry.points)
         if shapes != {(count,)} or len(points) != 2 or points[0] != count or np.shape(geometry.normals) != points:
             raise ValueError(f"{HISTORY_H5}: the contact points do not fit each other")
         whole = [name for name in file if name != "contact" and file[name].ndim > 1 and file[name].shape[0] == rows]
-        arrays = {name: _values(file, name) for name in whole}
+        arrays = {name: file[name][()] for name in whole}
         if any(values.shape[1] != count for values in arrays.values()):
             raise ValueError(f"{HISTORY_H5}: arrays are not those of {count} contact points")
     return arrays, geometry if count else None
-
-
-def _values(group: Any, name: str) -> Any:
-    """Numbers of a data set that lies in this very file, in memory no more than it can hold."""
-    item = group[name]
-    link = group.get(name, getlink=True)
-    if not isinstance(link, h5py.HardLink) or item.external is not None or item.is_virtual:
-        raise ValueError(f"{HISTORY_H5}: {name} lies in another file")
-    if item.dtype.kind not in "fiub" or item.nbytes > DENSEST * os.path.getsize(item.file.filename):
-        raise ValueError(f"{HISTORY_H5}: {name} is no array of numbers of this file")
-    return item[()]

@@ -4,8 +4,9 @@ Numbers are in history.csv, arrays in history.h5, of later steps in history.jour
 """
 
 import hashlib
+import os
 from collections.abc import Container, Iterator, Sequence
-from contextlib import closing, suppress
+from contextlib import closing
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -13,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.errors import InputError
+from ...core.errors import InputError, of_machine
 from ...core.files import open_hdf5
+from ...core.own_files import is_own, open_to_read
 from ...core.step import Row
 from .folder import HISTORY_CSV, HISTORY_H5, JOURNAL, check_folder_format
 from .table import Block, Table
@@ -49,10 +51,10 @@ class StoredRows:
         """Return the rows, in order. InputError, one sentence, for what is missing, damaged or of other columns."""
         check_folder_format(self.folder)
         path, names = self.folder / HISTORY_CSV, self._table.numbers
-        if not path.is_file():
+        if not is_own(path):
             raise InputError(f"'{path}' is missing, so the histories cannot be continued: start a new run")
         self.hash = hashlib.sha256()
-        with open(path, "rb") as csv, closing(StoredArrays(self.folder, self._table)) as arrays:
+        with open_to_read(path) as csv, closing(StoredArrays(self.folder, self._table)) as arrays:
             header = csv.readline()
             if header.decode(errors="replace").strip() != ",".join(names):
                 raise InputError(f"'{path}' holds other columns than this run records: restart with the same recorders")
@@ -112,11 +114,12 @@ class StoredArrays:
         self._journal: Array
         if table.arrays:
             path, width = folder / JOURNAL, 1 + sum(one.size for one in table.arrays.values())
-            rows = path.stat().st_size // (8 * width) if path.is_file() else 0  # one cut short by a crash is left out
-            shape = rows, width
-            self._journal = np.memmap(path, dtype=float, mode="r", shape=shape) if rows else np.zeros(shape)
-            with suppress(OSError):  # missing or damaged: the journal may still have all
+            self._journal = _journal_rows(path, width)
+            try:
                 self._file = open_hdf5(self._path)
+            except OSError as error:  # missing or damaged: the journal may still have all
+                if of_machine(error):
+                    raise
 
     def close(self) -> None:
         """Close history.h5."""
@@ -140,14 +143,20 @@ class StoredArrays:
             fit = all(self._file[name].shape == (*held.shape, *one.shape) for name, one in self._samples.items())
             n = min(max(held.shape[0] - first, 0), len(steps))
             return n if fit and np.array_equal(held[first : first + n], steps[:n]) else 0
-        except (TypeError, KeyError, AttributeError, ValueError, OSError, RuntimeError):
+        except InputError:
+            raise
+        except (TypeError, KeyError, AttributeError, ValueError, OSError, RuntimeError) as error:  # h5py's, of damage
+            if of_machine(error):
+                raise
             return 0
 
     def _from_hdf5(self, first: int, n: int) -> Block:
         try:
             return {name: np.asarray(self._file[name][first : first + n]).astype(one.dtype)
                     for name, one in self._samples.items()}
-        except (TypeError, ValueError, OSError, RuntimeError) as error:
+        except (TypeError, ValueError, OSError, RuntimeError) as error:  # h5py's, of a file that is damaged
+            if of_machine(error):
+                raise
             raise InputError(f"'{self._path}' is damaged ({error}): restore it or start a new run") from error
 
     def _from_journal(self, steps: Array) -> Block:
@@ -164,10 +173,19 @@ class StoredArrays:
                 for (name, one), column in zip(self._samples.items(), columns, strict=True)}
 
 
+def _journal_rows(path: Path, width: int) -> Array:
+    """The rows of the journal; one that was cut short by a crash is left out."""
+    if not is_own(path):
+        return np.zeros((0, width))
+    with open_to_read(path) as file:
+        rows = os.fstat(file.fileno()).st_size // (8 * width)
+        return np.memmap(file, dtype=float, mode="r", shape=(rows, width)) if rows else np.zeros((0, width))
+
+
 def times_of(folder: Path, steps: Container[int]) -> dict[int, float]:
     """Step -> time of some rows of history.csv, whose first columns these are."""
     found: dict[int, float] = {}
-    with open(folder / HISTORY_CSV, "rb") as file:
+    with open_to_read(folder / HISTORY_CSV) as file:
         for line in islice(file, 1, None):
             t, k, *_ = line.split(b",", 2)
             if int(k) in steps:

@@ -128,7 +128,7 @@ class StoredHistory(Mapping[str, Array]):
 
     def _now(self) -> tuple[int, int] | None:
         try:
-            status = os.stat(self._file or "")
+            status = os.lstat(self._file or "")
         except OSError:
             return None
         return status.st_mtime_ns, status.st_size

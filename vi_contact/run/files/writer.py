@@ -15,9 +15,9 @@ from ...core.files import frames_of, on_root, push, to_json, write_atomically
 from ...core.problem import ContactProblem
 from ...core.step import Report, Row, State
 from .checkpoint import RestartPoint, write_checkpoint
-from .folder import ABOUT, CHECKPOINT, FORMAT, LOG, SUMMARY, clear, remove_litter
+from .folder import CHECKPOINT, LOG, SUMMARY, clear, remove_litter, take
 from .history import GEOMETRY, HistoryFiles
-from .log import RunLog, versions
+from .log import RunLog
 from .stored_rows import StoredRows, times_of
 from .table import Table
 
@@ -81,13 +81,12 @@ class Writer:
                 self._fields.write(state, np.zeros_like(state.u))
 
     def _make(self, folder: Path, geometry: Mapping[str, Array]) -> None:
+        take(folder)
         remove_litter(folder)
         if not self._continued:
             clear(folder)
         self._log = RunLog(folder / LOG, append=self._continued)
         self._files = HistoryFiles(folder, self._table, geometry, self._stored)
-        about = {"format": FORMAT, "vi_contact": versions()["vi_contact"]}
-        write_atomically(folder / ABOUT, (to_json(about) + "\n").encode())
 
     def append(self, row: Row) -> None:
         """Take a row of the histories; it is written, with all that wait, when the next one might be late."""
@@ -137,7 +136,7 @@ class Writer:
 
     def rescue(self, facts: Mapping[str, Any]) -> None:
         """Do the same after a failure: not collective, as others might not come; no error hides the first."""
-        with suppress(Exception):
+        with suppress(Exception):  # of any kind: the first error is told, and this one comes of it or after it
             self._close(facts)
 
     def _close(self, facts: Mapping[str, Any]) -> None:

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from petsc4py import PETSc
 
 from ...core.algebra import Array
 from ...core.errors import StepFailure
+from ..petsc import PETSc
 from ..volume.snes import Lent, weakly
 from .operator import Operator
 from .preconditioners import Masked

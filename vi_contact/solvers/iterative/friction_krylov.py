@@ -12,9 +12,9 @@ point that cannot turn. About half of the diagonal of A is what its neighbours l
 from typing import Any
 
 import numpy as np
-from petsc4py import PETSc
 
 from ...core.algebra import Array, Comm, largest
+from ..petsc import PETSc
 from ..volume.snes import Lent
 from .conjugate_gradients import SOLVED, STAGNATED
 from .contact import Contact

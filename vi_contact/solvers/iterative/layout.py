@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from petsc4py import PETSc
 
 from ...core.algebra import Array, EffectiveMatrix, Indices, largest, upper_blocks
+from ..petsc import PETSc
 from ..volume.bounded_system import assembled
 
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from petsc4py import PETSc
 
 from ...core.algebra import Array, Indices
+from ..petsc import PETSc
 from ..volume.snes import Lent
 
 

@@ -15,12 +15,12 @@ contact open; the interpolation is kept, Galerkin products are renewed when over
 from typing import Any
 
 import numpy as np
-from petsc4py import PETSc
 
 from ...core.algebra import Array, EffectiveMatrix, Indices, Mask
 from ...core.errors import InputError
 from ...core.surfaces import ContactSurface
 from ...laws.mass_transfer import rigid_motions
+from ..petsc import PETSc
 from ..volume.failures import last_line
 from ..volume.options import OptionLayers, Options
 from .layout import Layout, Nodewise
@@ -31,6 +31,7 @@ KINDS = (JACOBI, ICC, GAMG)
 SMALL, LARGE = 0.5, 30.0  # Courant numbers; CHOSEN: docs/guide/solvers.md has what was measured
 DRIFT = 0.1  # of the contact set that may move before GAMG is renewed
 RENEWALS = 4  # in a step, at most
+FEW_LEVELS = 2  # of a multigrid: with fewer there is nothing for options of levels
 RAISED = 0.5  # of the diagonal, for factors that were not positive definite; CHOSEN: docs/guide/solvers.md
 DEFAULTS: dict[str, Options] = {
     JACOBI: {"pc_type": "jacobi"},
@@ -189,6 +190,12 @@ def made(matrix: Any, layers: OptionLayers) -> Any:
             pc.setFromOptions()
             pc.setUp()
             pc.setUpOnBlocks()
+            if layers.own:  # parts of it read their options when they are first applied
+                ones, image = matrix.createVecs()
+                ones.set(1.0)
+                pc.apply(ones, image)
+            if pc.getType() in ("gamg", "mg") and pc.getMGLevels() < FEW_LEVELS:
+                layers.read.update(key for key in layers.own if key.startswith("mg_levels_"))  # of none that is there
         except PETSc.Error as error:
             raise InputError(f"PETSc makes no preconditioner of the options under {layers.prefix} "
                              f"({last_line(error)}): correct or drop them") from error

@@ -13,7 +13,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from petsc4py import PETSc
 
 from ...core.algebra import EffectiveMatrix
 from ...core.checks import attributes, check_word, instance, shown, whole
@@ -22,6 +21,7 @@ from ...core.problem import ContactProblem
 from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
 from ..certified import check_laws
+from ..petsc import PETSc
 from ..volume.failures import raised
 from ..volume.options import OptionLayers
 from .conjugate_gradients import SOLVED, WRONG_SIGNS, ConjugateGradients, stopped
@@ -47,7 +47,7 @@ class Iterative:
             with rigid body modes), or "auto", which takes the first up to a Courant number of 0.5 in A, the second up
             to 30, and the third beyond. PETSc's options may name another.
         petsc_options: options of the preconditioner without prefix, e.g. {"pc_gamg_threshold": 0.02}; those of ICC
-            begin with sub_pc_. Options of the command line override them.
+            begin with sub_pc_. Options of the command line override them. One that nothing reads is refused.
         prefix: the prefix of these options on the command line and in PETSC_OPTIONS.
         tolerance: it stops when the residual, measured as the certificate, and the estimated error are below this.
         changes: number of changes of the contact set in a step without friction; after more, or when a set comes
@@ -96,6 +96,9 @@ class PreparedIterative:
         self._blocks, self._raised = blocks, False
         self._take(Multigrid(nodewise, surface, self._layers, self.work) if self.kind == GAMG
                    else Inverse(blocks, self._layers))
+        if settings.preconditioner == AUTO:
+            self._layers.excuse_known()  # they may be for a kind that another time step makes
+        self._layers.refuse_unread(self._name, surface.comm)
         self._diagonal = np.array(blocks.getDiagonal().array_r)
         self._contact = Contact(surface, scale, layout.places[surface.owned], self._diagonal, layout.missing)
         self._norm: float | None = None

@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from petsc4py import PETSc
 
 from ...core.algebra import Array, Comm, EffectiveMatrix, Indices, Mask, SerialMatrix
 from ...core.errors import InputError
 from ...core.step import StepProblem
 from ...core.surfaces import ContactSurface
+from ..petsc import PETSc
 
 
 class BoundedSystem:

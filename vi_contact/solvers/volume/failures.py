@@ -16,6 +16,12 @@ ADVICE = {
     "DIVERGED_LINEAR_SOLVE": "check that the body is held or that mass enters A, and that A is positive definite",
     **dict.fromkeys((name for name, words in WORDS.items() if words.endswith("not a number")), CHECK_NUMBERS),
 }
+ERRORS = {  # of PETSc, by number
+    55: "PETSc has no memory left: take Iterative(), which factorises nothing, or more memory",
+    71: "the matrix has a zero pivot: check that the body is held or that mass enters A",
+    81: "the matrix has a zero pivot: check that the body is held or that mass enters A",
+}
+UNKNOWN = "PETSc says no more of the cause: check that the body is held and petsc_options fit, or try another method"
 GENERAL_ADVICE = "check that the body is held, try a smaller step, another method, or a larger iteration limit"
 
 
@@ -36,10 +42,11 @@ def stopped(method: str, reasons: type, reason: int, iterations: int, worst: flo
 def raised(method: str, error: Any) -> StepFailure:
     """Return the failure of a PETSc call that raised."""
     said = last_line(error)
-    advice = "check that A is positive definite and that load, guess and bound are finite, or try another method"
+    code: Any = getattr(error, "ierr", "unknown")
+    advice = ERRORS.get(code, UNKNOWN)
     if re.search(r"\bnan\b", said, re.IGNORECASE):  # error 72, "Inf or NaN", or 83, "generated infinity or NaN"
         said, advice = f"not a number: {said}", CHECK_NUMBERS
-    return StepFailure(f"{method} stopped with PETSc error {getattr(error, 'ierr', 'unknown')} ({said}): {advice}")
+    return StepFailure(f"{method} stopped with PETSc error {code} ({said}): {advice}")
 
 
 def last_line(error: Any) -> str:

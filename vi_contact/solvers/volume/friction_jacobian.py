@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from petsc4py import PETSc
 
 from ...core.algebra import Array, Indices
+from ..petsc import PETSc
 from .bounded_system import aij, renumbered
 from .friction_system import FrictionSystem, ScaledFrictionStep
 

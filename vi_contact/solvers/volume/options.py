@@ -4,30 +4,41 @@ Layers, the later wins: the method's defaults, ``petsc_options`` of the settings
 PETSC_OPTIONS). SNES VI reads its options again whenever the active set changes, so they stay in the database for
 as long as a solve runs and are taken out afterwards: two solvers with one prefix do not meet."""
 
+import ctypes
+import logging
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from difflib import get_close_matches
+from functools import cache
 from pathlib import Path
 from typing import Any
 
-from petsc4py import PETSc
-
+from ...core import packages
+from ...core.algebra import Comm
 from ...core.errors import InputError
+from ..petsc import PETSc
 from .failures import last_line
 
+log = logging.getLogger(__name__)
 Options = Mapping[str, object | None]
 DIRECT = ("lu", "cholesky")
+EXACT = (*DIRECT, "redundant")  # by one application
 
 
 class OptionLayers:
-    """Hold defaults and the user's own options under a prefix; ``in_force`` puts them into PETSc's database."""
+    """Hold defaults and the user's own options under a prefix; ``in_force`` puts them into PETSc's database.
 
-    def __init__(self, prefix: str, defaults: Options, own: Options) -> None:
+    own: the user's options; read: those of them that PETSc has read."""
+
+    def __init__(self, prefix: str, defaults: Options, own: Options, read: set[str] | None = None) -> None:
+        """``read``: the user's own options that PETSc has read so far, shared with other layers of one solver."""
         self.prefix = prefix
-        self._defaults, self._own = defaults, {key.lstrip("-"): value for key, value in own.items()}
+        self._defaults, self.own = defaults, {key.lstrip("-"): value for key, value in own.items()}
+        self.read: set[str] = set() if read is None else read
 
     def apply(self, solver: Any, check: "Callable[[Any, OptionLayers], None]") -> None:
-        """Set up a SNES or TAO object from the options; InputError when PETSc or ``check`` does not take them."""
+        """Set up a SNES, TAO or PC object from the options; InputError when PETSc or ``check`` does not take them."""
         with self.in_force():
             try:
                 solver.setFromOptions()
@@ -40,9 +51,9 @@ class OptionLayers:
     def in_force(self) -> Iterator[None]:
         """Set what the database does not already hold, and take it out at the end."""
         database = PETSc.Options()
-        values = {**self._defaults, **self._own}
+        values = {**self._defaults, **self.own}
         pc = database.getString(self.prefix + "pc_type", str(values.get("pc_type", "")))
-        if pc not in DIRECT and "pc_factor_mat_solver_type" not in self._own:
+        if pc not in DIRECT and "pc_factor_mat_solver_type" not in self.own:
             values.pop("pc_factor_mat_solver_type", None)  # the default is for our own direct solver
         added = [key for key in values if not database.hasName(self.prefix + key)]
         for key in added:
@@ -50,12 +61,65 @@ class OptionLayers:
         try:
             yield
         finally:
+            self.read.update(key for key in self.own if key not in added or was_read(self.prefix + key))
             for key in added:
                 database.delValue(self.prefix + key)
+
+    def refuse_unread(self, owner: str, comm: Comm) -> None:
+        """Raise InputError, on all ranks, for an option of the user's that no rank has read.
+
+        To be called when all has been read that ever will be: after a solve with at least one iteration. Collective."""
+        for key in self._unread(comm) if self.own else ():
+            raise InputError(f"{owner}: nothing reads '{key}' of petsc_options: {self._remedy(key)}")
+        self._tell_unread(owner, comm)
+
+    def _unread(self, comm: Comm) -> list[str]:
+        """Return the user's options that no rank has read: one without rows makes no blocks. Collective."""
+        lists = comm.gather([key for key in self.own if key not in self.read])
+        everywhere = None if lists is None else [key for key in lists[0] if all(key in one for one in lists)]
+        return list(comm.bcast(everywhere))
+
+    def _tell_unread(self, owner: str, comm: Comm) -> None:
+        """Warn, once, of options of the command line that this solver has not read: they may be for another one."""
+        given = [name for name in PETSc.Options().getAll() if name.startswith(self.prefix)]
+        unread = [name for name in given if not was_read(name) and name not in _TOLD]
+        _TOLD.update(unread)
+        for name in unread if comm.rank == 0 else ():
+            remedy = self._remedy(name.removeprefix(self.prefix))
+            log.warning("%s: nothing reads the PETSc option -%s: %s", owner, name, remedy)
+
+    def excuse_known(self) -> None:
+        """Count the user's options that PETSc has as read, whether this solver has a use for them or not."""
+        self.read.update(key for key in self.own if key.removeprefix(_part(key)) in KNOWN)
+
+    def _remedy(self, key: str) -> str:
+        """Return the end of a sentence about an option that nothing has read."""
+        if key.startswith(self.prefix):
+            return f"give it without its prefix, as '{key.removeprefix(self.prefix)}'"
+        part = _part(key)
+        near = get_close_matches(key.removeprefix(part), KNOWN, n=1, cutoff=0.6)
+        if near and part + near[0] != key:
+            return f"did you mean '{part}{near[0]}'? Correct it, or leave it out"
+        return "what it is for is not part of this solver as it is set, so leave it out"
 
     def chosen(self, key: str) -> str:
         """Return the value in force; call inside ``in_force``."""
         return str(PETSc.Options(self.prefix).getString(key, ""))
+
+
+@cache
+def _options_used() -> Any:
+    """Return PetscOptionsUsed of the PETSc library that petsc4py has loaded, which petsc4py itself does not offer."""
+    call = ctypes.CDLL(PETSc.__file__).PetscOptionsUsed
+    call.argtypes, call.restype = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p], ctypes.c_int
+    return call
+
+
+def was_read(name: str) -> bool:
+    """Return whether PETSc has read an option, by its whole name, since it came into the database; on this rank."""
+    found = ctypes.c_int(0)  # PetscBool is an int, and one byte since PETSc 3.24
+    _options_used()(None, name.encode(), ctypes.byref(found))
+    return found.value != 0
 
 
 def refuse(combination: str, reason: str, remedy: str) -> None:
@@ -63,9 +127,43 @@ def refuse(combination: str, reason: str, remedy: str) -> None:
     raise InputError(f"{combination} is refused because {reason}: {remedy}")
 
 
+_TOLD: set[str] = set()  # options of the command line that a warning has named
 NOT_EXACT = "one application of it does not solve the system"
 TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 REDUCED_PC = TABLES["reduced_pc"]
+KNOWN = tuple(TABLES["known"].split())
+
+
+def _part(key: str) -> str:
+    """Return with what the name of an option begins that belongs to a part of a solver, such as blocks or levels."""
+    return next((one for one in TABLES["parts"] if key.startswith(one)), "")
+
+
+EXCHANGE = {"umfpack": "suitesparse", "superlu": "superlu"}  # solvers that exchange rows, and their packages
+
+
+def direct(kind: str, ranks: int, *, exchanges: bool = False) -> Options:
+    """Return the options of a direct solver, "cholesky" or "lu", of what this PETSc was built with: MUMPS, or one of
+    one rank, of which every rank has a copy; the log says which where it is not MUMPS. SuperLU_DIST is never taken: it
+    ends the process where a row is zero.
+
+    ``exchanges``: whether rows have to be exchanged, as beside zeros on the diagonal, which PETSc's own does not do.
+    InputError where nothing else is there."""
+    if packages.petsc_has("mumps"):
+        return {**TABLES["mumps"], "pc_type": kind}
+    own = {"ksp_type": "preonly", "pc_type": kind, "pc_factor_mat_solver_type": "petsc"}
+    if exchanges:
+        found = [name for name, package in EXCHANGE.items() if packages.petsc_has(package)]
+        if not found:
+            raise InputError("Volume() with friction needs a direct solver that exchanges rows, and this PETSc has "
+                             "none (MUMPS, SuiteSparse or SuperLU): take Condensed() or Iterative()")
+        own["pc_factor_mat_solver_type"] = found[0]
+    else:
+        own["pc_factor_mat_ordering_type"] = "nd"
+    log.info("Volume: %s of '%s' factorises, as this PETSc has no MUMPS", kind, own["pc_factor_mat_solver_type"])
+    if ranks == 1:
+        return own
+    return {"ksp_type": "preonly", "pc_type": "redundant", **{f"redundant_{key}": one for key, one in own.items()}}
 
 
 def check_reduced(snes: Any, layers: OptionLayers) -> None:
@@ -74,7 +172,7 @@ def check_reduced(snes: Any, layers: OptionLayers) -> None:
     pc, ksp = snes.ksp.pc.getType(), snes.ksp.getType()
     if pc in REDUCED_PC:
         refuse(f"pc_type {pc} with vinewtonrsls", REDUCED_PC[pc], "use cholesky with MUMPS, hypre or bjacobi")
-    if ksp == "preonly" and pc not in DIRECT:
+    if ksp == "preonly" and pc not in EXACT:
         refuse(f"ksp_type preonly with pc_type {pc}", NOT_EXACT, "use ksp_type cg")
     _check_line_search(layers)
 
@@ -98,7 +196,7 @@ def _check_unsymmetric(snes: Any, layers: OptionLayers, wanted: str, what: str, 
     for kind, name, symmetric in (("pc", pc, ("cholesky", "icc")), ("ksp", ksp, TABLES["symmetric_ksp"])):
         if name in symmetric:
             refuse(f"{kind}_type {name} with {what}", f"{matrix} is not symmetric", "use lu with preonly")
-    if ksp == "preonly" and pc != "lu":
+    if ksp == "preonly" and pc not in ("lu", "redundant"):
         refuse(f"ksp_type preonly with pc_type {pc}", NOT_EXACT, "use lu or gmres")
     _check_line_search(layers)
 

@@ -10,8 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol, cast
 
-from petsc4py import PETSc
-
 from ...core.algebra import EffectiveMatrix
 from ...core.checks import instance, provides, real, shown
 from ...core.errors import InputError, StepFailure
@@ -19,11 +17,12 @@ from ...core.problem import ContactProblem
 from ...core.step import StepProblem, StepResult
 from ...core.surfaces import ContactSurface
 from ..certified import check_laws
+from ..petsc import PETSc
 from .bounded_system import BoundedSystem
 from .failures import raised
 from .friction import VolumeFriction
 from .friction_system import FrictionSystem, ScaledFrictionStep
-from .options import OptionLayers, Options
+from .options import OptionLayers, Options, direct
 from .scaled_step import ScaledStep
 from .snes import ReducedNewton, SemismoothNewton, SnesDriver
 from .tao import TaoDriver, TaoTron
@@ -48,7 +47,8 @@ class Volume:
 
     Attributes:
         method: ReducedNewton (the reference), SemismoothNewton or TaoTron.
-        petsc_options: PETSc options without prefix, e.g. {"snes_monitor": None}; the command line overrides them.
+        petsc_options: PETSc options without prefix, e.g. {"snes_monitor": None}; the command line overrides them. One
+            that nothing has read by the end of the first step with an iteration is refused, with the nearest known.
         prefix: the prefix of these options on the command line and in PETSC_OPTIONS.
         tolerance: the largest relative error that is accepted when a solver stops improving above round-off."""
 
@@ -87,15 +87,17 @@ class PreparedVolume:
         self._system = BoundedSystem(A, surface, scale)
         PETSc.garbage_cleanup(self._system.comm)
         self._settings, self._method = settings, settings.method
-        own = settings.method.defaults(surface.comm.size)
-        self._layers = self._layered(own if self._system.symmetric else {**own, "pc_type": "lu"})
+        self._comm, self._read, self._all_read = surface.comm, set[str](), False
+        ranks = surface.comm.size
+        own = settings.method.defaults(ranks)
+        self._layers = self._layered(own if self._system.symmetric else {**own, **direct("lu", ranks)})
         self._scaled = ScaledStep(self._system, settings.tolerance)
         self._name = f"Volume({type(settings.method).__name__})"
         self._friction: VolumeFriction | None = None
         self._driver: SnesDriver | TaoDriver | None = self._method.driver(self._scaled, self._layers)
 
     def _layered(self, defaults: Options) -> OptionLayers:
-        return OptionLayers(self._settings.prefix, defaults, self._settings.petsc_options)
+        return OptionLayers(self._settings.prefix, defaults, self._settings.petsc_options, self._read)
 
     def _friction_method(self) -> VolumeFriction:
         """The problem with friction, made at the first step that has some, in the place of the other one."""
@@ -103,7 +105,8 @@ class PreparedVolume:
             self.close()
             method, tolerance = cast(ReducedNewton, self._method), self._settings.tolerance
             scaled = ScaledFrictionStep(FrictionSystem(self._system), tolerance)
-            self._driver = method.friction_driver(scaled, self._layered(method.friction_defaults()))
+            defaults = method.friction_defaults(self._system.comm.size)
+            self._driver = method.friction_driver(scaled, self._layered(defaults))
             self._friction = VolumeFriction(scaled, self._driver, self._name)
         return self._friction
 
@@ -130,7 +133,7 @@ class PreparedVolume:
     def solve(self, step: StepProblem) -> StepResult:
         """Return the step; StepFailure with PETSc's reason when it does not converge."""
         try:
-            return self._solve(step) if step.slip0 is None else self._friction_method().solve(step)
+            found = self._solve(step) if step.slip0 is None else self._friction_method().solve(step)
         except PETSc.Error as error:
             self.close()  # its state is unknown; the next step gets a new one
             if error.__cause__ is not None:
@@ -139,6 +142,18 @@ class PreparedVolume:
         except StepFailure:
             self.close()
             raise
+        self._refuse_unread(found.iterations)
+        return found
+
+    def excuse_options(self) -> None:
+        """Take options that nothing reads: they are for another method, in whose place this one is tried."""
+        self._all_read = True
+
+    def _refuse_unread(self, iterations: int) -> None:
+        """Raise InputError for options that nothing has read, once the parts of the solver have been at work."""
+        if iterations and not self._all_read:
+            self._all_read = True
+            self._layers.refuse_unread(self._name, self._comm)
 
     def _solve(self, step: StepProblem) -> StepResult:
         """The step without friction."""

@@ -7,14 +7,16 @@ any system of units and scaling loses no digit: a bound stays exactly a bound.""
 from typing import Any
 
 import numpy as np
-from petsc4py import PETSc
 
 from ...core.algebra import Array, Mask, max_abs, total
 from ...core.step import StepProblem
+from ..petsc import PETSc
 from .bounded_system import BoundedSystem
 from .failures import NOT_A_NUMBER, stopped
 
 ROUND_OFF = 1e-14  # backward error |A z - b| / (|A| |z| + |b|), largest entries, of a solve that cannot be improved
+
+INDEFINITE = 1e-8  # of the sizes in a curvature below zero: far above its rounding
 
 
 class ScaledStep:
@@ -70,6 +72,14 @@ class ScaledStep:
     def measure_from(self, y: Array) -> None:
         """Take y as the origin of the objective."""
         self._zero = y, self.residual(y)
+
+    def curves_down(self, y: Array, F: Array) -> bool:
+        """Say whether dy·H dy, dy the way from the origin of the objective, is below zero by more than rounding: then
+        H is not positive definite. Collective."""
+        dy, dF = y - self._zero[0], F - self._zero[1]
+        comm = self.system.surface.comm
+        curvature, sizes = comm.sum(np.array([dy @ dF, np.abs(dy) @ (np.abs(F) + np.abs(self._zero[1]))]))
+        return bool(curvature < -INDEFINITE * sizes)
 
     def active(self, y: Array, F: Array) -> Mask:
         """Return (m,) what the natural map chooses: where the reaction exceeds the remaining gap."""

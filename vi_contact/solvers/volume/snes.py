@@ -10,16 +10,24 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from petsc4py import PETSc
 
 from ...core.algebra import Array
+from ..petsc import PETSc
 from .bounded_system import BoundedSystem
 from .friction_jacobian import FrictionJacobian
 from .friction_system import ScaledFrictionStep
-from .options import TABLES, OptionLayers, Options, check_friction, check_reduced, check_semismooth
+from .options import (
+    TABLES,
+    OptionLayers,
+    Options,
+    check_friction,
+    check_reduced,
+    check_semismooth,
+    direct,
+)
 from .scaled_step import ScaledStep
 
-NEWTON: Options = TABLES["newton"] | TABLES["mumps"]
+NEWTON: Options = TABLES["newton"]
 
 
 class SnesDriver:
@@ -158,17 +166,17 @@ class ReducedNewton:
 
     def defaults(self, ranks: int) -> Options:
         """Return the options that come before the user's."""
-        return {**NEWTON, "pc_type": "cholesky"}
+        return {**NEWTON, **direct("cholesky", ranks)}
 
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> SnesDriver:
         """Return the SNES object."""
         jacobian = AssembledJacobian(scaled.system)
         return SnesDriver(scaled, layers, jacobian, snes_type="vinewtonrsls", check=check_reduced)
 
-    def friction_defaults(self) -> Options:
+    def friction_defaults(self, ranks: int) -> Options:
         """Return options before the user's: LU, the system with friction is not symmetric. Its zeros on the diagonal
         delay pivots, for which MUMPS on several ranks needs more room than usual, or stops with INFOG(1) = -9."""
-        return {**NEWTON, "pc_type": "lu", "mat_mumps_icntl_14": 200}
+        return {**NEWTON, **direct("lu", ranks, exchanges=True), "mat_mumps_icntl_14": 200}
 
     def friction_driver(self, scaled: ScaledFrictionStep, layers: OptionLayers) -> SnesDriver:
         """Return the SNES object of a step with friction."""
@@ -185,7 +193,7 @@ class SemismoothNewton:
 
     def defaults(self, ranks: int) -> Options:
         """Return the options that come before the user's."""
-        return {**NEWTON, "snes_linesearch_type": "bt", "pc_type": "lu"}
+        return {**NEWTON, "snes_linesearch_type": "bt", **direct("lu", ranks)}
 
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> SnesDriver:
         """Return the SNES object."""

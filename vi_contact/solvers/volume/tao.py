@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from petsc4py import PETSc
 
 from ...core.algebra import Array
+from ..petsc import PETSc
 from .options import REDUCED_PC, TABLES, OptionLayers, Options, refuse
 from .scaled_step import ScaledStep
 from .snes import AssembledJacobian, weakly, write_bounds
@@ -74,7 +74,10 @@ class TaoDriver:
         if tao.getConvergedReason():
             return None
         y = tao.getSolution().array_r
-        reason = self._scaled.verdict(y, self._scaled.residual(y))  # TRON overwrites its gradient by the projected one
+        F = self._scaled.residual(y)  # TRON overwrites its gradient by the projected one
+        if self._scaled.curves_down(y, F):
+            return int(PETSc.TAO.Reason.DIVERGED_USER)  # without bounds it would go on for ever
+        reason = self._scaled.verdict(y, F)
         if reason < 0:
             return int(PETSc.TAO.Reason.DIVERGED_NAN)
         return int(PETSc.TAO.Reason.CONVERGED_USER) if reason else None

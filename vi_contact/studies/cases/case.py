@@ -11,12 +11,15 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ...core.arguments import check
 from ...core.errors import InputError
+from ...core.files import on_root
 from ...core.problem import ContactProblem
 from ...core.protocols import Excitation, FrictionLaw, Frictionless, ImpactLaw, MassLaw
 from ...core.state_checks import initial_state
@@ -24,6 +27,7 @@ from ...core.step import Recorder, Scheme, Solver, State
 from ...core.surfaces import ContactSurface, empty_surface
 from ...engineering.checks.comparison import Check
 from ...fem.assembly import assemble
+from ...fem.communicators import MpiComm
 from ...fem.contact.joined import joined_surfaces
 from ...fem.heterogeneous import Heterogeneous
 from ...fem.mesh import Tags, build_mesh, read_mesh
@@ -31,21 +35,22 @@ from ...laws.materials import LinearElastic
 from ...laws.orthotropic import Orthotropic
 from ...meshes.gmsh_session import MeshScript
 from ...run.cross_check import CrossChecked
-from ...run.files.folder import locked, run_folder
+from ...run.files.folder import locked, refuse_files_of_others, run_folder
 from ...run.files.writer import FieldWriter
 from ...run.method import with_defaults
 from ...run.recorders import Contact, Energy, Steps
 from ...run.simulate import Solution, simulate
 from ...run.time_steps import StepPlan, step_plan
 from .expressions import check_axes
-from .library import base_folder, check_format, keep_copy, refuse_retired, refuse_retired_model
+from .library import base_folder, check_format, keep_copy, refuse_case_of_others
 from .own_classes import packages
 from .parsing import Words, arguments, nearest, read
 from .stage_tables import Stage, split
 from .stages import Reached, run_stages
-from .strain_compatible import CALL, iterate
+from .strain_compatible import CALL, iterate, with_known_damping
 from .table_calls import Call, Callee, Group, Node, Spot, build, callee, needs_body, nodes_in
 from .toml_file import read_toml, with_settings
+from .unread_choices import Part, findings, refuse_unread
 from .vocabulary import MeshFile, Parts, weight, words
 
 _TABLES: dict[str, Any] = {  # in the order in which they are read: type of what a table makes, or the one call it is
@@ -156,6 +161,8 @@ class Case:
         that are ``reached`` already. Raises as ``simulate``."""
         self.check()
         folder = self.out if out is None else Path(out)
+        if folder is not None:  # before any work; ``simulate`` looks once more, with the folder's lock
+            on_root(MpiComm(comm), partial(self._refuse_files_of_others, folder))
         if "strain_compatible" in self.nodes:
             return iterate(self, comm, folder, restart=restart, progress=progress, wall_time=wall_time)
         if self.stages:
@@ -165,6 +172,11 @@ class Case:
         with self.call(parts, folder) as call:
             self.keep_model(comm, parts, folder)
             return simulate(**call, restart=restart, progress=progress, changed=changed, wall_time=wall_time)
+
+    def _refuse_files_of_others(self, folder: Path) -> None:
+        """InputError for what the run would replace in a folder, and which no run has made."""
+        refuse_files_of_others(folder)
+        refuse_case_of_others(self.path, folder)
 
     def keep_model(self, comm: Any, parts: Parts, folder: Path | None) -> None:
         """Write into the folder of a run, if it has one, what its model is. Collective."""
@@ -212,7 +224,8 @@ class Case:
         mesh, tags = self.meshed(comm)
         early = "excitation" not in self.nodes or not needs_body(self.nodes["excitation"])  # else they need the system
         shaking = {"excitations": self.excitations()} if early else {}
-        system = self._made("system", mesh=mesh, tags=tags, **shaking)
+        body = with_known_damping(self.nodes["system"]) if "strain_compatible" in self.nodes else self.nodes["system"]
+        system = build(body, {"mesh": mesh, "tags": tags, **shaking})
         system = self._made("gravity", system=system, tags=tags) if "gravity" in self.nodes else system
         none = empty_surface(system.algebra.comm, system.space.dimension)
         surfaces = self._several("contact", system=system, tags=tags) or (none,)
@@ -253,13 +266,21 @@ def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence
 
     Raises InputError, one sentence with file, table, key and remedy: no TOML (with the line), a table, type or key that
     nobody knows (with the nearest known), a missing key, a value of the wrong kind. Groups are looked up by ``run``."""
+    check("read_case", "path", path, str | Path)
     path = Path(path)
-    tables = with_settings(read_toml(path), settings)
+    file = read_toml(path)
+    case = _read(path, with_settings(file, settings), settings, allow)
+    found = _unread(case)
+    if found:
+        refuse_unread(found, _unread_in(path, file, allow) if settings else [], settings)
+    return case
+
+
+def _read(path: Path, tables: Mapping[str, Any], settings: Sequence[str], allow: Sequence[str]) -> Case:
+    """Return the case of tables that have their settings."""
     allowed = packages(allow)
     known = words(base_folder(path), allowed)
     check_format(path, tables)
-    refuse_retired(tables)
-    refuse_retired_model(path, tables.get("model"))
     for name in tables:
         if name not in ("format", *_TABLES, "stage"):
             raise InputError(f"{path}: the table [{name}] is unknown: {nearest(name, ('format', *_TABLES, 'stage'))}")
@@ -269,6 +290,23 @@ def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence
     stages = tuple(replace(one, case=replace(whole, nodes=_nodes(one.tables, one.label, known)))
                    for one in split(path, tables))
     return replace(whole, nodes=stages[-1].case.nodes if stages else _nodes(tables, str(path), known), stages=stages)
+
+
+def _unread(case: Case) -> list[tuple[str, str]]:
+    """Return the choices of a case that nothing reads: key and sentence of each."""
+    if case.stages:
+        parts = [Part(one.label, one.tables, one.case.nodes, one.static) for one in case.stages]
+    else:
+        parts = [Part(str(case.path), case.tables, case.nodes)]
+    return list(findings(case.path, case.tables, parts))
+
+
+def _unread_in(path: Path, tables: Mapping[str, Any], allow: Sequence[str]) -> list[tuple[str, str]]:
+    """Return the same of a file alone; none where it is no case without the settings that complete it."""
+    try:
+        return _unread(_read(path, tables, (), allow))
+    except InputError:
+        return []
 
 
 def _nodes(tables: Mapping[str, Any], source: str, known: Words) -> dict[str, Node]:

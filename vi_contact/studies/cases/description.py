@@ -2,7 +2,7 @@
 
 import json
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
@@ -13,24 +13,25 @@ from ...core.algebra import Array, Comm, largest, total
 from ...core.files import on_root, to_json, write_atomically
 from ...core.problem import ContactProblem
 from ...core.step import AXES
-from ...engineering.modal import natural_frequencies
-from ...fem.mesh import Cells
-from ...fem.output.outline import cell_volumes, longest_edge, outline
+from ...engineering.damping import NOT_COMPUTED, damping_in_words, first_modes
+from ...fem.mesh import Cells, Facets
+from ...fem.output.outline import cell_volumes, facets_with_cells, longest_edge, outline
 from ...fem.space import space_of
 from ...ground_motion.excitation import GroundMotion
 from ...ground_motion.record import Record
-from ...laws.free_motions import free_motions
 from ...run.files.folder import MODEL
 from .table_calls import Call, Group, build, nodes_in
+from .unread_choices import left_over
 from .vocabulary import Parts
 
 ELEMENTS = 8.0  # of first order in a wave length: Kuhlemeyer and Lysmer (1973); the cautious take 10
 STEPS = 20.0  # in a period
+COARSER = 1.2  # edges of side 2 over those of side 1: more points than a softer side can follow (CHOSEN)
 ENERGY = 0.95  # of a record, the integral of |A(f)|², below the frequency that is told
 ROUNDED = 1e-9  # of a time step
-TOUCHING = 1e-9  # of the size of the bodies: a gap that is none
 FEW = 10_000  # unknowns: up to so many a run tells its periods, which take two seconds; more when it is checked
 DIGITS = 10  # of a number: those beyond depend on the number of ranks
+RATIO_DIGITS = 4  # of the damping ratio of a mode, which is found less sharply than its period
 WORDS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 
 
@@ -38,8 +39,10 @@ def describe(case: Any, comm: Any, parts: Parts | None = None, *, most: int = 50
     """Return what the model of a ``Case`` is, plain values in SI units; computes no step.
 
     Keys: title, dimension, unknowns, degree, mass; groups (name, kind); bodies (name, cells, mass, material);
-    supports (kind, groups, components); contact (name, points, size [m²], friction, places); periods and
-    rigid_motions with the contact closed where it touches at the start, and sticking where there is friction; waves
+    supports (kind, groups, components); contact (name, points, size [m²], friction, nodes: a sentence, places, others:
+    kind -> places, sides: name, h and G of both); periods, damping_ratios
+    of their modes and rigid_motions with the contact closed where it touches at the start, and sticking where there is
+    friction; damping: in words, "none" without; waves
     (body, c_s, h: the longest edge over the degree, f_max = c_s / (8 h), dt_ratio = dt c_s / h); records (file, scale,
     dt, duration, pga, f_95: 95 % of its energy are below); run (dt, t_end, steps); outline (group, lines), on rank 0;
     defects and warnings: sentences.
@@ -57,13 +60,13 @@ def describe(case: Any, comm: Any, parts: Parts | None = None, *, most: int = 50
         "degree": space.degree, "mass": sum(one["mass"] for one in bodies),
         "groups": [{"name": name, "kind": type(one).__name__.lower()} for name, one in tags.items()],
         "bodies": [{key: one[key] for key in ("name", "cells", "mass", "material")} for one in bodies],
-        "supports": list(_supports(space)), "contact": list(_contact(case, problem)),
+        "supports": list(_supports(space)), "contact": list(_contact(case, problem, tags)),
         "waves": [{"body": one["name"], "c_s": one["c_s"], "h": one["h"], "f_max": one["c_s"] / (ELEMENTS * one["h"]),
                    "dt_ratio": run["dt"] * one["c_s"] / one["h"]} for one in bodies],
         "records": _records(case, parts.system),
         "run": run, "outline": outline(space, tags, [cells for cells, _ in space.forms.materials]),
-    } | (_periods(problem, space.size) if space.unknowns <= most else {})
-    model |= {"defects": list(_defects(model)), "warnings": list(_warnings(model))}
+    } | _modes(case, problem, most)
+    model |= {"defects": list(_defects(model)), "warnings": [*_warnings(model), *left_over(case.path, case.tables)]}
     return dict(json.loads(to_json(model), parse_float=lambda text: float(f"{float(text):.{DIGITS}g}")))
 
 
@@ -96,6 +99,8 @@ def _body(space: Any, tags: Mapping[str, Any], volumes: Array, cells: Any, mater
         z = int(np.argmax(np.abs(np.asarray(material.axes)[2]))) if np.ndim(material.axes) else 2
         shear = density / material.rho * (G[z] if space.dimension == 2 else min(G))
     numbers = {key: one for key, one in vars(material).items() if isinstance(one, int | float)}
+    if not numbers.get("xi", 1.0):  # a material without damping has no ratio to tell
+        numbers.pop("xi")
     return {"name": (names or ["body"])[0], "cells": round(total(space.comm, len(own))),
             "mass": total(space.comm, volumes[own] @ density), "material": {"type": type(material).__name__} | numbers,
             "c_s": -largest(space.comm, np.max(-np.sqrt(shear / density), initial=-np.inf)),
@@ -113,16 +118,44 @@ def _supports(space: Any) -> Iterator[dict[str, Any]]:
         yield {"kind": kind, "groups": groups, "components": [AXES[one] for one in chosen]}
 
 
-def _contact(case: Any, problem: ContactProblem) -> Iterator[dict[str, Any]]:
+def _contact(case: Any, problem: ContactProblem, tags: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """Yield the parts of the contact, one for each table: by its name, or by those of its groups."""
     surface, tables = problem.surface, case.nodes.get("contact", ())
-    names = [node.arguments.get("name") or " on ".join(one.name for one in nodes_in(node) if isinstance(one, Group))
-             for node in (tables if isinstance(tables, tuple) else (tables,))]
+    nodes = tables if isinstance(tables, tuple) else (tables,)
+    grouped = [[one for one in nodes_in(node) if isinstance(one, Group)] for node in nodes]
+    names = [node.arguments.get("name") or " on ".join(one.name for one in groups)
+             for node, groups in zip(nodes, grouped, strict=True)]
     whole, parts = surface.whole(), getattr(surface, "parts", ())
     ends = np.cumsum([0, *(round(total(surface.comm, len(part.slots))) for part in parts)])
-    for name, (a, b) in zip(names, pairwise(ends), strict=True):
-        yield {"name": name, "points": int(b - a), "size": float(whole.weights[a:b].sum()),
-               "friction": repr(problem.friction), "places": whole.points[a:b]}
+    for number, (name, groups, (a, b)) in enumerate(zip(names, grouped, pairwise(ends), strict=True)):
+        census = surface.censuses[number] if len(surface.censuses) == len(parts) else None
+        yield {
+            "name": name,
+            "points": int(b - a),
+            "size": float(whole.weights[a:b].sum()),
+            "friction": repr(problem.friction),
+            "nodes": "" if census is None else census.in_words(),
+            "places": whole.points[a:b],
+            "others": {} if census is None else census.places,
+            "sides": _sides(problem.system.space, tags, [one.name for one in groups], whole.points[a:b]),
+        }
+
+
+def _sides(space: Any, tags: Mapping[str, Any], names: Sequence[str], points: Array) -> list[dict[str, Any]]:
+    """Return (name, mean edge h [m], shear modulus G [Pa]) of both sides of a pair, of their facets that are no further
+    from the box of the contact points than an edge; none where a table has no two groups of facets."""
+    sides = [tags[name] for name in names if isinstance(tags.get(name), Facets)]
+    if len(sides) != 2 or len(names) != 2 or not len(points):
+        return []
+    found: list[dict[str, Any]] = []
+    for side in sides:
+        middles, edges, cells = facets_with_cells(space.mesh, side.indices)
+        slack = largest(space.comm, edges.max(initial=0.0))
+        near = np.all((middles >= points.min(axis=0) - slack) & (middles <= points.max(axis=0) + slack), axis=1)
+        shear = space.forms.cellwise("shear")[cells[near]]
+        count, h, G = space.comm.sum(np.array([near.sum(), edges[near].sum(), shear.sum()]))
+        found.append({"name": side.name, "h": h / max(count, 1.0), "G": G / max(count, 1.0)})
+    return found
 
 
 def _records(case: Any, system: Any) -> list[dict[str, Any]]:
@@ -145,19 +178,18 @@ def _record(motion: GroundMotion) -> dict[str, Any]:
             "pga": float(np.abs(motion.scale * record.acceleration).max())}
 
 
-def _periods(problem: ContactProblem, size: float) -> dict[str, Any]:
-    """Undamped natural periods [s] with the contact closed where it is held or has no gap, sticking where it rubs."""
-    system, surface = problem.static_load, problem.surface
-    closed, held, springs = (surface.gap0 <= TOUCHING * size) | surface.bilateral, *np.zeros((2, system.rows))
-    rigid = closed & surface.rigid
-    held[surface.owned[rigid]] = 1.0
-    held[surface.tangents[(surface.tangents >= 0) & closed[:, None] & problem.frictional]] = 1.0
-    springs[surface.owned[closed & ~rigid]] = 1.0 / surface.compliance[closed & ~rigid]
-    algebra, every = system.algebra, np.arange(system.rows)
-    K = algebra.combine([(1.0, system.K), (1.0, algebra.local(every, every, springs, system.rows))])
-    most = sum(body.motions.shape[1] for body in free_motions(problem.system))
-    f, free = natural_frequencies(algebra, *(algebra.block(one, held == 0.0) for one in (K, system.M)), rigid=most)
-    return {"periods": list(1.0 / f), "rigid_motions": free}
+def _modes(case: Any, problem: ContactProblem, most: int) -> dict[str, Any]:
+    """Return natural periods [s] of a problem of up to ``most`` unknowns, and the damping that it has. Collective."""
+    few = problem.system.space.unknowns <= most
+    found: dict[str, Any] = {}
+    if few:
+        modes = first_modes(problem)
+        found = {"periods": list(modes.periods), "rigid_motions": modes.rigid_motions}
+        found["damping_ratios"] = [float(f"{one:.{RATIO_DIGITS}g}") for one in modes.ratios]
+    if "strain_compatible" in case.nodes:  # the system has the damping of other cells only
+        return {**found, "damping_ratios": [], "damping": WORDS["by_curves"]}
+    unknown = WORDS["many"].format(unknown=NOT_COMPUTED, most=most)
+    return {**found, "damping": damping_in_words(problem, unknown="" if few else unknown)}
 
 
 def _defects(model: Mapping[str, Any]) -> Iterator[str]:
@@ -176,6 +208,9 @@ def _warnings(model: Mapping[str, Any]) -> Iterator[str]:
     for one in sorted(model["records"], key=lambda one: float(one["f_95"]))[-1:]:
         coarse = (wave for wave in model["waves"] if one["f_95"] > wave["f_max"])
         yield from (WORDS["coarse"].format(wave=wave, one=one) for wave in coarse)
+    for sides in (one["sides"] for one in model["contact"] if one["sides"]):
+        if sides[1]["h"] > COARSER * sides[0]["h"] and sides[1]["G"] < sides[0]["G"]:
+            yield WORDS["unlike"].format(one=sides[0], two=sides[1])
     if model["run"]["dt"] > next(iter(model.get("periods", ())), np.inf) / STEPS:
         yield WORDS["slow"].format(**model)
 

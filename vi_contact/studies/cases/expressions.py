@@ -44,7 +44,7 @@ class Expression:
         words = " ".join(word[0] for word in _WORD.finditer(self.text))
         try:
             tree = ast.parse(words.replace("^", "**").strip(), mode="eval").body
-        except (SyntaxError, RecursionError, MemoryError):
+        except (SyntaxError, RecursionError, MemoryError):  # MemoryError: the parser's stack is full
             raise InputError("its brackets, signs or commas are not arithmetic") from None
         object.__setattr__(self, "program", tuple(self._program(tree, 0)))
 

@@ -1,8 +1,7 @@
 """Find the case files that ship with the package, and keep in a run folder the copy of the case that made it."""
 
 import re
-import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,16 +9,16 @@ from ...core.algebra import Comm, SerialComm
 from ...core.checks import shown
 from ...core.errors import InputError
 from ...core.files import on_root, write_atomically
+from ...core.own_files import is_own, read_bytes
+from ...run.files.folder import COPY
 from .parsing import nearest
 from .toml_file import read_toml, with_settings
 
 FOLDER = Path(__file__).parent / "builtin"
 STARTERS = Path(__file__).parents[1] / "starters"  # cases to begin with: copied, and then changed
-COPY = "case.toml"
 FORMAT = 1  # of case files
 _SET = "# set "  # before a setting, in the copy
 _FROM = "# its paths are relative to "  # before a folder, in the copy
-_RETIRED = tomllib.loads(Path(__file__).with_name("retired.toml").read_text(encoding="utf-8"))
 
 
 def builtin_cases() -> dict[str, str]:
@@ -54,29 +53,10 @@ def located(case: str) -> Path:
     """Return the file of a case: what ends in ".toml" is a file, all else the name of one that ships."""
     if case.endswith(".toml"):
         return Path(case)
-    refuse_retired([case])
     if case not in builtin_cases():
         raise InputError(f"there is no built-in case {shown(case)}: {nearest(case, builtin_cases())}; a file ends in "
                          ".toml")
     return FOLDER / f"{case}.toml"
-
-
-def refuse_retired(names: Iterable[str]) -> None:
-    """Raise InputError, which names the demo in its place, for a name of a case or table that is retired."""
-    for name in names:
-        if demo := _RETIRED["demos"].get(name):
-            raise InputError(f"the case '{name}' is retired: bash demos/run.sh {demo} computes and draws the same, "
-                             f"with its parameters on top of demos/{demo}.py")
-
-
-def refuse_retired_model(path: Path, model: Any) -> None:
-    """Raise InputError, which names what is in its place, for a table [model] and its settings; None: no such table."""
-    given = model if isinstance(model, dict) else {"type": model}
-    name = "channel" if given.get("type") == "Channel" or path == FOLDER / "channel.toml" else "wall"
-    places = _RETIRED["model"][name]
-    for key in () if model is None else sorted(given, key=lambda one: one == "type") or ["type"]:  # which says least
-        raise InputError(f"{path}: [model] {key} was of the model {name.capitalize()}, which is retired: give "
-                         f"{places.get(key, f'mesh.{key}')} of the case '{name}', {FOLDER / name}.toml")
 
 
 def check_format(path: Path, tables: Mapping[str, Any]) -> None:
@@ -91,13 +71,13 @@ def base_folder(path: Path) -> Path:
     """Return the folder to which relative paths of a case belong: its own, where one is for those that ship, of a copy
     in a run folder that of the case it was made from."""
     own = Path() if path.parent == FOLDER else path.parent
-    told = _marked(path, _FROM) if path.name == COPY else []
+    told = _marked(path.read_bytes(), _FROM) if path.name == COPY else []
     return Path(told[0]) if told else own
 
 
-def _marked(path: Path, mark: str) -> list[str]:
+def _marked(data: bytes, mark: str) -> list[str]:
     """What follows a mark at the beginnings of lines."""
-    lines = path.read_text(encoding="utf-8").splitlines()
+    lines = data.decode("utf-8", "surrogateescape").splitlines()
     return [line.removeprefix(mark) for line in lines if line.startswith(mark)]
 
 
@@ -108,20 +88,32 @@ def keep_copy(path: Path, settings: Sequence[str], folder: Path, comm: Comm) -> 
 
     def copy() -> None:
         text = re.sub(rb"(?m)^# (set|its paths) ", rb"# once \1 ", path.read_bytes())  # of the run this is a copy of
-        if (folder / COPY).resolve() != path.resolve():
+        if not _is_the_copy(path, folder):
             write_atomically(folder / COPY, made.encode() + text)
 
     on_root(comm, copy)
 
 
+def refuse_case_of_others(path: Path, folder: Path) -> None:
+    """Raise InputError for a case file in a run folder that no run has written, and that this run would replace."""
+    if is_own(folder / COPY) and not _is_the_copy(path, folder) and not _marked(read_bytes(folder / COPY), _FROM):
+        raise InputError(f"'{folder / COPY}' is not the copy of a case that a run has made, and this run would replace "
+                         "it: choose another output folder, or move the file")
+
+
+def _is_the_copy(path: Path, folder: Path) -> bool:
+    """Whether a case file is the one in the run folder."""
+    return (folder / COPY).exists() and path.exists() and path.samefile(folder / COPY)
+
+
 def read_copy(folder: Path) -> dict[str, Any]:
     """Return the tables of the case that made a run folder, settings included; empty where no case file did."""
     path = folder / COPY
-    if not path.is_file():
+    if not is_own(path):
         return {}
     return with_settings(read_toml(path), copied_settings(folder))
 
 
 def copied_settings(folder: Path) -> list[str]:
     """Return the settings KEY=VALUE that were made when the case of a run folder ran."""
-    return _marked(folder / COPY, _SET)
+    return _marked(read_bytes(folder / COPY), _SET)

@@ -71,9 +71,12 @@ def _imported(module: str, name: str, spot: Spot) -> Any:
     try:
         return getattr(import_module(module), name)
     except (Exception, SystemExit) as error:  # a module may raise anything
-        why = f"{type(error).__name__}: {_line(error)}"
-        raise spot.inside(f"has the type '{module}:{name}', which Python cannot import ({why}): install "
-                          f"{module.partition('.')[0]}, or set PYTHONPATH to its folder") from error
+        why, package = f"{type(error).__name__}: {_line(error)}", module.partition(".")[0]
+        remedy = f"correct {module}, or the name"
+        if isinstance(error, ModuleNotFoundError):
+            missing = (error.name or package).partition(".")[0]
+            remedy = f"correct the name, install {missing}, or set PYTHONPATH to its folder"
+        raise spot.inside(f"has the type '{module}:{name}', which Python cannot import ({why}): {remedy}") from error
 
 
 def _line(error: BaseException) -> str:

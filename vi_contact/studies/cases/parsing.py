@@ -11,7 +11,7 @@ from typing import Any, Union, get_args, get_origin
 
 from ...core.checks import SHOWN, shown
 from ...core.errors import InputError
-from ...core.lazy import since
+from ...core.renamed import WORDS
 from .own_classes import own_class
 from .quantities import FIELD, HISTORY, Expression, list_node, text_node, unit_of
 from .table_calls import GROUP, Call, Callee, Group, Node, Spot, callee
@@ -76,9 +76,9 @@ def nearest(word: Any, known: Iterable[str]) -> str:
     if not names:
         return "leave it out, as there are none"
     near = get_close_matches(str(word), names, n=3, cutoff=0.5)
-    now = since("words", str(word)).removeprefix(": ")
-    if "it is gone" in now or now.split(" ")[-1] in names:
-        return now
+    renamed = WORDS.get(str(word))
+    if renamed in names:
+        return f"it is now {renamed}"
     return (f"did you mean {' or '.join(near)}? " if near else "") + f"Known: {', '.join(names)}"
 
 

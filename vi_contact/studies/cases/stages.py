@@ -6,7 +6,7 @@ body, and the reactions of released supports as forces. Every stage begins at t 
 run folder, DIR/stages/1_NAME, the last one DIR itself; a static stage a folder of one row. FOLLOWS in it has the
 checksums of what the stages before it left, so that a restart finds out which stages still follow from one another."""
 
-import shutil
+import os
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -17,18 +17,17 @@ import numpy as np
 from ...core.algebra import Array
 from ...core.errors import InputError
 from ...core.files import on_root, write_atomically
+from ...core.own_files import inner_folder, is_own, make_inner_folder, read_text
 from ...core.problem import ContactProblem
 from ...core.state_checks import initial_state
 from ...core.step import State
 from ...fem.communicators import MpiComm
 from ...fem.released_supports import release, removed_support, same_supports, started
 from ...run.files.checkpoint import state_checksum
-from ...run.files.folder import CHECKPOINT, clear, locked, run_folder
+from ...run.files.folder import CHECKPOINT, FOLLOWS, STAGES, clear, is_marked, locked, remove_run, run_folder, take
 from ...run.simulate import Solution, simulate
 from .stage_tables import Stage
 from .vocabulary import Parts
-
-FOLLOWS = "follows.txt"
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,7 @@ def run_stages(case: Any, comm: Any, out: Path | None, *, restart: bool | str | 
                **options: Any) -> Solution:
     """Run those stages of a case that are not reached yet; the solution of the last one. Collective."""
     ranks, stages, reached = MpiComm(comm), case.stages, reached or Reached(0, case.meshed(comm))
-    inner = [Path("stages") / f"{number}_{one.name}" for number, one in enumerate(stages[:-1], start=1)] + [Path()]
+    inner = [Path(STAGES) / f"{number}_{one.name}" for number, one in enumerate(stages[:-1], start=1)] + [Path()]
     source, before = out if restart is True else Path(restart) if restart else None, ""
     with locked(ranks, None if out is None else run_folder(ranks, out)):
         if (place := source or out) is not None:
@@ -69,7 +68,7 @@ def run_stages(case: Any, comm: Any, out: Path | None, *, restart: bool | str | 
             again = None if source is None else source / folder
             found = ranks.bcast(on_root(ranks, partial(_follows, again, before)))
             if before and out is not None and not found:
-                on_root(ranks, partial(_begin, out / folder, before))
+                on_root(ranks, partial(_begin, out, folder, before))
             more = {"restart": again if found or stage is stages[0] and again else False}
             reached, solution = _made(stage, reached, comm, None if out is None else out / folder, options | more)
             place = out or (source if found else None)
@@ -79,29 +78,34 @@ def run_stages(case: Any, comm: Any, out: Path | None, *, restart: bool | str | 
 
 
 def _tidy(out: Path, stages: list[Path], *, keep: bool) -> None:
-    """Clear the folders of a new run, and remove those of stages that are none any more; to ``keep``, refuse these."""
-    old = [one for one in sorted((out / "stages").glob("[0-9]*_*")) if one.relative_to(out) not in stages]
+    """Clear the folders of a new run, and remove the runs in those of stages that are none any more; to ``keep``,
+    refuse these. Folders and files that no run has made are left alone."""
+    place = inner_folder(out, STAGES)
+    names = sorted(os.listdir(place)) if place.is_dir() else []
+    found = [Path(STAGES) / name for name in names if name[0].isdecimal() and "_" in name]
+    old = [one for one in found if one not in stages and is_marked(inner_folder(out, *one.parts))]
     if keep and old:
-        raise InputError(f"'{old[0]}' belongs to no stage of the case: give stages their old names and order, or start "
-                         "a new run, which removes it")
+        raise InputError(f"'{out / old[0]}' belongs to no stage of the case: give stages their old names and order, or "
+                         "start a new run, which removes it")
     for folder in () if keep else old:
-        shutil.rmtree(folder)
+        remove_run(out / folder)
     for folder in () if keep else stages:
-        clear(out / folder)
+        clear(inner_folder(out, *folder.parts))
 
 
 def _follows(folder: Path | None, before: str) -> bool:
     """Return whether there is a checkpoint to continue from, of a stage that began where those before it now end."""
-    if folder is None or not (folder / CHECKPOINT).is_file():
+    if folder is None or not is_own(folder / CHECKPOINT):
         return False
-    return not before or (folder / FOLLOWS).is_file() and (folder / FOLLOWS).read_text("utf-8") == before
+    return not before or is_own(folder / FOLLOWS) and read_text(folder / FOLLOWS) == before
 
 
-def _begin(folder: Path, before: str) -> None:
+def _begin(out: Path, folder: Path, before: str) -> None:
     """Note what a stage that is made anew follows from, in its empty folder."""
-    folder.mkdir(parents=True, exist_ok=True)
-    clear(folder)
-    write_atomically(folder / FOLLOWS, before.encode())
+    place = make_inner_folder(out, *folder.parts)
+    take(place)
+    clear(place)
+    write_atomically(place / FOLLOWS, before.encode())
 
 
 def _made(stage: Stage, reached: Reached, comm: Any, folder: Path | None,

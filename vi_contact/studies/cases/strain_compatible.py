@@ -6,7 +6,7 @@
 Every run is a whole one, in DIR, all stages with the same soil; those before the last one, or all where none ends it,
 are in DIR/iterations/1, 2, …, and DIR/strain_compatible.json has the largest relative change of G or xi after each."""
 
-import shutil
+import os
 from dataclasses import replace
 from functools import partial
 from itertools import count
@@ -15,13 +15,15 @@ from typing import Any
 
 from ...core.errors import InputError, ViContactError
 from ...core.files import on_root, to_json, write_atomically
+from ...core.own_files import inner_folder, make_inner_folder
 from ...fem.communicators import MpiComm
-from ...run.files.folder import LOCK, locked, run_folder
+from ...run.files.folder import locked, move_run, remove_if_empty, remove_run, run_folder
 from ...run.recorders import Contact, Energy
 from ...run.simulate import Solution
 from ...soil.strain_compatible import strain_compatible
-from .table_calls import Call, build, callee
+from .table_calls import Call, build, callee, nodes_in
 
+PLACE = "iterations"  # in the run folder
 CALL = replace(callee(strain_compatible, only=("curves", "ratio", "tolerance", "most"), given=()), function=dict)
 
 
@@ -46,7 +48,7 @@ def iterate(case: Any, comm: Any, folder: Path | None, *, restart: bool | str | 
 
     def run(material: Any, strain: Any) -> Any:
         if folder is not None:
-            on_root(ranks, partial(_set_aside, folder / "iterations", next(numbers)))
+            on_root(ranks, partial(_set_aside, folder, next(numbers)))
         stages = tuple(replace(stage, case=softened(stage.case, material, *[strain][stage is not case.stages[-1] :]))
                        for stage in case.stages)
         return replace(softened(case, material, strain), stages=stages).run(comm, out=folder, **options)
@@ -58,7 +60,7 @@ def iterate(case: Any, comm: Any, folder: Path | None, *, restart: bool | str | 
             found = strain_compatible(mesh, material, run=run, **asked)
         except ViContactError:  # DIR shall not look like the run that was asked for
             if folder is not None and (number := next(numbers)):
-                on_root(ranks, partial(_set_aside, folder / "iterations", number))
+                on_root(ranks, partial(_set_aside, folder, number))
             raise
         if folder is not None:
             told = to_json({"changes": found.changes}).encode()
@@ -66,12 +68,26 @@ def iterate(case: Any, comm: Any, folder: Path | None, *, restart: bool | str | 
         return found.solution
 
 
-def _set_aside(place: Path, number: int) -> None:
-    """Move the run beside this folder into it; before the first run, remove what is there of an earlier time."""
+def with_known_damping(system: Call) -> Call:
+    """Return the call of [system] without its damping where no material has a ratio: curves give them, run by run."""
+    ratios = [one for one in nodes_in(system) if isinstance(one, Call) and one.arguments.get("xi")]
+    known = {name: node for name, node in system.arguments.items() if name != "damping" or ratios}
+    return replace(system, arguments=known)
+
+
+def _set_aside(folder: Path, number: int) -> None:
+    """Move the run in this folder into one inside of it; before the first run, remove runs of an earlier time there.
+
+    Files of others stay where they are."""
     if number == 0:
-        shutil.rmtree(place, ignore_errors=True)
-        return
-    (place / str(number)).mkdir(parents=True)
-    for path in place.parent.iterdir():
-        if path.name not in (place.name, LOCK):
-            path.replace(place / str(number) / path.name)
+        _remove_earlier(inner_folder(folder, PLACE))
+    else:
+        move_run(folder, make_inner_folder(folder, PLACE, str(number)))
+
+
+def _remove_earlier(place: Path) -> None:
+    """Remove the runs in the folders 1, 2, … of this one."""
+    for name in sorted(os.listdir(place)) if place.is_dir() else ():
+        if name.isdecimal():
+            remove_run(inner_folder(place, name))
+    remove_if_empty(place)

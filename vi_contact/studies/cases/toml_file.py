@@ -39,8 +39,8 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         raise InputError(f"{path}: {error}; correct the TOML there") from None
     except RecursionError:
         raise InputError(f"{path}: {_TOO_DEEP}") from None
-    except ValueError:  # a number of more digits than Python reads
-        raise InputError(f"{path}: {_TOO_LONG}") from None
+    except ValueError as error:
+        raise InputError(f"{path}: {_value_error(error)}") from None
     return checked(tables, str(path))
 
 
@@ -94,9 +94,16 @@ def _value(text: str) -> Any:
         found = tomllib.loads(f"value = {text}")
     except tomllib.TOMLDecodeError:
         return text
-    except (RecursionError, ValueError):
-        raise InputError(f"setting {shown(text)} is nested too deep, or {_TOO_LONG}") from None
+    except RecursionError:
+        raise InputError(f"setting {shown(text)} {_TOO_DEEP}") from None
+    except ValueError as error:
+        raise InputError(f"setting {shown(text)} {_value_error(error)}") from None
     return found["value"] if set(found) == {"value"} else text
+
+
+def _value_error(error: ValueError) -> str:
+    """What Python says of a value that is TOML; of a number of more digits than it reads, what helps."""
+    return _TOO_LONG if "digits" in str(error) else f"holds a value that cannot be read ({error}): correct it"
 
 
 def _set(there: Any, way: list[str], value: Any, setting: str) -> None:

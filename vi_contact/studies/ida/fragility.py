@@ -21,6 +21,7 @@ from scipy.optimize import minimize
 from scipy.special import log_ndtr, ndtr
 
 from ...core.algebra import Array
+from ...core.arguments import checked
 from ...core.errors import InputError
 from .measures import Demand, demand
 
@@ -85,8 +86,12 @@ class Fragility:
         return np.asarray(ndtr(z + np.outer([-1.0, 0.0, 1.0], size)))
 
 
+@checked
 def fragility_curve(brackets: Array) -> Fragility:
     """Return the fragility of brackets (records, 2). InputError where they do not tell median and dispersion."""
+    brackets = np.asarray(brackets, dtype=float)
+    if brackets.ndim != 2 or brackets.shape[1] != 2:
+        raise InputError(f"fragility_curve: brackets has shape {brackets.shape}; give two intensities for each record")
     low, high = np.max(brackets[:, 0], initial=0.0), np.min(brackets[:, 1], initial=math.inf)
     if low <= high * (1.0 + SAME):
         raise InputError(f"{np.isfinite(brackets[:, 1]).sum()} of {len(brackets)} records pass the limit, maybe all at "

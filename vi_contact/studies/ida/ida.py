@@ -7,6 +7,7 @@ row."""
 
 import hashlib
 import math
+import os
 import time
 import tomllib
 from collections.abc import Callable, Sequence
@@ -19,8 +20,10 @@ from pathlib import Path
 import numpy as np
 
 from ...core.algebra import Array, SerialComm
+from ...core.arguments import check_fields, checked
 from ...core.errors import InputError
 from ...core.files import to_json, write_atomically, write_csv
+from ...core.own_files import inner_folder, is_own
 from ...fem.mesh import alone
 from ...plots.studies import DemandPanel, plot_fragility, plot_ida
 from ...run.files.folder import LOCK, locked
@@ -62,6 +65,7 @@ class IDA:
     limits: Sequence[str] = ()
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if bool(self.scales) == bool(self.levels):
             raise InputError("give either scales or levels of the intensity, at least one value")
         values = (*self.scales, *self.levels)
@@ -105,6 +109,7 @@ class IDA:
         return OneRun(self.case, shaking, factor, folder)
 
 
+@checked
 def run_ida(study: IDA, out: str | Path, *, jobs: int = 1, part: tuple[int, int] = (1, 1), launch: Sequence[str] = (),
             say: Callable[[str], None] = print, wall_time: str | None = None) -> list[Row]:
     """Make the runs that have not finished yet, and the table and figure of all that are in ``out``. Return its rows.
@@ -173,7 +178,15 @@ def _claim(study: IDA, out: Path) -> None:
     case = _digest(to_json(study.case.tables).encode())
     records = {one.name: [_digest(path.read_bytes()) for path in one.files if path.is_file()] for one in study.shakings}
     old = read_json(out / STUDY)
-    if old is not None:
+    if old is None:
+        if is_own(out / STUDY):
+            raise InputError(f"'{out / STUDY}' is damaged, or of no study: restore it, choose another folder, or move "
+                             "this one away")
+        for name in (TABLE, COLUMNS, FIGURE, FRAGILITY):
+            if os.path.lexists(out / name):
+                raise InputError(f"'{out / name}' is not of a study of vi_contact, which would replace it (there is no "
+                                 f"whole {STUDY} in '{out}'): choose another folder, or move the file")
+    else:
         kept = old.get("records")
         if not isinstance(kept, dict) or "case" not in old:
             raise InputError(f"'{out / STUDY}' is damaged: restore it, choose another folder, or delete this one")
@@ -195,7 +208,7 @@ def _digest(data: bytes) -> str:
 
 def _tell(study: IDA, out: Path, *, draw: bool = False) -> list[Row]:
     """Writes table and units of all runs in the folder, and draws the figure."""
-    rows, units = _tabulated(study.case, out / RUNS, study.measure, study.wanted)
+    rows, units = _tabulated(study.case, inner_folder(out, RUNS), study.measure, study.wanted)
     described = {name: {"unit": unit, "meaning": meaning} for name, (unit, meaning) in units.items()}
     write_csv(out / TABLE, list(units), (list(row.values()) for row in rows))
     write_atomically(out / COLUMNS, to_json(described).encode())
@@ -208,7 +221,9 @@ def _tell(study: IDA, out: Path, *, draw: bool = False) -> list[Row]:
 def _tabulated(case: Case, out: Path, measure: Intensity, demands: Sequence[Demand]) -> tuple[list[Row], Units]:
     """Return (rows by record and scale, column -> (unit, meaning)) of all runs in the folder that have ended,
     None for what a run has not measured. InputError when a finished run has no such column."""
-    found = [(path.parent, row) for path in out.glob(f"*/{ROW}") if (row := read_row(path)) is not None]
+    folders = [out / name for name in sorted(os.listdir(out))] if out.is_dir() else []
+    own = [one for one in folders if one.is_dir() and not one.is_symlink()]
+    found = [(one, row) for one in own if (row := read_row(one / ROW)) is not None]
     found.sort(key=lambda one: (one[1]["record"], math.inf if one[1]["scale"] is None else one[1]["scale"]))
     units: Units = _COLUMNS["first"] | {measure.name: (measure.unit, f"{measure.meaning} of the scaled motion")}
     units |= {one.name: ("", one.meaning) for one in demands} | _COLUMNS["last"]

@@ -48,15 +48,20 @@ _MEASURES = {one.name: one for one in (
 )}
 
 
+def _seconds(text: str) -> float:
+    """The number in a text; zero where there is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return 0.0
+
+
 def intensity(text: str, first_period: Callable[[], float] | None = None) -> Intensity:
     """Return the measure of a word: pga, pgv, pgd, arias, cav, housner, or sa:T (pseudo-acceleration at T s, 5 %),
     "sa:T1" at the period that ``first_period`` finds [s]."""
     word, _, period = text.partition(":")
     if word == "sa":
-        try:
-            seconds = first_period() if period == "T1" and first_period is not None else float(period)
-        except ValueError:
-            seconds = 0.0
+        seconds = first_period() if period == "T1" and first_period is not None else _seconds(period)
         if not 0.0 < seconds < np.inf:
             raise InputError(f"intensity '{text}': give the period after the colon in seconds, such as sa:0.5")
         meaning = f"pseudo-acceleration at {seconds:g} s, 5 % damping"

@@ -15,9 +15,10 @@ from queue import SimpleQueue
 from typing import Any
 
 from ...core.errors import InputError, OutOfTime
-from ...run.files.folder import CHECKPOINT, SUMMARY
+from ...core.own_files import is_own, remove
+from ...run.files.folder import CHECKPOINT, SUMMARY, is_marked
 from ...run.wall_time import WallTime
-from .runs import ROW, OneRun, Row
+from .runs import ROW, OneRun, Row, read_row
 
 TOGETHER = 8  # runs in a process: so many share every pass over a matrix
 ATTEMPTS = 5  # of runs that end without a word: Gmsh 4.8, asked before it is initialised, does that now and then
@@ -31,7 +32,7 @@ def command(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> lis
     """Return the command of these runs, each from its checkpoint if there is one; OutOfTime without wall time left."""
     case, folders = runs[0].case, [one.folder for one in runs]
     asked = {"case": str(case.path), "allow": case.allowed, "settings": [one.settings for one in runs],
-             "folders": [*map(str, folders)], "restart": [(one / CHECKPOINT).is_file() for one in folders],
+             "folders": [*map(str, folders)], "restart": [is_own(one / CHECKPOINT) for one in folders],
              "wall_time": None}
     if end.text is not None:
         if (left := int(end.left - ASIDE)) < 1:
@@ -46,14 +47,16 @@ def started(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> sub
     way = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
     environment = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"} | dict(os.environ) | {"PYTHONPATH": way}
     words = command(runs, launch, end)
-    for name in (ROW, SUMMARY):
-        for one in runs:
-            (one.folder / name).unlink(missing_ok=True)
+    for one in runs:
+        if read_row(one.folder / ROW) is not None:
+            remove(one.folder / ROW)
+        if is_marked(one.folder):
+            remove(one.folder / SUMMARY)
     try:
         return subprocess.Popen(words, env=environment, text=True, encoding="utf-8", errors="replace",
                                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                                 start_new_session=True)
-    except OSError as error:
+    except (FileNotFoundError, PermissionError) as error:  # of a program; others tell of the machine
         raise InputError(f"'{error.filename}' cannot be started ({error.strerror}): correct --launch") from None
 
 
@@ -125,7 +128,7 @@ def executed(runs: Sequence[OneRun], jobs: int, launch: Sequence[str], end: Wall
         try:
             for row in processes.rows(batch):
                 told.put(row)
-        except BaseException as error:
+        except BaseException as error:  # of any kind: it is raised again by the thread that waits for this one
             told.put(error)
 
     wrong = [run for run in runs if run.wrong]

@@ -7,8 +7,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from ...core.arguments import checked
 from ...core.errors import InputError
 from ...core.files import to_json, write_atomically
+from ...core.own_files import inner_folder, make_inner_folder
 from ...ground_motion.excitation import GroundMotion
 from ...ground_motion.processing import scaled
 from ...ground_motion.record import Record
@@ -67,6 +69,7 @@ def ground_motions(case: Case) -> list[tuple[str, Mapping[str, Any]]]:
     return found
 
 
+@checked
 def record_set(word: str) -> list[list[str]]:
     """Return the files of each record of "H", "H,V", a folder (its AT2 files, if it has any, else all) or "@LIST".
     A LIST is a file with "H" or "H,V" in each line, relative to its folder. InputError for others."""
@@ -116,6 +119,7 @@ class OneRun:
 
     def done(self) -> Row | None:
         """Return the row of a run that has finished, or None."""
+        inner_folder(self.folder.parents[1], self.folder.parent.name, self.folder.name)
         row = read_row(self.folder / ROW)
         if row is None and (read_json(self.folder / SUMMARY) or {}).get("status") == "finished":
             row = self.keep("", 0)  # it outlived the process that had started it
@@ -135,7 +139,7 @@ class OneRun:
                "status": "finished" if finished else "failed", "reason": "" if finished else _sentence(said, code),
                "certificate": facts.get("worst_certificate"), "energy_created": facts.get("energy_created"),
                "steps": facts.get("steps")}
-        self.folder.mkdir(parents=True, exist_ok=True)
+        make_inner_folder(self.folder.parents[1], self.folder.parent.name, self.folder.name)
         if not finished:
             write_atomically(self.folder / SAID, said.encode())
         write_atomically(self.folder / ROW, to_json(row).encode())

@@ -1,0 +1,96 @@
+"""Read HDF5 files of run folders: numbers that are stored in that very file, and no more than the memory can hold.
+
+An HDF5 file may send its reader on: by a soft or external link, by a virtual data set, by external storage. It may
+announce an array that no memory holds. Nothing of this is followed. Writing is in ``core.files``."""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from .errors import InputError
+from .own_files import open_to_read
+
+DENSEST = 1100  # bytes in memory for one on disk: zeros that are packed
+_NUMBERS = "fiub"  # kinds of numpy: floats, whole numbers, truth values
+
+
+class StoredGroup:
+    """Hold a group of an HDF5 file that is open to be read: ``group[name]`` is a group or a data set of numbers.
+
+    KeyError for a name that is not there, InputError for what does not lie in this file."""
+
+    def __init__(self, path: Path, group: Any, size: int) -> None:
+        self._path, self._group, self._size = path, group, size
+
+    def __getitem__(self, name: str) -> Any:
+        found: Any = self
+        for part in filter(None, name.split("/")):
+            if not isinstance(found, StoredGroup):
+                raise KeyError(name)
+            found = found._member(part)
+        return found
+
+    def _member(self, name: str) -> Any:
+        """A group or data set that lies here; its link is looked at before it is followed."""
+        import h5py  # late: no step needs it
+
+        link = self._group.get(name, getlink=True)
+        if link is None:
+            raise KeyError(name)
+        if not isinstance(link, h5py.HardLink):
+            raise self._wrong(name, "lies in another file, or elsewhere in this one")
+        item = self._group[name]
+        if isinstance(item, h5py.Group):
+            return StoredGroup(self._path, item, self._size)
+        if not isinstance(item, h5py.Dataset):
+            raise self._wrong(name, "is no array of numbers of this file")
+        if item.external is not None or item.is_virtual:
+            raise self._wrong(name, "lies in another file")
+        if item.dtype.kind not in _NUMBERS or item.nbytes > DENSEST * self._size:
+            raise self._wrong(name, "is no array of numbers of this file")
+        return item
+
+    def _wrong(self, name: str, what: str) -> InputError:
+        return InputError(f"'{self._path}' is damaged: {self._group.name.rstrip('/')}/{name} {what}; restore it, or "
+                          "run again")
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._group
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._group)
+
+    def copy_to(self, target: Any, name: str) -> None:
+        """Copy all data sets of this group into the group ``name`` of a file that is written."""
+        for one in self:
+            self[one]  # refuses what lies elsewhere
+        self._group.copy(self._group, target, name=name)
+
+
+class StoredFile(StoredGroup):
+    """Open an HDF5 file of a run folder to be read. OSError when it is none, InputError when it is a link."""
+
+    def __init__(self, path: Path) -> None:
+        import h5py  # late: no step needs it
+
+        with open_to_read(path) as own:  # a regular file; HDF5 opens it once more by its name
+            status = os.fstat(own.fileno())
+            self._file = h5py.File(path, "r")
+            found = os.fstat(self._file.id.get_vfd_handle())
+            if not os.path.samestat(status, found):
+                self._file.close()
+                raise OSError(None, "it was replaced while it was opened", str(path))
+        super().__init__(path, self._file, status.st_size)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def __enter__(self) -> "StoredFile":
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.close()

@@ -1,0 +1,13 @@
+"""Hold the names that have changed since version 0.2.0, so that old programs are told the new ones.
+
+A name stays here for the versions that docs/reference/releases.md promises. ``core.lazy`` gives the thing of the new
+name with a DeprecationWarning, and case files name the new word.
+"""
+
+from __future__ import annotations
+
+# Package -> old public name -> dotted path of the new one.
+NAMES: dict[str, dict[str, str]] = {}
+
+# Old word of a case file or an option -> new word.
+WORDS: dict[str, str] = {}

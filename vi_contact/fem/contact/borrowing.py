@@ -1,0 +1,48 @@
+"""Say from which neighbours a node of a contact boundary without a condition takes its pressure in pictures and fields.
+
+Such a node is held, shared by both sides, or hardly covered: no reaction of its own tells the pressure there. The mean
+of its neighbours on the facets around it is right up to the size of a facet, where zero is wrong by all of it."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from ...core.algebra import Array, Indices, from_each
+
+
+@dataclass(frozen=True, eq=False)
+class Borrowed:
+    """Hold nodes of this rank that take the values of others: their numbers (t,), the numbers (q,) of the lenders, of
+    all ranks, and shares (t, q) with rows that sum to one."""
+
+    numbers: Indices
+    lenders: Indices
+    shares: sp.csr_matrix
+
+    def values(self, space: Any, nodal: Array) -> Array:
+        """Return the values (t, c) that the nodes take of owned nodal values (k, c). Collective."""
+        return np.asarray(self.shares @ space.at_nodes(self.lenders, nodal))
+
+
+def borrowed(space: Any, facets: Any, without: Indices, having: Indices) -> Borrowed | None:
+    """Return what nodes ``without`` a pressure of their own borrow of those ``having`` one; None where there are none
+    of either. Both are numbers of nodes of any rank, as this rank knows them. Collective."""
+    asking, lending = (np.unique(np.concatenate(from_each(space.comm, one))) for one in (without, having))
+    asking = np.setdiff1d(asking, lending)
+    rows = space.corners_of_facets(facets.indices)
+    if not (len(asking) and len(lending)):
+        return None
+    v = rows.shape[1]
+    pairs = np.column_stack([np.repeat(rows, v, axis=1).ravel(), np.tile(rows, v).ravel()])
+    pairs = pairs[np.isin(pairs[:, 0], asking) & np.isin(pairs[:, 1], lending)]
+    pairs = np.unique(np.concatenate(from_each(space.comm, pairs)), axis=0)
+    pairs = pairs[space.blocks_of(pairs[:, 0]) >= 0] if len(pairs) else pairs
+    numbers, row = np.unique(pairs[:, 0], return_inverse=True)
+    shares = sp.csr_matrix(
+        (np.ones(len(pairs)), (row.ravel(), np.searchsorted(lending, pairs[:, 1]))),
+        shape=(len(numbers), len(lending)),
+    )
+    count = np.asarray(shares.sum(axis=1)).ravel()
+    return Borrowed(numbers, lending, sp.csr_matrix(sp.diags(1.0 / count) @ shares if len(count) else shares))

@@ -1,0 +1,59 @@
+"""Count the nodes of a contact boundary by what became of them: the `Census` of a contact surface."""
+
+import logging
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ...core.algebra import Array, Comm, Mask, from_each, total
+from ...core.census import Census
+from .nodes import Nodes
+
+log = logging.getLogger(__name__)
+
+
+def census_on_ranks(
+    comm: Comm, name: str, nodes: Nodes, kinds: Mapping[str, Mask], points: int
+) -> Census:
+    """Return the census of a boundary whose ``nodes`` are those of this rank only. Collective.
+
+    Args:
+        kinds: kind -> mask (k,) of the nodes of this rank that are of this kind.
+        points: number of contact conditions on this rank.
+    """
+    return Census(
+        name=name,
+        nodes=round(total(comm, len(nodes.numbers))),
+        points=round(total(comm, points)),
+        places=_filled({kind: _gathered(comm, nodes.pick(mask)) for kind, mask in kinds.items()}),
+    )
+
+
+def census_of_all(name: str, nodes: Nodes, kinds: Mapping[str, Mask], points: int) -> Census:
+    """Return the census of a boundary whose ``nodes``, ordered by number, every rank has.
+
+    Args:
+        kinds: kind -> mask (k,) of the nodes that are of this kind.
+        points: number of contact conditions on all ranks.
+    """
+    places = {kind: nodes.points[mask] for kind, mask in kinds.items()}
+    return Census(name, len(nodes.numbers), points, _filled(places))
+
+
+def tell(comm: Comm, census: Census) -> None:
+    """Log, on rank 0, what became of the nodes of a boundary, where not all are plain contact points."""
+    if census.places and comm.rank == 0:
+        log.info("contact on '%s': %s", census.name, census.in_words())
+
+
+def _gathered(comm: Comm, nodes: Nodes) -> Array:
+    """Coordinates of the nodes of all ranks, by their numbers. Collective."""
+    parts: Any = from_each(comm, (nodes.numbers, nodes.points))
+    numbers, points = (np.concatenate([part[i] for part in parts]) for i in range(2))
+    return np.asarray(points[np.argsort(numbers)])
+
+
+def _filled(places: Mapping[str, Array]) -> dict[str, Array]:
+    """The kinds of which there are nodes."""
+    return {kind: points for kind, points in places.items() if len(points)}

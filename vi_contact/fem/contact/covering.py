@@ -1,0 +1,148 @@
+"""Let whole facets carry what is covered of a facet beside them, at the edge of what side 1 has in front of it.
+
+A node t of side 1 beyond that edge has but a share of its facets in front of side 2. A multiplier of its own would be
+that of a sliver: its reaction over its weight is no pressure of the interface, and its condition asks for the gap at
+t, where there is none. So t has no condition if little of its facets is covered. Displacements and pressures of the
+nearest whole facet, with nodes k, are carried on linearly to t instead:
+
+    u(t) = sum_k E_tk u_k,   sum_k E_tk = 1,   sum_k E_tk x_k = x_t
+
+and on the partly covered facet these nodes get D_k = sum_t E_tk D_t and the functions
+
+    psi_k = D_k b(x)ᵀ (∫ b bᵀ)⁻¹ b(x_k),   b = (1, x) or (1, x, y),   ∫ over its part in front of side 2
+
+so that sum_k psi_k = 1, ∫ psi_k = D_k and ∫ psi_k x = D_k x_k still: a uniform pressure passes through exactly, forces
+and moments of both sides are in balance, and every pressure is one over a patch that is covered. Badia, Verdugo and
+Martín, Comput. Methods Appl. Mech. Engrg. 336 (2018), 533-553 carry displacements on in the same way."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from ...core.algebra import Array, Indices, Mask
+
+LEAST_SHARE = 0.5  # of a node's facets beyond the edge, weighted with its function: less of it is carried (CHOSEN)
+LEAST_COVERED = 1e-3  # of a facet: less is no contact where no other facet carries it
+LEAST_WEIGHT = 0.25  # of the weight that a node has without what it carries
+
+
+@dataclass(frozen=True, eq=False)
+class Covered:
+    """Hold what is covered of the k facets of side 1 in front of which something lies.
+
+    Attributes:
+        facets: (k, v) their nodes; middles: (k, d) middles of their covered parts.
+        weights, full: (k, v) integrals of the functions of their nodes, over the covered part and over all of it.
+        inside: (k, v) nodes that are in front of side 2 themselves; parts: (k,) covered shares of the facets.
+        common: (m,) nodes of side 1 that are nodes of side 2 too."""
+
+    facets: Indices
+    middles: Array
+    weights: Array
+    full: Array
+    inside: Mask
+    parts: Array
+    common: Mask
+
+    def sums(self, values: Array) -> Array:
+        """Return sums (m,) at the nodes of side 1 of values (k, v) at the nodes of facets."""
+        found = np.zeros(len(self.common))
+        np.add.at(found, self.facets, values)
+        return found
+
+    @property
+    def share(self) -> Array:
+        """Return the covered share (m,) of the facets of each node beyond the edge, 1 for all other nodes."""
+        full = self.sums(self.full)
+        share = self.sums(self.weights) / np.where(full > 0.0, full, 1.0)
+        beyond = (full > 0.0) & (self.sums(self.inside.astype(float)) == 0.0)
+        return np.asarray(np.where(beyond, share, 1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """Say which nodes (m,) of side 1 are carried, by the nodes (k, v) of which facet on each covered facet, and which
+    facets (k,) are used at all."""
+
+    nodes: Mask
+    by: Indices
+    used: Mask
+
+
+def carried_by(covered: Covered, asked: Mask) -> Carried:
+    """Return the nodes that are carried of those ``asked`` for (m,), by the facets whose middle is the nearest.
+
+    None is where there is no whole facet to carry them, and none of a facet at a weld."""
+    facets, common = covered.facets, covered.common
+    nodes = asked.copy()
+    nodes[facets[common[facets].any(axis=1)]] = False
+    inside = covered.sums(covered.inside.astype(float)) > 0.0
+    apart = ~(nodes | common)[facets].any(axis=1)  # facets that carry themselves
+    within = apart & inside[facets].all(axis=1)
+    whole = np.flatnonzero(within if within.any() else apart)
+    some = np.flatnonzero(nodes[facets].any(axis=1))
+    if not len(whole):
+        nodes, some = np.zeros_like(nodes), some[:0]
+    alone = (covered.share < LEAST_SHARE) & ~nodes
+    used = (covered.parts > LEAST_COVERED) | ~alone[facets].any(axis=1)
+    if not len(some):
+        return Carried(nodes, facets, used)
+    from scipy.spatial import cKDTree  # late: it takes a while
+
+    by = facets.copy()
+    by[some] = facets[whole[cKDTree(covered.middles[whole]).query(covered.middles[some])[1]]]
+    return Carried(nodes, by, used)
+
+
+def extrapolation(corners: Array, points: Array) -> Array:
+    """Return E (k, p, v): what each of the corners (k, v, c) of facets counts at points (k, p, c), linearly."""
+    middle = corners.mean(axis=1, keepdims=True)
+    size = np.abs(corners - middle).max(axis=(1, 2))[:, None, None]
+    known, wanted = (
+        np.concatenate([np.ones((*x.shape[:2], 1)), (x - middle) / size], axis=2) for x in (corners, points)
+    )
+    return np.asarray(wanted @ np.linalg.pinv(known))
+
+
+def overloaded(covered: Covered, carried: Carried, weights: Array) -> Mask:
+    """Return the carried nodes (m,) that leave too little of its own weight to a node which carries them: the one with
+    the largest weight for each of these. ``weights``: (m,) with what is carried [m], [m²].
+
+    A linear function that is positive at one node of a facet and beyond is negative at the other: where much is
+    carried far this one would be pulled."""
+    own = covered.sums(covered.weights)
+    light = ~(carried.nodes | covered.common) & (own > 0.0) & (weights < LEAST_WEIGHT * own)
+    found = np.zeros(len(own), dtype=bool)
+    for node in np.flatnonzero(light):
+        around = covered.facets[(carried.by == node).any(axis=1)].ravel()
+        around = around[carried.nodes[around]]
+        if len(around):
+            found[around[np.argmax(own[around])]] = True
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Coupled:
+    """Hold D (m,), M (m, n), the size (m,) [m] of the largest facet of each node, the carried nodes (m,), which have
+    no row in either, and the covered share (m,) of the facets of each node."""
+
+    D: Array
+    M: sp.csr_matrix
+    longest: Array
+    carried: Mask
+    share: Array
+
+
+def coupled(covered: Covered, assembled: Callable[[Carried], tuple[Array, sp.csr_matrix, Array]]) -> Coupled:
+    """Return the coupling in which whole facets carry the nodes that have little covered, as far as they can."""
+    share = covered.share
+    asked = share < LEAST_SHARE
+    while True:
+        carried = carried_by(covered, asked)
+        D, M, longest = assembled(carried)
+        too_much = overloaded(covered, carried, D)
+        if not too_much.any():
+            return Coupled(D, M, longest, carried.nodes, share)
+        asked = carried.nodes & ~too_much
