@@ -37,7 +37,7 @@ _STATION = re.compile(r"\bstat(?:io)?n\s*+(?:no|id)[.:](.*+)", re.IGNORECASE)
 _CODE = re.compile(r"\bcode:(.*+)", re.IGNORECASE)
 _EVENT = re.compile(r"re?co?rd of", re.IGNORECASE)
 _END = re.compile(r"^\s*+(?:end-of-data|/&)", re.IGNORECASE)
-_ROW = re.compile(rf"(?:\s*+{NUMBER})++\s*+")
+_VALUE = re.compile(NUMBER)
 _NUMBERS = re.compile(r"[\s\d-]++")
 _UNKNOWN = re.compile(rf"unknown/unspecified:\s*+{NUMBER}[,\s]++({NUMBER})", re.IGNORECASE)
 
@@ -148,7 +148,7 @@ def _samples(text: TextFile, block: Block) -> tuple[list[float], list[int]]:
         values += row
         lines += [index] * len(row)
     after = text.lines[block.end] if block.end < len(text.lines) else ""
-    if after.strip() and _ROW.fullmatch(after) and len(after.rstrip()) % block.width == 0:
+    if after.strip() and not _VALUE.sub("", after).strip() and len(after.rstrip()) % block.width == 0:
         raise InputError(f"{text.at(block.line)}: {block.count:.12g} samples are announced but line {block.end + 1} "
                          "holds more of them; get the complete file")
     return values, lines
