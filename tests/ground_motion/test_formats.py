@@ -69,6 +69,17 @@ def test_csmip_of_1983_and_its_first_volume(tmp_path):
     assert record.station == "58000" and record.notes[0].startswith("Uncorrected accelerogram")
 
 
+def test_csmip_units_of_the_peak_where_the_samples_have_it(tmp_path):
+    """Older files state units with the peak only; a peak of other samples says nothing about these."""
+    bare = csmip(unit="(8f10.3)")
+    path = write(tmp_path, bare.replace("=    27.114    cm/sec/sec  at", "=  -250.750  CMS/SEC/SEC AT"))
+    record = read_record(path)
+    assert np.allclose(record.acceleration, 0.01 * VALUES, rtol=1e-14, atol=0.0)
+    assert record.units == "cm/s2" and record.units_from == "header, line 9"
+    refused(path, "line 9", "states its units as cm/s2", units="g")
+    refused(write(tmp_path, bare), "does not state its units; pass units=")
+
+
 def test_csmip_several_channels_are_chosen_by_number(tmp_path):
     path = write(tmp_path, csmip(1, "90 Deg") + csmip(2, "UP", -VALUES) + csmip(3, "360 Deg", 2.0 * VALUES))
     refused(path, "3 channels (1: 90 Deg, 2: UP, 3: 360 Deg)", "pass channel=")

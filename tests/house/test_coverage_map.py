@@ -52,7 +52,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "fem/test_surface.py": "fem.contact.faces",
     "fem/test_ties.py": "soil.soil_column",
     "ground_motion/test_columns.py":
-        "ground_motion.formats.columns ground_motion.formats.gaps ground_motion.formats.headings "
+        "ground_motion.formats.gaps ground_motion.formats.headings "
         "ground_motion.formats.statements ground_motion.formats.times",
     "ground_motion/test_formats.py": "ground_motion.formats.at2 ground_motion.formats.writer",
     "ground_motion/test_networks.py":

@@ -498,3 +498,17 @@ def test_schemes_and_solvers_have_one_vocabulary() -> None:
 def test_every_example_is_in_order() -> None:
     for path in sorted((ROOT / "demos" / "cases").glob("*.toml")):
         assert read_case(path).nodes
+
+
+def test_a_component_of_a_record_by_its_name(shared_tmp: Path) -> None:
+    """channel takes a number or a name in case files too; without it the components are listed."""
+    rows = "".join(f"{0.01 * k:.2f} {np.sin(0.3 * k):.6f} {2.0 * np.sin(0.3 * k):.6f}\n" for k in range(11))
+    write(shared_tmp, "Time [s] North [g] East [g]\n" + rows, "motion.txt")
+    plain = 'record = {path = "motion.txt", units = "g", processing = {pga = 4.0}}'
+    for said, factor in (('"east"', 2.0), ("2", 2.0), ('"North"', 1.0)):
+        chosen = f'record = {{path = "motion.txt", channel = {said}}}'
+        case = read_case(write(shared_tmp, PAIR.replace(plain, chosen)))
+        peak = np.max(np.abs(case.problem(COMM).excitation[0].record.acceleration))
+        assert peak == pytest.approx(factor * 9.80665 * np.round(np.sin(1.5), 6), rel=1e-5)
+    with pytest.raises(vc.InputError, match="1: North, 2: East"):
+        read_case(write(shared_tmp, PAIR.replace(plain, 'record = {path = "motion.txt"}'))).problem(COMM)

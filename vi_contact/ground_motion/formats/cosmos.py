@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from ...core.errors import InputError
-from ..record import Record
+from ..record import Record, known_units
 from .statements import agreed
 from .text import NUMBER, TextFile
 
@@ -28,6 +28,7 @@ _UNITS = (re.compile(r"units?\s*+(?:[=:]|\bof\b)\s*+(g/10|[^,()\s]++)", re.IGNOR
 _SPACED = re.compile(rf"equally[- ]spaced\s++(?:at|intervals\s++of)\s++({NUMBER})\s*+sec", re.IGNORECASE)
 _UNEVEN = re.compile(r"unequally", re.IGNORECASE)
 _RATE = re.compile(rf"\bat\s++({NUMBER})\s*+pts/sec", re.IGNORECASE)
+_PEAK = re.compile(rf"\bpeak\s++accel\w*+\s*+=\s*+({NUMBER})\s*+(\S++)\s++at\b", re.IGNORECASE)
 _REALS = re.compile(r"^\s*+(\d++)\s++real-header values follow on\s++(\d++)\s++lines", re.IGNORECASE)
 _CHANNEL = re.compile(r"\bchan?:?\s++([\w?]++):([^(]*+)", re.IGNORECASE)
 _COMPONENT = re.compile(r"^\s*+COMP\s++(\S++)")
@@ -36,7 +37,7 @@ _STATION = re.compile(r"\bstat(?:io)?n\s*+(?:no|id)[.:](.*+)", re.IGNORECASE)
 _CODE = re.compile(r"\bcode:(.*+)", re.IGNORECASE)
 _EVENT = re.compile(r"re?co?rd of", re.IGNORECASE)
 _END = re.compile(r"^\s*+(?:end-of-data|/&)", re.IGNORECASE)
-_ROW = re.compile(rf"(?:\s*+{NUMBER})++\s*+")
+_VALUE = re.compile(NUMBER)
 _NUMBERS = re.compile(r"[\s\d-]++")
 _UNKNOWN = re.compile(rf"unknown/unspecified:\s*+{NUMBER}[,\s]++({NUMBER})", re.IGNORECASE)
 
@@ -84,7 +85,10 @@ def read(text: TextFile) -> Record:
     cosmos = "format v" in text.heads[0].lower()
     event = next(filter(_EVENT.match, words), " ".join(words[1:2] if cosmos else words[2:3]))
     samples, lines = _samples(text, block)
-    return text.record(samples, lines=lines, units=stated, dt=_step(text, block), line=block.line, title=event,
+    place = block.line
+    if stated is None and (peak := _peak_units(text, block, samples)) is not None:
+        place, stated = peak
+    return text.record(samples, lines=lines, units=stated, dt=_step(text, block), line=place, title=event,
                        format="COSMOS" if cosmos else "CSMIP", notes=(*words, *comments),
                        station=_station(text, block), component=_component(text, block))
 
@@ -144,7 +148,7 @@ def _samples(text: TextFile, block: Block) -> tuple[list[float], list[int]]:
         values += row
         lines += [index] * len(row)
     after = text.lines[block.end] if block.end < len(text.lines) else ""
-    if after.strip() and _ROW.fullmatch(after) and len(after.rstrip()) % block.width == 0:
+    if after.strip() and not _VALUE.sub("", after).strip() and len(after.rstrip()) % block.width == 0:
         raise InputError(f"{text.at(block.line)}: {block.count:.12g} samples are announced but line {block.end + 1} "
                          "holds more of them; get the complete file")
     return values, lines
@@ -165,6 +169,15 @@ def _step(text: TextFile, block: Block) -> float | None:
             return values[STEP] if len(values) > STEP and values[STEP] > 0.0 else None
     stated = agreed(text, "the time step", found)
     return stated[1] if stated else None
+
+
+def _peak_units(text: TextFile, block: Block, samples: list[float]) -> tuple[int, str] | None:
+    """Return the line and the units of the peak that the header states, where the samples have that peak."""
+    for index, match in _found(text, block.header, _PEAK):
+        peak, found = abs(text.number(index, match[1])), max(map(abs, samples))
+        if known_units(match[2]) is not None and abs(found - peak) <= 1e-3 * peak:
+            return index, match[2]
+    return None
 
 
 def _component(text: TextFile, block: Block) -> str:

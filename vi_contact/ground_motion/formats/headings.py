@@ -13,12 +13,12 @@ from .text import TextFile
 
 _MARKS = "#%!;/*'\" \t"  # before a heading
 _SPLITS = (
-    re.compile(r"\s*+[,;\t|]\s*+"),
+    re.compile(r"[,;\t|]"),
     re.compile(r"\s{2,}+"),
     re.compile(r"(?<=[)\]])\s*+(?=\S)"),
     re.compile(r"\s++"),
 )
-_UNIT_BEHIND = re.compile(r"^(.*?)[\s_]*[\[(]\s*([^\[\]()]*+(?:\([^()]*+\))?)\s*[\])]\s*$")
+_UNIT_BEHIND = re.compile(r"[\[(]\s*+([^\[\]()]*+(?:\([^()]*+\))?+)\s*+[\])]\s*+$")
 _UNIT_WORD = re.compile(r"^(.*?)(?:[\s_]+(?:in[\s_]+)?|/)(\S+)$")
 _KINDS = (
     ("time", re.compile(r"^(?:t|tiempo|temps|zeit|tempo|elapsed|seconds|.*\btimes?)$", re.I)),
@@ -98,13 +98,11 @@ def _cells(line: str, width: int) -> list[str] | None:
 
 def _column(cell: str, line: int) -> Column:
     """Return what one cell says."""
-    name, unit = cell, None
-    match = _UNIT_BEHIND.match(cell)
-    if match is None:
+    if match := _UNIT_BEHIND.search(cell):
+        name, unit = cell[: match.start()].rstrip(" _"), match[1].strip()
+    else:
         word = _UNIT_WORD.match(cell)
-        match = word if word and word[1] and _kind_of_unit(word[2]) else None
-    if match:
-        name, unit = match[1], match[2]
+        name, unit = (word[1], word[2]) if word and word[1] and _kind_of_unit(word[2]) else (cell, None)
     by_unit = _kind_of_unit(unit) if unit else ""
     by_name = next((kind for kind, pattern in _KINDS if pattern.search(name.strip(" .:"))), "")
     if by_name == "time" and by_unit not in ("time", ""):
