@@ -43,7 +43,9 @@ def test_the_rim_of_a_contact_between_two_bodies_is_refused(d, simplices):
     tags, system = problem_on(Merged(stacked(d, simplices), rim))
     one, two = tags["upper_bottom"], tags["lower_top"]
     count = {2: r"2 nodes, at \(0, 1\) and \(2, 1\)", 3: r"6 nodes, the first at \(0, 1, 0\)"}[d]
-    with pytest.raises(InputError, match=f"contact_pair: 'upper_bottom' and 'lower_top' share {count}.*hinges=True"):
+    with pytest.raises(
+        InputError, match=f"contact_pair: 'upper_bottom' and 'lower_top' share {count}.*hinges=True"
+    ):
         fem.contact_pair(system, one, two)
     with pytest.raises(InputError, match=f"'lower_top' and 'upper_bottom' share {count[:7]}"):
         fem.contact_pair(system, two, one, matching=fem.DualMortar())
@@ -55,13 +57,19 @@ def test_the_rim_of_a_contact_between_two_bodies_is_refused(d, simplices):
 
 def test_one_shared_corner_is_enough():
     tags, system = problem_on(Merged(stacked(2), lambda x: rim(x) & (x[0] < 1.0)))
-    with pytest.raises(InputError, match=r"'upper_bottom' and 'lower_top' share a node, at \(0, 1\), where bodies would"):
+    with pytest.raises(
+        InputError,
+        match=r"'upper_bottom' and 'lower_top' share a node, at \(0, 1\), where bodies would",
+    ):
         fem.contact_pair(system, tags["upper_bottom"], tags["lower_top"])
 
 
 def test_a_boundary_on_an_obstacle_may_be_glued_to_another_body_too():
     tags, system = problem_on(Merged(stacked(2), rim))
-    with pytest.raises(InputError, match=r"contact_surface: 'upper_bottom' shares 2 nodes with another body, at \(0, 1\)"):
+    with pytest.raises(
+        InputError,
+        match=r"contact_surface: 'upper_bottom' shares 2 nodes with another body, at \(0, 1\)",
+    ):
         fem.contact_surface(system, tags["upper_bottom"])
     (census,) = fem.contact_surface(system, tags["upper_bottom"], hinges=True).censuses
     assert census.places["shared with another body"].tolist() == [[0.0, 1.0], [2.0, 1.0]]
@@ -70,9 +78,13 @@ def test_a_boundary_on_an_obstacle_may_be_glued_to_another_body_too():
 def test_a_node_that_only_one_side_shares_is_refused():
     """A side of the upper block faces an obstacle; the lower block hangs on its corner."""
     tags, system = problem_on(Merged(stacked(2), rim))
-    with pytest.raises(InputError, match=r"'upper_left' shares a node with another body, at \(0, 1\)"):
+    with pytest.raises(
+        InputError, match=r"'upper_left' shares a node with another body, at \(0, 1\)"
+    ):
         fem.contact_surface(system, tags["upper_left"])
-    with pytest.raises(InputError, match=r"'upper_left' shares a node with another body, at \(0, 1\)"):
+    with pytest.raises(
+        InputError, match=r"'upper_left' shares a node with another body, at \(0, 1\)"
+    ):
         fem.contact_pair(system, tags["upper_left"], tags["upper_right"])
 
 
@@ -89,7 +101,10 @@ def test_the_edge_of_a_weld_is_no_hinge(d):
     """The left half of the interface is one: the material goes on round the end of what may part, in space along a line."""
     whole = Merged(stacked(d), lambda x: np.isclose(x[1], 1.0) & (x[0] < 1.01))
     mesh, tags = fem.build_mesh(whole, COMM)
-    right = [fem.Facets(f"{name}_right", right_half(mesh, tags[name]), mesh) for name in ("upper_bottom", "lower_top")]
+    right = [
+        fem.Facets(f"{name}_right", right_half(mesh, tags[name]), mesh)
+        for name in ("upper_bottom", "lower_top")
+    ]
     system = fem.assemble(mesh, ROCK, clamped=tags["lower_bottom"])
     surface = fem.contact_pair(system, *right)
     (census,) = surface.censuses
@@ -109,7 +124,10 @@ class Inner:
     """A block with an inner boundary: the facets at height y whose middles satisfy ``where``."""
 
     def __init__(self, d: int, where: Any) -> None:
-        self.block, self.where = BlockMesh(lengths=(2.0, 2.0, 1.0)[:d], divisions=(8, 4, 4)[:d]), where
+        self.block, self.where = (
+            BlockMesh(lengths=(2.0, 2.0, 1.0)[:d], divisions=(8, 4, 4)[:d]),
+            where,
+        )
 
     def build(self, gmsh: Any) -> None:
         arrays = arrays_of(self.block)
@@ -118,14 +136,19 @@ class Inner:
         sides = np.unique(cell_sides(arrays.cells, arrays.cell)[0], axis=0)
         at_height = np.isclose(arrays.points[sides][:, :, 1], 1.0).all(axis=1)
         chosen = at_height & self.where(arrays.points[sides].mean(axis=1))
-        add_arrays(gmsh, replace(arrays, facet_groups=arrays.facet_groups | {"crack": sides[chosen]}))
+        add_arrays(
+            gmsh, replace(arrays, facet_groups=arrays.facet_groups | {"crack": sides[chosen]})
+        )
 
 
 @pytest.mark.parametrize("d", [2, 3])
 def test_cracks_end_at_tips_and_fronts(d):
     """A crack inside a body, from x = 0.5 to 1.5 (in space to z = 0.5): all its ends are shared and none is a hinge."""
-    mesh = CutOpen(Inner(d, lambda x: (np.abs(x[:, 0] - 1.0) < 0.5) & (x[:, -1] < 0.5 if d == 3 else True)), "crack",
-                   towards=(0.0, 1.0, 0.0)[:d])
+    mesh = CutOpen(
+        Inner(d, lambda x: (np.abs(x[:, 0] - 1.0) < 0.5) & (x[:, -1] < 0.5 if d == 3 else True)),
+        "crack",
+        towards=(0.0, 1.0, 0.0)[:d],
+    )
     mesh, tags = fem.build_mesh(mesh, COMM)
     surface = fem.contact_pair(fem.assemble(mesh, ROCK), tags["crack_1"], tags["crack_2"])
     (census,) = surface.censuses
@@ -136,7 +159,9 @@ def test_cracks_end_at_tips_and_fronts(d):
 
 def test_the_mouth_of_a_crack_that_was_left_closed_is_refused():
     """A crack through a body whose end points at the outside are still one node each, as meshers leave them."""
-    mesh, tags = fem.build_mesh(Merged(stacked(2), lambda x: np.isclose(x[1], 1.0) & (x[0] > 1.99)), COMM)
+    mesh, tags = fem.build_mesh(
+        Merged(stacked(2), lambda x: np.isclose(x[1], 1.0) & (x[0] > 1.99)), COMM
+    )
     system = fem.assemble(mesh, ROCK, clamped=tags["lower_bottom"])
     with pytest.raises(InputError, match=r"share a node, at \(2, 1\)"):
         fem.contact_pair(system, tags["upper_bottom"], tags["lower_top"])
@@ -186,7 +211,10 @@ def test_case_files_are_refused_and_may_mean_hinges(tmp_path):
     (tmp_path / "rim.geo").write_text(RIM_GEO)
     case = tmp_path / "rim.toml"
     case.write_text(RIM)
-    with pytest.raises(InputError, match=r"'base' and 'ground' share 2 nodes, at \(0, 0\) and \(2, 0\).*hinges = true in"):
+    with pytest.raises(
+        InputError,
+        match=r"'base' and 'ground' share 2 nodes, at \(0, 0\) and \(2, 0\).*hinges = true in",
+    ):
         read_case(case).problem(MPI.COMM_SELF)
     case.write_text(RIM.replace('facets2 = "ground"', 'facets2 = "ground"\nhinges = true'))
     assert read_case(case).problem(MPI.COMM_SELF).surface.total == 7

@@ -22,7 +22,9 @@ def stone(x, y, length=1.0, height=1.0, d=2, gap=0.0):
     lengths, divisions = [length, height], [round(4 * length), round(4 * height)]
     if d == 3:
         lengths, divisions = [*lengths, 0.5], [*divisions, 2]
-    return BlockMesh(lengths=tuple(lengths), divisions=tuple(divisions), corner=(x, y + gap, 0.0)[:d])
+    return BlockMesh(
+        lengths=tuple(lengths), divisions=tuple(divisions), corner=(x, y + gap, 0.0)[:d]
+    )
 
 
 def bond(d, joint=0.0, order=("a", "b")):
@@ -34,8 +36,13 @@ def bond(d, joint=0.0, order=("a", "b")):
     sideways = [fem.Prescribed(tags["up_left"], components=(0,))]
     if d == 3:
         sideways.append(fem.Prescribed(tags["up_back"], components=(2,)))
-    system = fem.assemble(mesh, STONE, clamped=[tags["a_bottom"], tags["b_bottom"]], prescribed=sideways,
-                          loads=fem.Traction(tags["up_top"], push))
+    system = fem.assemble(
+        mesh,
+        STONE,
+        clamped=[tags["a_bottom"], tags["b_bottom"]],
+        prescribed=sideways,
+        loads=fem.Traction(tags["up_top"], push),
+    )
     return mesh, tags, system
 
 
@@ -45,8 +52,11 @@ def test_a_stone_on_two_stones_has_no_single_partner(d, order):
     """Refused with the place, in either order of the bodies; the remedy gives the uniform pressure and settlement."""
     mesh, tags, system = bond(d, order=tuple(order))
     tops = facets(mesh, tags, "a_top", "b_top")
-    with pytest.raises(InputError, match=r"the node of 'up_bottom' at \(1, 1.*\) faces several nodes of 'a_top\+b_top'.*"
-                                         r"DualMortar\(\), in a case file matching = \{type = \"DualMortar\"\}"):
+    with pytest.raises(
+        InputError,
+        match=r"the node of 'up_bottom' at \(1, 1.*\) faces several nodes of 'a_top\+b_top'.*"
+        r"DualMortar\(\), in a case file matching = \{type = \"DualMortar\"\}",
+    ):
         fem.contact_pair(system, tags["up_bottom"], tops)
     surface = fem.contact_pair(system, tags["up_bottom"], tops, matching=fem.DualMortar())
     state = vc.static_equilibrium(vc.ContactProblem(system, surface))
@@ -56,7 +66,10 @@ def test_a_stone_on_two_stones_has_no_single_partner(d, order):
 
 def test_a_joint_of_finite_width_has_no_single_partner_either():
     mesh, tags, system = bond(2, joint=1e-3)
-    with pytest.raises(InputError, match=r"at \(1, 1\) faces several nodes of 'a_top\+b_top' at one place, as a stone"):
+    with pytest.raises(
+        InputError,
+        match=r"at \(1, 1\) faces several nodes of 'a_top\+b_top' at one place, as a stone",
+    ):
         fem.contact_pair(system, tags["up_bottom"], facets(mesh, tags, "a_top", "b_top"))
 
 
@@ -68,10 +81,18 @@ def test_columns_of_stones_face_their_own(d, gap):
     blocks = {"a": stone(0.0, 0.0, d=d), "b": stone(1.0, 0.0, d=d)}
     blocks |= {"v": stone(1.0, 1.0, d=d, gap=gap), "u": stone(0.0, 1.0, d=d, gap=gap)}
     mesh, tags = fem.build_mesh(Blocks(blocks), COMM)
-    loads = [fem.Traction(tags[f"{name}_top"], (0.0, -q, 0.0)[:d]) for name, q in (("u", 1e6), ("v", 2e6))]
-    sideways = [fem.Prescribed(tags[f"{name}_{side}"], components=(c,)) for name in "uv"
-                for side, c in (("left", 0), ("back", 2))[: d - 1]]
-    system = fem.assemble(mesh, STONE, clamped=[tags["a_bottom"], tags["b_bottom"]], prescribed=sideways, loads=loads)
+    loads = [
+        fem.Traction(tags[f"{name}_top"], (0.0, -q, 0.0)[:d])
+        for name, q in (("u", 1e6), ("v", 2e6))
+    ]
+    sideways = [
+        fem.Prescribed(tags[f"{name}_{side}"], components=(c,))
+        for name in "uv"
+        for side, c in (("left", 0), ("back", 2))[: d - 1]
+    ]
+    system = fem.assemble(
+        mesh, STONE, clamped=[tags["a_bottom"], tags["b_bottom"]], prescribed=sideways, loads=loads
+    )
     one, two = facets(mesh, tags, "u_bottom", "v_bottom"), facets(mesh, tags, "a_top", "b_top")
     surface = fem.contact_pair(system, one, two)
     state = vc.static_equilibrium(vc.ContactProblem(system, surface))
@@ -82,10 +103,16 @@ def test_columns_of_stones_face_their_own(d, gap):
 
 def test_a_stone_beside_another_column_faces_its_own():
     """Side 2 has the tops of both columns, side 1 the bottom of one stone: its corner faces its own column."""
-    mesh, tags = fem.build_mesh(Blocks({"b": stone(1.0, 0.0), "a": stone(0.0, 0.0), "u": stone(0.0, 1.0)}), COMM)
-    system = fem.assemble(mesh, STONE, clamped=[tags["a_bottom"], tags["b_bottom"]],
-                          prescribed=fem.Prescribed(tags["u_left"], components=(0,)),
-                          loads=fem.Traction(tags["u_top"], (0.0, -1e6)))
+    mesh, tags = fem.build_mesh(
+        Blocks({"b": stone(1.0, 0.0), "a": stone(0.0, 0.0), "u": stone(0.0, 1.0)}), COMM
+    )
+    system = fem.assemble(
+        mesh,
+        STONE,
+        clamped=[tags["a_bottom"], tags["b_bottom"]],
+        prescribed=fem.Prescribed(tags["u_left"], components=(0,)),
+        loads=fem.Traction(tags["u_top"], (0.0, -1e6)),
+    )
     surface = fem.contact_pair(system, tags["u_bottom"], facets(mesh, tags, "a_top", "b_top"))
     state = vc.static_equilibrium(vc.ContactProblem(system, surface))
     pressure = surface.everywhere(state.r_n) / surface.everywhere(surface.weights)
@@ -95,9 +122,15 @@ def test_a_stone_beside_another_column_faces_its_own():
 def test_bars_have_one_partner_only():
     """Three bars of which two begin where the first one ends: the mortar method is no remedy there."""
     bar = BlockMesh(lengths=(1.0,), divisions=(2,))
-    blocks = {"one": bar, "two": BlockMesh(lengths=(1.0,), divisions=(2,), corner=(1.0,)),
-              "three": BlockMesh(lengths=(2.0,), divisions=(2,), corner=(1.0,))}
+    blocks = {
+        "one": bar,
+        "two": BlockMesh(lengths=(1.0,), divisions=(2,), corner=(1.0,)),
+        "three": BlockMesh(lengths=(2.0,), divisions=(2,), corner=(1.0,)),
+    }
     mesh, tags = fem.build_mesh(Blocks(blocks), COMM)
     system = fem.assemble(mesh, STONE, clamped=[tags["two_right"], tags["three_right"]])
-    with pytest.raises(InputError, match="faces several nodes of 'two_left.three_left' at one place, and can touch one"):
+    with pytest.raises(
+        InputError,
+        match="faces several nodes of 'two_left.three_left' at one place, and can touch one",
+    ):
         fem.contact_pair(system, tags["one_right"], facets(mesh, tags, "two_left", "three_left"))

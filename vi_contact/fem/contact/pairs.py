@@ -88,8 +88,9 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
                          "bodies one by one, or cut the mesh open (meshes.cut.CutOpen)")
     _refuse_common(one, two)
     hinge = _hinges(space, one, two, shared, allowed=hinges)
-    one = replace(one, tied=_tied_over(space, one, two))
-    tied = one.nodes.numbers[one.tied >= 0]
+    places = _tied_over(space, one, two)
+    one = replace(one, tied=places)
+    tied = one.nodes.numbers[places >= 0]
     around = boundary(space, facets1, beyond=angle)
     faces = _faces(space, one, boundary(space, facets1) if len(around.vertices) else around, angle)
     with together(space.comm):  # a matching of the user's may fail on one rank
