@@ -126,7 +126,9 @@ def test_curved_sides_in_space_touch():
 
 
 def test_both_remedies_give_the_pressure_of_the_press_fit():
-    """The strain of the shaft, in one static step, and the overlap as a motion of the seat: Lamé to 2e-4 on 16 divisions."""
+    """The strain of the shaft in one static step, and the overlap as a motion of the seat.
+
+    Lamé to 2e-4 on 16 divisions."""
     exact = lame()
     assert exact == pytest.approx(34.615e6, rel=1e-4)
     swelling = TOO_LARGE / B

@@ -98,7 +98,9 @@ def test_a_rim_that_is_clamped_glues_nothing():
 
 @pytest.mark.parametrize("d", [2, 3])
 def test_the_edge_of_a_weld_is_no_hinge(d):
-    """The left half of the interface is one: the material goes on round the end of what may part, in space along a line."""
+    """The left half of the interface is one: the material goes on round the end of what may part.
+
+    In space it does so along a line."""
     whole = Merged(stacked(d), lambda x: np.isclose(x[1], 1.0) & (x[0] < 1.01))
     mesh, tags = fem.build_mesh(whole, COMM)
     right = [

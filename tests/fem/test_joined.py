@@ -268,7 +268,8 @@ def test_a_node_on_both_sides():
     mesh, tags = build_mesh(Blocks(parts), COMM)
     system = assemble(mesh, SOFT)
     first = contact_pair(system, tags["sw_right"], tags["se_left"])
-    sentence = r"node \(1, 1\) is on side 1 of one contact pair and on side 2 of another: where cracks cross, give each arm"
+    sentence = (r"node \(1, 1\) is on side 1 of one contact pair and on side 2 of another: where cracks cross, "
+                "give each arm")
     good = joined_surfaces(first, contact_pair(system, tags["ne_bottom"], tags["se_top"]))
     assert good.total == 6
     with pytest.raises(InputError, match=sentence):

@@ -76,7 +76,9 @@ def test_a_joint_of_finite_width_has_no_single_partner_either():
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("gap", [0.0, 0.01])
 def test_columns_of_stones_face_their_own(d, gap):
-    """Two columns side by side, pressed by 1 and 2 MPa: at the corner that four stones share each node faces the stone of
+    """Two columns side by side, pressed by 1 and 2 MPa.
+
+    At the corner that four stones share each node faces the stone of
     its own column, and neither feels the other."""
     blocks = {"a": stone(0.0, 0.0, d=d), "b": stone(1.0, 0.0, d=d)}
     blocks |= {"v": stone(1.0, 1.0, d=d, gap=gap), "u": stone(0.0, 1.0, d=d, gap=gap)}

@@ -126,7 +126,9 @@ def test_contact_between_tied_sides(comm):
 @pytest.mark.parametrize("graded", [False, True], ids=["alike", "unlike"])
 @pytest.mark.parametrize("whole", [False, True], ids=["half", "whole"])
 def test_a_tie_beside_a_contact_is_a_weld(comm, graded, whole):
-    """The left half of an interface is tied, the right half, or all of it, is a contact: nodes that are tied to the other
+    """The left half of an interface is tied, the right half, or all of it, is a contact.
+
+    Nodes that are tied to the other
     side have no condition. Pressed by 1 MPa the pressure is 1 MPa; pulled the right half opens like a crack."""
 
     def right_graded(x):
@@ -145,7 +147,8 @@ def test_a_tie_beside_a_contact_is_a_weld(comm, graded, whole):
     material = vc.LinearElastic(E=1e9, nu=0.0, rho=2000.0)
     found = {}
     for load in (-1e6, 1e6):
-        system = fem.assemble(mesh, material, clamped=tags["lower_bottom"], loads=fem.Traction(tags["upper_top"], (0.0, load)),
+        pressed = fem.Traction(tags["upper_top"], (0.0, load))
+        system = fem.assemble(mesh, material, clamped=tags["lower_bottom"], loads=pressed,
                               tied=fem.Tied(halves["top"][0], halves["bottom"][0]))
         surface = fem.contact_pair(system, one, two, matching=fem.DualMortar() if graded else None)
         assert surface.total == 4 and len(surface.censuses[0].places["tied to the other side"]) == (5 if whole else 1)

@@ -224,7 +224,8 @@ def test_a_joint_between_two_cell_groups_needs_no_boundary_group(d, simplices):
         group = "_".join(names)
         assert len(bodies(cut)) == 2
         for own, other in zip("12", sides, strict=True):
-            assert places(cut, cut.facet_groups[f"{group}_{own}"]) == places(named, named.facet_groups[f"{one}_{other}"])
+            wanted = named.facet_groups[f"{one}_{other}"]
+            assert places(cut, cut.facet_groups[f"{group}_{own}"]) == places(named, wanted)
         assert np.isin(cut.facet_groups[f"{group}_1"], cut.cells[cut.cell_groups[names[0]]]).all()
         assert {"upper_top", "lower_bottom"} <= set(cut.facet_groups)
 
@@ -237,7 +238,8 @@ def test_what_cannot_be_cut_between_cell_groups():
         ({"between": ("upper", "sea")}, "mesh has no cell group 'sea'; it has lower, upper"),
         ({"between": ("upper", "upper")}, "between is .*; give the names of two groups of cells"),
         ({"between": "upper"}, "between is 'upper'; give the names of two groups of cells"),
-        ({"between": ("upper", "lower"), "inside": "upper"}, "has its first side in 'upper': leave out inside and towards"),
+        ({"between": ("upper", "lower"), "inside": "upper"},
+         "has its first side in 'upper': leave out inside and towards"),
         ({"between": ("upper", "lower"), "group": "upper_bottom"}, "give group=, .*, or between=, two groups of cells"),
         ({}, "give group=, the name of an inner boundary, or between=, two groups of cells"),
     ):
@@ -247,7 +249,7 @@ def test_what_cannot_be_cut_between_cell_groups():
         cut_open(apart, between=("upper", "lower"))
     again = cut_open(joined, "upper_bottom", inside="upper")
     taken = {name.replace("upper_bottom_1", "upper_top_1"): rows for name, rows in again.facet_groups.items()}
-    with pytest.raises(InputError, match="the mesh has a group 'upper_bottom_2' already, the name of a side of the cut"):
+    with pytest.raises(InputError, match="has a group 'upper_bottom_2' already, the name of a side of the cut"):
         cut_open(replace(joined, facet_groups=joined.facet_groups | {"upper_bottom_2": taken["upper_bottom_2"]}),
                  "upper_bottom", inside="upper")
 

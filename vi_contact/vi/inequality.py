@@ -98,8 +98,8 @@ def solve(form: Any = None, u: Any = None, *, energy: Any = None, lower: Any = N
     refuse_choices(form, energy, J, method)
     agree(MpiComm(kept(u.function_space.mesh.comm)), "vi.solve", {
         "lower": given_alike(lower), "upper": given_alike(upper), "J": J is None, "energy": energy is None,
-        "method": method, "number of bcs": len(bcs) if isinstance(bcs, list | tuple) else bcs, "petsc_options": petsc_options,
-        "prefix": prefix, "tolerance": tolerance, "iterations": iterations})
+        "method": method, "number of bcs": len(bcs) if isinstance(bcs, list | tuple) else bcs,
+        "petsc_options": petsc_options, "prefix": prefix, "tolerance": tolerance, "iterations": iterations})
     settings = Volume(method or TaoTron(), {} if petsc_options is None else petsc_options, prefix, tolerance)
 
     problem = Problem(form, u, bcs, J, energy)
