@@ -42,6 +42,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "fem/test_counting.py": "core.census",
     "fem/test_forces_in_space.py": "fem.output.cut_cells",
     "fem/test_forms.py": "fem.form_checks fem.own_forms",
+    "fem/test_curved_contact.py": "fem.contact.curves",
     "fem/test_mortar_in_space.py": "fem.contact.clipping fem.contact.sight",
     "fem/test_pairs.py": "fem.contact.matching",
     "fem/test_second_order.py": "fem.numbering",
@@ -51,8 +52,8 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "fem/test_space.py": "fem.nodal_space",
     "fem/test_surface.py": "fem.contact.faces",
     "fem/test_ties.py": "soil.soil_column",
-    "ground_motion/test_columns.py":
-        "ground_motion.formats.gaps ground_motion.formats.headings "
+    "ground_motion/test_columns_of_records.py":
+        "ground_motion.formats.columns ground_motion.formats.gaps ground_motion.formats.headings "
         "ground_motion.formats.statements ground_motion.formats.times",
     "ground_motion/test_formats.py": "ground_motion.formats.at2 ground_motion.formats.writer",
     "ground_motion/test_networks.py":
