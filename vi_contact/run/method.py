@@ -17,6 +17,7 @@ from ..laws.mass import ConsistentMass
 from ..schemes.trapezoidal import Trapezoidal
 from ..schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from ..solvers.automatic import Automatic
+from .loose_bodies import refuse_loose_bodies
 from .time_steps import TimeSteps, step_plan
 
 SCHEME = ("check", "start", "jump", "effective_matrix", "step", "finish", "balance")
@@ -61,6 +62,8 @@ def checked_method(owner: str, problem: ContactProblem, scheme: Scheme | None,
         method.solvers[0].check(problem)
         if state is not None:
             check_state(owner, problem, state, dt=size, tolerance=tolerance, scheme=scheme)
+    if problem.system.floating and state is None:  # what continues a run was looked at when it began
+        refuse_loose_bodies(problem)
     return method
 
 

@@ -109,7 +109,7 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
     _warn_of_coarse(space, one, two, little)
     kinds["shared with another body"] = hinge & ~shared
     kinds["tied to the other side"] = np.isin(one.nodes.numbers, tied)
-    kinds["faces nothing"] &= ~kinds["tied to the other side"]
+    kinds["in front of nothing"] &= ~kinds["tied to the other side"]
     nodes, matched = nodes.pick(free), matched.pick(free)
     if points is not None:
         chosen = listed(space, nodes, points, one.name)

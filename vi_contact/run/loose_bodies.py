@@ -1,0 +1,99 @@
+"""Name bodies that nothing holds and that no contact condition touches, before a run computes a step.
+
+They are seldom meant. Where nodes of such a body lie at the places of another body's nodes, the meshes of the two have
+not been merged: they look like one body in a picture, and fly apart without a word.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..core.algebra import Array, from_each
+from ..core.checks import at
+from ..core.errors import InputError
+from ..core.problem import ContactProblem
+from ..laws.free_motions import free_motions, rows_of_bodies
+
+log = logging.getLogger(__name__)
+SAME = 1e-9  # of the size of the bodies: nodes that are nearer lie at one place
+
+
+@dataclass(frozen=True)
+class LooseBody:
+    """Hold the middle [m] of a loose body, its number of nodes, and how many of them lie at nodes of other bodies."""
+
+    middle: Array
+    nodes: int
+    coinciding: int
+
+
+def find_loose_bodies(problem: ContactProblem) -> list[LooseBody]:
+    """Return the bodies that have a rigid motion which neither a stiffness nor a contact condition meets. Collective."""
+    system = problem.system
+    if not any(body.motions.shape[1] for body in free_motions(system)):
+        return []
+    comm = system.algebra.comm
+    rows = rows_of_bodies(system)
+    points = system.space.coordinates
+    nodes = [_distinct(from_each(comm, points[own])) for own in rows]
+    size = float(np.max(np.ptp(np.concatenate(nodes), axis=0), initial=0.0))
+    loose = []
+    for number, free in enumerate(free_motions(system)):
+        if not free.motions.shape[1] or _is_touched(problem, rows[number]):
+            continue
+        others = [one for other, one in enumerate(nodes) if other != number]
+        coinciding = 0
+        if others:
+            distance, _ = cKDTree(np.concatenate(others)).query(nodes[number])
+            coinciding = int(np.count_nonzero(distance <= SAME * size))
+        middle = 0.5 * (nodes[number].min(axis=0) + nodes[number].max(axis=0))
+        loose.append(LooseBody(middle, len(nodes[number]), coinciding))
+    return loose
+
+
+def _distinct(parts: list[Array]) -> Array:
+    """Return the places of all ranks, each once."""
+    return np.asarray(np.unique(np.concatenate(parts), axis=0))
+
+
+def _is_touched(problem: ContactProblem, rows: Array) -> bool:
+    """Return whether a translation of the body alone moves some contact condition, as its side 1 or its side 2."""
+    surface = problem.surface
+    moved = 0.0
+    for translation in problem.system.influence.T:
+        alone = np.zeros_like(translation)
+        alone[rows] = translation[rows]
+        alone = surface.in_frames(alone)
+        if surface.coupling is not None:  # relative to the other side: see SemiDiscreteSystem.in_relative
+            alone = 2.0 * alone - surface.coupling @ alone
+        values = (surface.normal_values(alone), surface.tangential_values(alone))
+        moved = max(moved, *(float(np.max(np.abs(one), initial=0.0)) for one in values))
+    return bool(surface.comm.max(np.array([moved]))[0] > 0.0)
+
+
+def judge_loose_bodies(problem: ContactProblem) -> Iterator[tuple[str, bool]]:
+    """Yield a sentence on every loose body, and whether it is refused: where its nodes lie at another's. Collective."""
+    for body in find_loose_bodies(problem):
+        what = f"nothing holds the body of {body.nodes} nodes around {at(body.middle)}, and no contact touches it"
+        if body.coinciding:
+            yield (
+                f"{what}: {body.coinciding} of its nodes lie at the places of nodes of another body, as of meshes that "
+                "are not merged: merge them (Coherence in Gmsh), or make a contact or a tie between the two",
+                True,
+            )
+        else:
+            yield f"{what}: it moves freely", False
+
+
+def refuse_loose_bodies(problem: ContactProblem) -> None:
+    """Raise InputError for a loose body whose nodes lie at another body's; warn, on rank 0, of others. Collective."""
+    for sentence, refused in judge_loose_bodies(problem):
+        if refused:
+            raise InputError(sentence)
+        if problem.surface.comm.rank == 0:
+            log.warning("%s", sentence)
