@@ -16,7 +16,7 @@ from vi_contact import fem
 from vi_contact.meshes import BlockMesh, TwoBlocks
 
 COMM = MPI.COMM_WORLD
-LOWER = BlockMesh(lengths=(1.0, 1.0), divisions=(2, 2))
+LOWER = BlockMesh(lengths=(1.0, 1.0), divisions=(4, 4))
 
 
 def stacked(*, gap: float = 0.0, contact: bool = False, clamp_both: bool = False) -> vc.ContactProblem:
@@ -38,9 +38,9 @@ def run(problem: vc.ContactProblem) -> Any:
 
 
 def test_meshes_that_are_not_merged_are_refused() -> None:
-    """The 9 nodes of the upper block are around (0.5, 1.5) m, and 3 of them lie at nodes of the lower one."""
-    with pytest.raises(vc.InputError, match=r"nothing holds the body of 9 nodes around \(0.5, 1.5\), and no contact "
-                                            r"touches it: 3 of its nodes lie at the places of nodes of another body"):
+    """The 25 nodes of the upper block are around (0.5, 1.5) m, and 5 of them lie at nodes of the lower one."""
+    with pytest.raises(vc.InputError, match=r"nothing holds the body of 25 nodes around \(0.5, 1.5\), and no contact "
+                                            r"touches it: 5 of its nodes lie at the places of nodes of another body"):
         run(stacked())
 
 
