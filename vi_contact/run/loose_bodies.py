@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..core.algebra import Array, from_each
+from ..core.algebra import Array, Indices, from_each
 from ..core.checks import at
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
@@ -33,7 +33,7 @@ class LooseBody:
 
 
 def find_loose_bodies(problem: ContactProblem) -> list[LooseBody]:
-    """Return the bodies that have a rigid motion which neither a stiffness nor a contact condition meets. Collective."""
+    """Return the bodies with a rigid motion that neither a stiffness nor a contact condition meets. Collective."""
     system = problem.system
     if not any(body.motions.shape[1] for body in free_motions(system)):
         return []
@@ -61,7 +61,7 @@ def _distinct(parts: list[Array]) -> Array:
     return np.asarray(np.unique(np.concatenate(parts), axis=0))
 
 
-def _is_touched(problem: ContactProblem, rows: Array) -> bool:
+def _is_touched(problem: ContactProblem, rows: Indices) -> bool:
     """Return whether a translation of the body alone moves some contact condition, as its side 1 or its side 2."""
     surface = problem.surface
     moved = 0.0

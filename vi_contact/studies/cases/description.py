@@ -20,6 +20,7 @@ from ...fem.space import space_of
 from ...ground_motion.excitation import GroundMotion
 from ...ground_motion.record import Record
 from ...run.files.folder import MODEL
+from ...run.loose_bodies import judge_loose_bodies
 from ...run.sampling import sampling_warning
 from .table_calls import Call, Group, build, nodes_in
 from .unread_choices import left_over
@@ -68,6 +69,8 @@ def describe(case: Any, comm: Any, parts: Parts | None = None, *, most: int = 50
         "run": run, "outline": outline(space, tags, [cells for cells, _ in space.forms.materials]),
     } | _modes(case, problem, most)
     model |= {"defects": list(_defects(model)), "warnings": [*_warnings(model), *left_over(case.path, case.tables)]}
+    for sentence, refused in judge_loose_bodies(problem) if problem.system.floating else ():
+        model["defects" if refused else "warnings"].append(sentence)
     if not any(run["dt"] > one["dt"] * (1.0 + ROUNDED) for one in model["records"]):  # that is a defect
         model["warnings"] += filter(None, [sampling_warning(problem, max(dt for dt, _ in plan.parts))])
     return dict(json.loads(to_json(model), parse_float=lambda text: float(f"{float(text):.{DIGITS}g}")))
