@@ -37,9 +37,10 @@ def oblique(system: Any, facets: Any, tilt: float = 0.2) -> Any:
     return fem.contact_surface(system, facets, obstacle=vc.HalfSpace((0.0, -1e-3), (tilt, 1.0)))
 
 
-def level(system: Any, facets: Any) -> Any:
+def level(system: Any, facets: Any, point: tuple[float, float] = (0.0, -1e-4),
+          normal: tuple[float, float] = (0.0, 1.0)) -> Any:
     """A surface along the axes: no turned matrices."""
-    return fem.contact_surface(system, facets, obstacle=vc.HalfSpace((0.0, -1e-4), (0.0, 1.0)))
+    return fem.contact_surface(system, facets, obstacle=vc.HalfSpace(point, normal))
 
 
 SCHEMES = {
@@ -81,7 +82,7 @@ CHANGES: dict[str, Change] = {
     "gap": lambda p, tags: replace(p, surface=replace(p.surface, gap0=0.5 * p.surface.gap0)),
     "other plane": lambda p, tags: replace(p, surface=oblique(p.system, tags["bottom"], 0.3)),
     "level plane": lambda p, tags: replace(p, surface=level(p.system, tags["bottom"])),
-    "other facets": lambda p, tags: replace(p, surface=level(p.system, tags["right"])),
+    "other facets": lambda p, tags: replace(p, surface=level(p.system, tags["right"], (1.0001, 0.0), (-1.0, 0.0))),
     "friction": lambda p, tags: replace(p, friction=vc.Coulomb(0.3)),
     "excitation": lambda p, tags: replace(p, excitation=SHAKING),
 }

@@ -31,9 +31,12 @@ def test_half_space_oblique():
     np.testing.assert_allclose(slope.directions(POINTS, normals), -np.sqrt(0.5) * np.ones((3, 2)), rtol=1e-15)
 
 
-def test_half_space_takes_sides_at_right_angles_but_for_rounding():
-    side = np.tile([1.0, 1e-16], (3, 1))
-    assert facing(HalfSpace((0.0, 0.0), (0.0, 1.0)), POINTS, side)[1].shape == (3,)
+def test_half_space_along_a_whole_side_is_refused():
+    """A side at right angles to the contact direction, but for rounding, can never touch."""
+    for across in (1e-16, -1e-16):
+        side = np.tile([1.0, across], (3, 1))
+        with pytest.raises(InputError, match=r"is along the boundary at 90 degrees to its mean outward normal \(1, "):
+            facing(HalfSpace((0.0, 0.0), (0.0, 1.0)), POINTS, side)
 
 
 @pytest.mark.parametrize(

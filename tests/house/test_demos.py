@@ -154,7 +154,7 @@ def test_the_wall_on_a_record(
 BAD = {
     "missing record": (["--motion", "none.at2"], ["none.at2", "no such file"]),
     "record that is no text": (["--motion", "binary.at2"], ["binary.at2", "not a text file"]),
-    "old setting": (["--set", "model.case=c"], ["[model] case", "contact.points, contact.held or contact"]),
+    "unknown table": (["--set", "model.case=c"], ["the table [model] is unknown", "Known: "]),
     "unknown solver": (["--solver", "magic"], ["'magic'", "Known: Automatic, Condensed"]),
     "folder below a file": (["--set", "contact.points=", "--out", "file/run"], ["file/run", "choose another"]),
     "dt zero": (["--set", "contact.points=", "--dt", "0"], ["dt is 0", "positive"]),

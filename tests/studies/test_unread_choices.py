@@ -231,7 +231,8 @@ def test_the_case_itself_runs(tmp_path: Path) -> None:
 @pytest.mark.serial
 def test_settings_may_leave_laws_of_the_file_behind(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """``--set contact=`` asks for the body without contact; a law that is set beside it is in vain."""
-    path = str(written(tmp_path, CASE + RUBS + STRIKES))
+    held = CASE.replace('clamped = "lower_bottom"', 'clamped = ["lower_bottom", "upper_top"]')  # or it would fly
+    path = str(written(tmp_path, held + RUBS + STRIKES))
     assert main(["run", path, "--quiet", "--out", str(tmp_path / "out"), "--set", "contact="]) == 0
     capsys.readouterr()
     command = ["run", path, "--quiet", "--out", str(tmp_path / "out"), "--set", "contact=", "--set", "friction.mu=0.3"]
@@ -448,6 +449,7 @@ ELSEWHERE = {  # type or type.key -> why nothing changes here, or where it is te
     "FirstModeHarmonic": "a Harmonic whose frequency is found", "FreeField": "tests/soil/test_free_field.py",
     "LinearMultistep": "its coefficients belong together; newmark names them",
     "MoreauJean.allow_energy_gain": "a permission", "contact_surface.name": "a label", "contact_pair.name": "a label",
+    "contact_surface.hinges": "a permission", "contact_pair.hinges": "a permission",
     "contact_surface.feature_angle": "of curved faces", "contact_pair.feature_angle": "of curved faces",
     "contact_surface.frictionless_corners": "of corners", "contact_pair.frictionless_corners": "of corners",
 }

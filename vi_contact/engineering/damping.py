@@ -14,6 +14,7 @@ import numpy as np
 from ..core.algebra import Array, Mask, total
 from ..core.checks import shown
 from ..core.problem import ContactProblem
+from ..core.state_checks import check_problem_given
 from ..core.system import SemiDiscreteSystem
 from ..laws.free_motions import free_motions
 from ..laws.materials import DampingRatio, NoDamping
@@ -41,6 +42,7 @@ def first_modes(problem: ContactProblem) -> FirstModes:
     """Return the first three undamped natural modes of a problem, with the ratios that its C gives.
 
     They are found once for a system and a surface. Collective."""
+    check_problem_given("first_modes", problem)
     surface, frictional = problem.surface, problem.frictional
     known: list[tuple[Any, bool, FirstModes]] = problem.system.cached(KNOWN, list)
     for one, rubbing, modes in known:

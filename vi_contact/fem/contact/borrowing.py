@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ...core.algebra import Array, Indices, from_each
+from ...core.algebra import Array, Indices, from_each, largest
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +29,9 @@ class Borrowed:
 def borrowed(space: Any, facets: Any, without: Indices, having: Indices) -> Borrowed | None:
     """Return what nodes ``without`` a pressure of their own borrow of those ``having`` one; None where there are none
     of either. Both are numbers of nodes of any rank, as this rank knows them. Collective."""
+    # A node has its condition on the rank that owns it: most boundaries end here, and nothing is gathered.
+    if not largest(space.comm, len(np.setdiff1d(without, having))):
+        return None
     asking, lending = (np.unique(np.concatenate(from_each(space.comm, one))) for one in (without, having))
     asking = np.setdiff1d(asking, lending)
     rows = space.corners_of_facets(facets.indices)

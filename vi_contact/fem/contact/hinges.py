@@ -58,8 +58,13 @@ def hinges(space: FemSpace, numbers: Indices) -> Indices:
 
     # nodes with several parts
     members = np.unique(member)
-    pairs = np.column_stack([things[members] // local.size_global, part[members]])
-    pairs = np.unique(np.concatenate(from_each(space.comm, np.unique(pairs, axis=0))), axis=0)
+    pairs = np.unique(np.column_stack([things[members] // local.size_global, part[members]]), axis=0)
+    # A node whose facets are this rank's alone has all its parts here: only what may have several is gathered.
+    here, counts = np.unique(pairs[:, 0], return_counts=True)
+    outside = np.unique(things[of_ghosts] // local.size_global)
+    several = np.union1d(here[counts > 1], outside)
+    pairs = pairs[np.isin(pairs[:, 0], several)]
+    pairs = np.unique(np.concatenate(from_each(space.comm, pairs)), axis=0)
     found, parts = np.unique(pairs[:, 0], return_counts=True)
     return np.asarray(found[parts > 1])
 
