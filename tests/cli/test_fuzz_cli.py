@@ -83,18 +83,16 @@ WRONG: dict[str, dict[str, list[str]]] = {  # command -> option -> values; an op
         "--part": ["0/1", "5/2", "x", "1"], "--launch": ["'"], "--motions": ["FILE FILE", "FILE,FILE", ",", ""],
         "--levels": ["1"], "--set": ["x"],
     },
-    "run wall": STEP | {"--set model.case=": ["foo", "3"], "--set mesh.divisions= --set mesh.size=": [*SET, "1e-9"],
+    "run wall": STEP | {"--set mesh.divisions= --set mesh.size=": [*SET, "1e-9"],
                         "--set mesh.divisions=": ["[0,1]", "[1.5,1]", "[1000000,1000000]"],
                         "--set contact.points=": ["foo", "3", "[[1]]", "[[7,1]]"], "--set contact.held=": ["3"]},
     "run channel": STEP | {
         "--set system.prescribed=": ["foo", '{type="foo"}'], "--set gravity.cells=": ["foo", "3"],
-        "--set mesh.size=": SET, "--set model.size=": SET, "--set model.sides=": ["foo", '{type="foo"}'],
+        "--set mesh.size=": SET,
         "--set material.soil=": ["{E=1,nu=0.6,rho=1}", "3"], "--set friction.mu=": ["0.3"],
         "--set friction.type=Coulomb --set friction.mu=": ["-1", "x", "nan"],
         "--set system.damping=": ['{type="Rayleigh",alpha=-1}', '{type="Rayleigh.from_frequencies",f1=nan}'],
     },
-    **{command: {"": ["", "--steps 3", "--out x", "--k 1 2", "--help", "--motion FILE --scale 2"]}
-       for command in ("wall", "channel", "beam", "layer")},  # answered by the command that has taken their place
     "report": {"": ["nowhere", "FILE", "FOLDER", "RUN --out x.docx", "RUN --show nosuch", "RUN --show t,u_x_end",
                     "RUN --refine"]},
     "plot": {"": ["nowhere", "FOLDER", "RUN", "RUN --times x", "RUN --out nowhere", "RUN --magnify 0"]},
@@ -255,7 +253,7 @@ def test_every_wrong_line_is_about_its_fault(places: dict[str, str]) -> None:
 @pytest.mark.parametrize(("command", "words"), [
     ("motion info", "pass --units as one of m/s2"),
     ("run wall --motion", "pass units (--set excitation.1.record.units=UNIT) as one of m/s2"),
-    ("motion info --units g --channel 1", "--channel 1 was passed"),
+    ("motion info --units g --channel 2", "there is no channel 2"),
     ("motion info --units g --dt 0.5", "--dt 0.5 was passed"),
     ("motion info --units cm/s2 --trim 0.5 9", "start=0.5 and end=9.0"),
 ])

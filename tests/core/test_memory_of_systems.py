@@ -82,7 +82,7 @@ CHANGES: dict[str, Change] = {
     "gap": lambda p, tags: replace(p, surface=replace(p.surface, gap0=0.5 * p.surface.gap0)),
     "other plane": lambda p, tags: replace(p, surface=oblique(p.system, tags["bottom"], 0.3)),
     "level plane": lambda p, tags: replace(p, surface=level(p.system, tags["bottom"])),
-    "other facets": lambda p, tags: replace(p, surface=level(p.system, tags["right"], (1.0001, 0.0), (-1.0, 0.0))),
+    "other facets": lambda p, tags: replace(p, surface=level(p.system, tags["right"], (2.0001, 0.0), (-1.0, 0.0))),
     "friction": lambda p, tags: replace(p, friction=vc.Coulomb(0.3)),
     "excitation": lambda p, tags: replace(p, excitation=SHAKING),
 }

@@ -110,7 +110,7 @@ class TextFile:
         if isinstance(wanted, int) and not isinstance(wanted, bool) and 0 < wanted <= len(components):
             return wanted - 1
         names = ", ".join(f"{k}: {name or 'unnamed'}" for k, name in enumerate(components, 1))
-        wrong = "" if self.channel is None else f"there is no channel {self.channel}: "
+        wrong = "" if self.channel is None else f"there is no channel {shown(self.channel)}: "
         count = "1 channel" if len(components) == 1 else f"{len(components)} channels"
         raise InputError(f"{self.path}: {wrong}the file holds {count} ({names}); pass channel=")
 
