@@ -253,7 +253,7 @@ def test_every_wrong_line_is_about_its_fault(places: dict[str, str]) -> None:
 @pytest.mark.parametrize(("command", "words"), [
     ("motion info", "pass --units as one of m/s2"),
     ("run wall --motion", "pass units (--set excitation.1.record.units=UNIT) as one of m/s2"),
-    ("motion info --units g --channel 2", "there is no channel 2"),
+    ("motion info --units g --channel 2", "there is no channel '2'"),
     ("motion info --units g --dt 0.5", "--dt 0.5 was passed"),
     ("motion info --units cm/s2 --trim 0.5 9", "start=0.5 and end=9.0"),
 ])

@@ -56,7 +56,7 @@ def test_a_component_is_chosen_by_number_or_name(channel: int | str, factor: flo
         record = read_record(write(tmp_path, THREE), "g", channel=channel, **options)
         assert np.array_equal(record.acceleration, G * factor * V) and np.isclose(record.dt, 0.01, rtol=1e-12)
     assert record.component == ("north" if factor == 1.0 else "east")
-    assert "there is no channel up" in refusal(write(tmp_path, THREE), channel="up")
+    assert "there is no channel 'up'" in refusal(write(tmp_path, THREE), channel="up")
     assert "there is no channel 3" in refusal(write(tmp_path, THREE), channel=3)
 
 

@@ -37,32 +37,34 @@ def hinges(space: FemSpace, numbers: Indices) -> Indices:
     local = mesh.topology.index_map(d - 1)
     known = local.local_to_global(facets.astype(np.int32)) if len(facets) else facets.astype(np.int64)
     keys = nodes.astype(np.int64) * local.size_global + known[:, None]
-    things, thing = np.unique(keys, return_inverse=True)
-    thing = thing.reshape(keys.shape)
 
-    # link all things of one cell and node
+    # The things of the wanted nodes, and of which cell each is.
     side = side.reshape(sides.shape)
     cell = np.broadcast_to(np.arange(len(cells))[:, None, None], (*sides.shape, nodes.shape[1])).ravel()
-    node, member = nodes[side].ravel(), thing[side].ravel()
+    node, key = nodes[side].ravel(), keys[side].ravel()
     wanted = np.isin(node, numbers)
-    cell, node, member = cell[wanted], node[wanted], member[wanted]
+    cell, node, key = cell[wanted], node[wanted], key[wanted]
+    things, member = np.unique(key, return_inverse=True)
+
+    # Link all things of one cell and node.
     order = np.lexsort((node, cell))
     same = (np.diff(cell[order]) == 0) & (np.diff(node[order]) == 0)
     one, other = member[order[:-1][same]], member[order[1:][same]]
 
-    # what ranks share: facets that are ghosts of some
+    # What ranks share: facets that are ghosts of some.
     ghosts = np.concatenate(from_each(space.comm, known[facets >= local.size_local]))
-    of_ghosts = np.zeros(len(things), dtype=bool)
-    of_ghosts[thing[np.isin(known, ghosts)].ravel()] = True
+    of_ghosts = np.isin(things % local.size_global, ghosts)
     part = parts_of(space.comm, one, other, things, np.flatnonzero(of_ghosts))
 
-    # nodes with several parts
-    members = np.unique(member)
-    pairs = np.unique(np.column_stack([things[members] // local.size_global, part[members]]), axis=0)
-    # A node whose facets are this rank's alone has all its parts here: only what may have several is gathered.
+    # Nodes with several parts.
+    pairs = np.unique(np.column_stack([things // local.size_global, part]), axis=0)
+    # A node that no other rank has, as a ghost or by a facet, has all its parts here: only what may have several is
+    # gathered.
     here, counts = np.unique(pairs[:, 0], return_counts=True)
-    outside = np.unique(things[of_ghosts] // local.size_global)
-    several = np.union1d(here[counts > 1], outside)
+    by_facets = np.unique(things[of_ghosts] // local.size_global)
+    foreign = names[mesh.geometry.index_map().size_local :]
+    as_ghosts = np.concatenate(from_each(space.comm, foreign[np.isin(foreign, numbers)]))
+    several = np.union1d(here[counts > 1], np.union1d(by_facets, as_ghosts))
     pairs = pairs[np.isin(pairs[:, 0], several)]
     pairs = np.unique(np.concatenate(from_each(space.comm, pairs)), axis=0)
     found, parts = np.unique(pairs[:, 0], return_counts=True)
