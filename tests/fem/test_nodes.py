@@ -50,8 +50,9 @@ class Weighed(MpiComm):
 
 
 def test_numbers_alone_are_gathered():
-    """A smooth boundary of 169 nodes: their numbers twice, before and after faces of one direction are joined, and twice
-    in the search for hinges, and what ranks tell of nodes that they share; no facet. Friction and redistributed mass gather shared neighbours only."""
+    """A smooth boundary of 169 nodes gathers no facet, but four times their numbers: before and after faces of one
+    direction are joined, and twice in the search for hinges; and what ranks tell of nodes that they share. Friction and
+    redistributed mass gather shared neighbours only."""
     system, tags = body()
     space, friction = system.space, Coulomb(0.3)
     assert not len(boundary(space, tags["bottom"], beyond=0.5).vertices)
