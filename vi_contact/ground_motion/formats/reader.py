@@ -39,8 +39,8 @@ def read_record(path: str | os.PathLike[str], units: str | None = None, *, dt: f
     refuse_unread(text)
     reader = next((one for one in (*SEVERAL, smc, knet, esm, at2) if one.recognises(text)), columns)
     if channel is not None and reader not in (*SEVERAL, columns):
-        raise InputError(f"{text.path}: channel={shown(channel)} was passed but the file holds one record; leave channel "
-                         "out")
+        raise InputError(f"{text.path}: channel={shown(channel)} was passed but the file holds one record; leave "
+                         "channel out")
     number("read_record", "largest", largest, positive=True, unit="m/s²")
     record = reader.read(text)
     peak = float(np.max(np.abs(record.acceleration)))
