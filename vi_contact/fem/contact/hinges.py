@@ -58,14 +58,6 @@ def hinges(space: FemSpace, numbers: Indices) -> Indices:
 
     # Nodes with several parts.
     pairs = np.unique(np.column_stack([things // local.size_global, part]), axis=0)
-    # A node that no other rank has, as a ghost or by a facet, has all its parts here: only what may have several is
-    # gathered.
-    here, counts = np.unique(pairs[:, 0], return_counts=True)
-    by_facets = np.unique(things[of_ghosts] // local.size_global)
-    foreign = names[mesh.geometry.index_map().size_local :]
-    as_ghosts = np.concatenate(from_each(space.comm, foreign[np.isin(foreign, numbers)]))
-    several = np.union1d(here[counts > 1], np.union1d(by_facets, as_ghosts))
-    pairs = pairs[np.isin(pairs[:, 0], several)]
     pairs = np.unique(np.concatenate(from_each(space.comm, pairs)), axis=0)
     found, parts = np.unique(pairs[:, 0], return_counts=True)
     return np.asarray(found[parts > 1])
