@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..core.algebra import Array, Indices, from_each
+from ..core.algebra import Array, Indices, Mask, from_each
 from ..core.checks import at
 from ..core.errors import InputError
 from ..core.problem import ContactProblem
@@ -34,17 +34,19 @@ class LooseBody:
 
 def find_loose_bodies(problem: ContactProblem) -> list[LooseBody]:
     """Return the bodies with a rigid motion that neither a stiffness nor a contact condition meets. Collective."""
+    # Nearly every body is touched: the rest, which gathers nodes, is for those that are not.
     system = problem.system
-    if not any(body.motions.shape[1] for body in free_motions(system)):
+    rows = rows_of_bodies(system)
+    touched = _touched(problem, rows)
+    if touched.all():
         return []
     comm = system.algebra.comm
-    rows = rows_of_bodies(system)
     points = system.space.coordinates
     nodes = [_distinct(from_each(comm, points[own])) for own in rows]
     size = float(np.max(np.ptp(np.concatenate(nodes), axis=0), initial=0.0))
     loose = []
     for number, free in enumerate(free_motions(system)):
-        if not free.motions.shape[1] or _is_touched(problem, rows[number]):
+        if not free.motions.shape[1] or touched[number]:
             continue
         others = [one for other, one in enumerate(nodes) if other != number]
         coinciding = 0
@@ -61,19 +63,20 @@ def _distinct(parts: list[Array]) -> Array:
     return np.asarray(np.unique(np.concatenate(parts), axis=0))
 
 
-def _is_touched(problem: ContactProblem, rows: Indices) -> bool:
-    """Return whether a translation of the body alone moves some contact condition, as its side 1 or its side 2."""
+def _touched(problem: ContactProblem, bodies: list[Indices]) -> Mask:
+    """Return for every body whether its translation alone moves some contact condition, as side 1 or 2. Collective."""
     surface = problem.surface
-    moved = 0.0
-    for translation in problem.system.influence.T:
-        alone = np.zeros_like(translation)
-        alone[rows] = translation[rows]
-        alone = surface.in_frames(alone)
-        if surface.coupling is not None:  # relative to the other side: see SemiDiscreteSystem.in_relative
-            alone = 2.0 * alone - surface.coupling @ alone
-        values = (surface.normal_values(alone), surface.tangential_values(alone))
-        moved = max(moved, *(float(np.max(np.abs(one), initial=0.0)) for one in values))
-    return bool(surface.comm.max(np.array([moved]))[0] > 0.0)
+    moved = np.zeros(len(bodies))
+    for number, rows in enumerate(bodies):
+        for translation in problem.system.influence.T:
+            alone = np.zeros_like(translation)
+            alone[rows] = translation[rows]
+            alone = surface.in_frames(alone)
+            if surface.coupling is not None:  # relative to the other side: see SemiDiscreteSystem.in_relative
+                alone = 2.0 * alone - surface.coupling @ alone
+            for values in (surface.normal_values(alone), surface.tangential_values(alone)):
+                moved[number] = max(moved[number], np.max(np.abs(values), initial=0.0))
+    return np.asarray(surface.comm.max(moved) > 0.0)
 
 
 def judge_loose_bodies(problem: ContactProblem) -> Iterator[tuple[str, bool]]:
