@@ -58,6 +58,9 @@ ELSEWHERE = {  # what fits the whole command: what runs it, or why nothing here 
         "tests/house/test_extend.py::test_the_command_computes_the_same",
     r"git (diff|tag|archive) .*": "a step of a release",
     r"python3 docs/run_commands\.py.*": "this program",
+    r"bash tests/fuzz\.sh .*": "as many runs of fuzz tests as asked for; "
+        "tests/house/test_fuzz_support.py::test_the_script_asks_for_a_seed",
+    r"python3 -m venv build/griffe|build/griffe/bin/.*|pip install 'dolfinx-solver-real.*": "asks a package index",
     # these need what a test has not
     r"git clone ADDRESS .*|cd vi_contact": "the address is the reader's own; done by hand in fresh trees",
     r"python3 -m venv .*|pip install (--no-deps )?\.|venv/bin/pip install \.|venv/bin/vi-contact .*|"

@@ -51,8 +51,9 @@ class Weighed(MpiComm):
 
 def test_numbers_alone_are_gathered():
     """A smooth boundary of 169 nodes gathers no facet, but six times their numbers: before and after faces of one
-    direction are joined, and four times in the search for hinges; and what ranks tell of nodes that they share. Friction and
-    redistributed mass gather shared neighbours only."""
+    direction are joined, and four times in the search for hinges; and what ranks tell of nodes that they share.
+
+    Friction and redistributed mass gather shared neighbours only."""
     system, tags = body()
     space, friction = system.space, Coulomb(0.3)
     assert not len(boundary(space, tags["bottom"], beyond=0.5).vertices)

@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..core.algebra import Array, Indices, Mask, from_each
 from ..core.checks import at
@@ -40,6 +39,8 @@ def find_loose_bodies(problem: ContactProblem) -> list[LooseBody]:
     touched = _touched(problem, rows)
     if touched.all():
         return []
+    from scipy.spatial import cKDTree  # late: no other run needs it
+
     comm = system.algebra.comm
     points = system.space.coordinates
     nodes = [_distinct(from_each(comm, points[own])) for own in rows]
