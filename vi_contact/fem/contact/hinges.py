@@ -31,7 +31,8 @@ def hinges(space: FemSpace, numbers: Indices) -> Indices:
     cells = np.flatnonzero(np.isin(corners, numbers).any(axis=1))
     mesh.topology.create_entities(d - 1)
     mesh.topology.create_connectivity(d, d - 1)
-    sides = mesh.topology.connectivity(d, d - 1).array.reshape(len(corners), -1)[cells]
+    per_cell = len(compat.sub_entities(mesh, d - 1))  # sides; a rank may have no cells
+    sides = mesh.topology.connectivity(d, d - 1).array.reshape(len(corners), per_cell)[cells]
     facets, side = np.unique(sides, return_inverse=True)
     nodes = names[compat.entities_to_geometry(mesh, d - 1, facets.astype(np.int32))]
     local = mesh.topology.index_map(d - 1)
