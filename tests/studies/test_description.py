@@ -317,11 +317,11 @@ def test_a_softer_side_2_with_longer_edges_is_told(
         assert ("of the contact area that touches at the start is open" in caplog.text) is warns
 
 
-def test_steps_are_compared_with_periods_of_open_contact(tmp_path: Path) -> None:
+def test_steps_are_compared_with_periods_of_open_contact(shared_tmp: Path) -> None:
     """The lower block carries the upper one: apart, the clamped one swings as it does alone, quicker than both."""
     sides = ", ".join(f'{{facets = "{block}_{side}", components = [0]}}' for block in ("lower", "upper")
                       for side in ("left", "right"))
-    model = described(written(tmp_path), COMM, f"system.prescribed=[{sides}]")
+    model = described(written(shared_tmp), COMM, f"system.prescribed=[{sides}]")
     assert model["periods_open"] == pytest.approx([axial(1, HEIGHT / 2, CELLS // 2)], rel=1e-8)
     assert model["periods_open"][0] < 0.51 * model["periods"][0]
     model["periods"].clear()  # as where closed contact holds everything
@@ -329,10 +329,10 @@ def test_steps_are_compared_with_periods_of_open_contact(tmp_path: Path) -> None
         model["run"]["dt"] = dt * model["periods_open"][0] / 20.0
         said = [one for one in _warnings(model) if "first natural period with the contact open" in one]
         assert len(said) == count
-    assert set(described(written(tmp_path), COMM, "mesh.gap=0.1")) - set(model) == set()
+    assert set(described(written(shared_tmp), COMM, "mesh.gap=0.1")) - set(model) == set()
 
 
-def test_a_harmonic_that_no_step_sees(tmp_path: Path) -> None:
+def test_a_harmonic_that_no_step_sees(shared_tmp: Path) -> None:
     shaking = """[[excitation]]
 type = "Harmonic"
 amplitude = 1.0
@@ -341,4 +341,4 @@ direction = [0.0, 1.0]
 """
     text = BLOCKS.replace(BLOCKS[BLOCKS.index("[[excitation]]"):BLOCKS.index("[run]")], shaking)
     words = "is 1 times half the period of Harmonic of 250 Hz"
-    assert sum(words in one for one in described(written(tmp_path, text), COMM)["warnings"]) == 1
+    assert sum(words in one for one in described(written(shared_tmp, text), COMM)["warnings"]) == 1

@@ -107,5 +107,7 @@ def clamped_or_prescribed(space: Any, nodes: Nodes, mask: Mask) -> Mapping[str, 
         if one.moves:
             moved[one.places(space)[0]] = True
     blocks = space.blocks_of(nodes.numbers)
-    driven = mask & (blocks >= 0) & moved[np.maximum(blocks, 0)]
+    here = np.flatnonzero(mask & (blocks >= 0))  # a rank may have no nodes
+    driven = np.zeros(len(blocks), dtype=bool)
+    driven[here] = moved[blocks[here]]
     return {"clamped": mask & ~driven, "prescribed": driven}
