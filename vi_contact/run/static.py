@@ -16,7 +16,7 @@ from itertools import accumulate, islice
 
 import numpy as np
 
-from ..core.algebra import EffectiveMatrix, from_each, largest, max_abs
+from ..core.algebra import EffectiveMatrix, largest, max_abs
 from ..core.checks import at, number, real, shown
 from ..core.collective import Parts, agree, together
 from ..core.errors import InputError
@@ -71,12 +71,14 @@ def _warn_if_open(problem: ContactProblem, state: State) -> None:
     )
     if pressed <= 0.0 or lost <= OPEN * area:
         return
-    own = [(int(surface.slots[row]), surface.points[row]) for row in np.flatnonzero(opened)[:1]]
-    first = min((one for part in from_each(surface.comm, own) for one in part), key=lambda one: one[0])
+    # The open point with the lowest number: of all ranks one has it, and tells its place by a sum.
+    first = -largest(surface.comm, np.max(-surface.slots[opened], initial=-np.inf))
+    own = opened & (surface.slots == first)
+    place = surface.comm.sum(surface.points[own].sum(axis=0))
     if surface.comm.rank == 0:
         log.warning("at rest at t = %g s %.3g %% of the contact area that touches at the start is open, from %s on: "
                     "loads that lift a body do that; so does a side 1 with smaller facets than a softer side 2, which "
-                    "should be meshed as finely or be side 1", state.t, 100.0 * lost / area, at(first[1]))
+                    "should be meshed as finely or be side 1", state.t, 100.0 * lost / area, at(place))
 
 
 class Equilibria:
