@@ -72,7 +72,7 @@ def _warn_if_open(problem: ContactProblem, state: State) -> None:
     if pressed <= 0.0 or lost <= OPEN * area:
         return
     # The open point with the lowest number: of all ranks one has it, and tells its place by a sum.
-    first = -largest(surface.comm, np.max(-surface.slots[opened], initial=-np.inf))
+    first = -largest(surface.comm, np.max(-surface.slots[opened].astype(float), initial=-np.inf))
     own = opened & (surface.slots == first)
     place = surface.comm.sum(surface.points[own].sum(axis=0))
     if surface.comm.rank == 0:
