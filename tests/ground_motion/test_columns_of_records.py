@@ -298,3 +298,16 @@ def test_the_remedy_that_is_offered_gives_the_right_samples(name: str, tmp_path:
     assert remedy in refusal(write(tmp_path, text), **options)
     record = read_record(write(tmp_path, text if change is None else change(text)), **better)
     assert record.acceleration.shape == right.shape and np.allclose(record.acceleration, right, rtol=1e-12, atol=1e-15)
+
+
+def test_a_record_of_five_samples_is_told_without_a_mean_period(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its frequencies are 40 Hz apart, so that none lies between 0.25 and 20 Hz; all else is told."""
+    heading = "Time Increment (s) : 0.005\nNumber of Data : 5\nAcceleration time series in m/s/s\n"
+    text = f"{heading}0.0\n0.1\n-0.3\n0.2\n0.0\n"
+    path = write(tmp_path, text)
+    assert main(["motion", "info", str(path)]) == 0
+    printed = capsys.readouterr().out
+    assert "mean period         (the record has no motion from 0.25 to 20 Hz)" in printed
+    assert "samples             5" in printed

@@ -1,6 +1,7 @@
 """Measure how strong a record is: peaks, Arias intensity, durations, what spectra say; and tell what it holds."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -134,7 +135,7 @@ def record_info(record: Record) -> str:
     measures = (pga, pga_time, pgv, pgd, arias, d5_95, cav, rms, housner_intensity)
     found: dict[str, Any] = {one.__name__: one(record) for one in measures}
     for one in (predominant_period, mean_period):
-        found[one.__name__] = f"{one(record):.3g} s" if found["pga"] > 0.0 else "(all zero)"
+        found[one.__name__] = _period_in_words(one, record) if found["pga"] > 0.0 else "(all zero)"
     velocity, displacement = (values[-1] for values in integrated(record))
     text = Path(__file__).with_name("record_info.txt").read_text(encoding="utf-8").format(
         **found, record=record, title=record.title or "(none)", station=record.station or "(not stated)",
@@ -142,3 +143,11 @@ def record_info(record: Record) -> str:
         displacement=displacement, in_g=found["pga"] / STANDARD_GRAVITY)
     doubts = (f"{'doubt':<20}{doubt}" for doubt in record.doubts)
     return "\n".join([text, *doubts, *(f"{'note':<20}{note}" for note in record.notes)])
+
+
+def _period_in_words(period: Callable[[Record], float], record: Record) -> str:
+    """Return a period [s], or why the record has none: all else of the table is told all the same."""
+    try:
+        return f"{period(record):.3g} s"
+    except InputError as error:  # "name: why; remedy"
+        return f"({str(error).partition(': ')[2].partition(';')[0]})"
