@@ -115,7 +115,7 @@ NEEDS = "PETSc factorises, because the quicker way needs a C compiler and PETSc'
 SLOW = "numpy does what compiled loops would do faster, because they need a C compiler: "
 
 
-@pytest.mark.parametrize("how", ["no compiler", "no cache", "no header", "no SuiteSparse", "no PETSc", "two", "static"])
+@pytest.mark.parametrize("how", ["no compiler", "no cache", "no header", "no CHOLMOD", "no PETSc", "two", "static"])
 def test_without_it_today_s_factor_serves_and_the_log_says_so_once(
     how: str, cold: Path, small: Path, monkeypatch: Any, caplog: Any, tmp_path: Path
 ) -> None:
@@ -133,9 +133,9 @@ def test_without_it_today_s_factor_serves_and_the_log_says_so_once(
     elif how == "no header":
         monkeypatch.setattr(compiled, "cholmod_of_petsc", lambda: Path("/nowhere/lib/libcholmod.so.3"))
         said = "there is no header cholmod.h beside /nowhere/lib/libcholmod.so.3"
-    elif how == "no SuiteSparse":
+    elif how == "no CHOLMOD":
         monkeypatch.setattr(packages, "petsc_has", lambda package: False)
-        said = "this PETSc was built without SuiteSparse"
+        said = "this PETSc was built without CHOLMOD"
     elif how == "no PETSc":
         monkeypatch.setattr(packages, "PETSC", "nobody.PETSc")
         said = "no PETSc is in this process"
@@ -167,7 +167,7 @@ def test_a_cholmod_of_another_version_than_its_header_is_left_alone(
     small: Path, monkeypatch: Any, tmp_path: Path
 ) -> None:
     """Structures change between versions: the compiled file itself compares."""
-    if not packages.petsc_has("suitesparse"):
+    if not packages.petsc_has("cholmod"):
         pytest.skip("PETSc has no CHOLMOD here")
     header = compiled._header(compiled.cholmod_of_petsc()) / "cholmod.h"
     other = tmp_path / "cholmod.h"

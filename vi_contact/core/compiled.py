@@ -101,8 +101,8 @@ def cholmod_of_petsc() -> Path:
     """Return the file of the CHOLMOD that PETSc has brought into this process; OSError, which says why, without one."""
     if not packages.petsc_is_here():
         raise OSError("no PETSc is in this process")
-    if not packages.petsc_has("suitesparse"):
-        raise OSError("this PETSc was built without SuiteSparse")
+    if not packages.petsc_has("cholmod"):
+        raise OSError("this PETSc was built without CHOLMOD")
     lines = MAPS.read_text(encoding="utf-8", errors="surrogateescape").splitlines()
     files = {line.split(maxsplit=5)[5] for line in lines if len(line.split(maxsplit=5)) == 6}
     found = sorted(file for file in files if Path(file).name.startswith("libcholmod"))

@@ -5,6 +5,7 @@ Call it as ``packages.petsc_has(…)``: a package that is assumed is a crash on 
 import sys
 
 PETSC = "petsc4py.PETSc"
+OF_SUITESPARSE = ("amd", "cholmod", "umfpack")  # one package to PETSc before 3.22, and from then on each by itself
 
 
 def petsc_is_here() -> bool:
@@ -14,4 +15,7 @@ def petsc_is_here() -> bool:
 
 def petsc_has(package: str) -> bool:
     """Say whether PETSc is in this process, and was built with a package, by its name in PETSc's configuration."""
-    return petsc_is_here() and bool(sys.modules[PETSC].Sys.hasExternalPackage(package))
+    if not petsc_is_here():
+        return False
+    names = [package, "suitesparse"] if package in OF_SUITESPARSE else [package]
+    return any(sys.modules[PETSC].Sys.hasExternalPackage(name) for name in names)

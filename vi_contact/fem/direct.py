@@ -26,7 +26,7 @@ MUMPS_MEMORY = (-8, -9, -11, -13, -14, -15, -17, -18, -19, -20)
 def ordering() -> str:
     """Return the order of elimination that PETSc's own factorisation takes: minimum degree, which is of SuiteSparse, or
     without it nested dissection, which is PETSc's."""
-    return "amd" if packages.petsc_has("suitesparse") else "nd"
+    return "amd" if packages.petsc_has("amd") else "nd"
 
 
 def own_serves(mat: Any) -> bool:
@@ -43,7 +43,7 @@ def by_mumps(mat: Any, *, symmetric: bool, own: bool) -> bool:
     what is missing, unless options of the user choose (``own``). Collective."""
     serves = symmetric and own_serves(mat)
     mumps = packages.petsc_has("mumps") and not serves
-    missing = [] if packages.petsc_has("suitesparse") else ["SuiteSparse (CHOLMOD, AMD)"]
+    missing = [] if packages.petsc_has("cholmod") and packages.petsc_has("amd") else ["SuiteSparse (CHOLMOD, AMD)"]
     missing += [] if packages.petsc_has("mumps") or serves else ["MUMPS"]
     if missing and not own and mat.comm.rank == 0:
         kind = "Cholesky" if symmetric else "LU"

@@ -139,7 +139,7 @@ def _part(key: str) -> str:
     return next((one for one in TABLES["parts"] if key.startswith(one)), "")
 
 
-EXCHANGE = {"umfpack": "suitesparse", "superlu": "superlu"}  # solvers that exchange rows, and their packages
+EXCHANGE = ("umfpack", "superlu")  # solvers that exchange rows
 
 
 def direct(kind: str, ranks: int, *, exchanges: bool = False) -> Options:
@@ -153,7 +153,7 @@ def direct(kind: str, ranks: int, *, exchanges: bool = False) -> Options:
         return {**TABLES["mumps"], "pc_type": kind}
     own = {"ksp_type": "preonly", "pc_type": kind, "pc_factor_mat_solver_type": "petsc"}
     if exchanges:
-        found = [name for name, package in EXCHANGE.items() if packages.petsc_has(package)]
+        found = [name for name in EXCHANGE if packages.petsc_has(name)]
         if not found:
             raise InputError("Volume() with friction needs a direct solver that exchanges rows, and this PETSc has "
                              "none (MUMPS, SuiteSparse or SuperLU): take Condensed() or Iterative()")
