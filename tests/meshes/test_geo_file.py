@@ -226,7 +226,7 @@ def test_a_surface_that_cannot_be_transfinite_is_meshed_freely(
     arrays = arrays_of(GeoFile(path=written(tmp_path, text)))
     assert area(arrays) == pytest.approx(35.0, rel=1e-12)
     said = [one.getMessage() for one in caplog.records]
-    assert any("Surface 1 is meshed freely, not transfinite: its sides have divisions" in one for one in said)
+    assert any("Surface 1 is meshed freely, not transfinite: " in one for one in said)
 
 
 @pytest.mark.parametrize("text", [

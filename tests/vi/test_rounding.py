@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("dolfinx")
 
 import ufl
-from dolfinx import fem
+from dolfinx import fem, mesh
 from own_forms import clamped, space, square
 
 from vi_contact import InputError, vi
@@ -97,6 +97,31 @@ def test_bounds_that_cross_by_rounding(comm: Any) -> None:
     lower.x.array[:] += 1e-9
     with pytest.raises(InputError, match="lower is above upper"):
         vi.solve(F, u, lower=lower, upper=upper, bcs=[clamped(V)])
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e-17, -1e-17, 1e-16])
+@pytest.mark.parametrize("load", [0.0, 1e-9, 1e-3])
+def test_a_body_that_rests_on_its_floor(comm: Any, shift: float, load: float) -> None:
+    """An elastic block of finite strains touches a floor whose height is rounded: no load, no displacement, and a small
+    load is not lost in the rounding."""
+    V = space(square(comm, 4), ("Lagrange", 1), 2)
+    u, v, floor = fem.Function(V), ufl.TestFunction(V), fem.Function(V)
+    F = ufl.Identity(2) + ufl.grad(u)
+    W = 0.5 * (ufl.tr(F.T * F) - 2.0) - ufl.ln(ufl.det(F)) + 0.5 * ufl.ln(ufl.det(F)) ** 2
+    floor.interpolate(lambda x: np.vstack([0.0 * x[0] - 10.0, np.where(x[1] > 1e-9, -x[1], shift)]))
+    form = ufl.derivative(W * ufl.dx, u, v) + load * v[1] * ufl.dx(V.mesh)
+    result = vi.solve(form, u, lower=floor, bcs=[held_sideways(V)])
+    assert result.certificate.worst <= 1e-9
+    assert np.max(np.abs(u.x.array), initial=0.0) <= max(load, 4e-15)
+    pressed = comm.allreduce(float(np.sum(result.lambda_lower.x.array[: 2 * V.dofmap.index_map.size_local])))
+    assert pressed == pytest.approx(load, rel=1e-6 if load else 0.0, abs=1e-14)
+
+
+def held_sideways(V: Any) -> Any:
+    """A condition that keeps the left side from moving to the right."""
+    left = mesh.locate_entities_boundary(V.mesh, 1, lambda x: np.isclose(x[0], 0.0))
+    across = V.sub(0)
+    return fem.dirichletbc(np.float64(0.0), fem.locate_dofs_topological(across, 1, left), across)
 
 
 def _largest() -> Any:

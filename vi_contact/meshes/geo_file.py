@@ -27,7 +27,7 @@ from vi_contact.meshes.mesh_file import safe_copy
 MOST = 8  # how often a mesh may be refined
 log = logging.getLogger(__name__)
 _NOT_TRANSFINITE = re.compile(
-    r"Error\s*: ((?:Surface|Volume) \d+) cannot be meshed using the transfinite algo \((.*)\)"
+    r"(?:Error|Warning)\s*: ((?:Surface|Volume) \d+) cannot be meshed using the transfinite algo\w* \((.*)\)"
 )
 
 
@@ -119,10 +119,10 @@ def mesh_here(refine: int, time_limit: float) -> None:
 def _tell_errors(lines: Sequence[str]) -> None:
     """Print a note where Gmsh left a transfinite mesh out, and end the process at any other error of its log."""
     for before, line in pairwise(["", *lines]):
-        if not line.startswith("Error"):
+        if match := _NOT_TRANSFINITE.match(line):  # Gmsh itself goes on with a free mesh; from 4.14 on it only warns
+            print(f"{match[1]} is meshed freely, not transfinite: {match[2]}")
             continue
-        if match := _NOT_TRANSFINITE.match(line):  # Gmsh itself goes on with a free mesh
-            print(f"{match[1]} is meshed freely, not transfinite: its sides have {match[2]}")
+        if not line.startswith("Error"):
             continue
         group = before.partition(": in")[2]
         sys.exit(f"{line} {'in' if ': in the group' in before else ''}{group}".rstrip())

@@ -9,6 +9,11 @@ from .forms import Problem
 
 DIAGONAL = 1e-8  # of the largest: smaller entries of the Jacobian's diagonal count as this
 
+# Of the size of the field: how small u may be and still be judged by its own size, where F is not linear. Such an F is
+# computed from numbers like 1 + grad u, and bounds from coordinates: both keep rounding errors of 1e-16 of the field,
+# which of a smaller u would be more than the tolerance.
+SMALL = 1e-6
+
 
 class Judged:
     """Hold what is known at the present u of a problem; arrays are of its free unknowns.
@@ -37,7 +42,9 @@ class Judged:
         self.broken = not np.all(np.isfinite(sizes))
         x_max, b_max, Ax_max, F_max, most = sizes.tolist()
         self.diagonal = np.maximum(diagonal, DIAGONAL * most)
-        x_ref, r_ref = x_max or 1.0, max(b_max, F_max) or 1.0
+        least = 0.0 if problem.constant else SMALL * problem.size
+        x_ref = max(x_max, least) or 1.0
+        r_ref = max(b_max, F_max, most * least) or 1.0
 
         # A bound acts where the multiplier, in units of forces, exceeds the distance, in units of u.
         below, above = self.x - lower, upper - self.x
@@ -50,7 +57,8 @@ class Judged:
         balance = max_abs(self.F - self.push[0] + self.push[1])
         away = max(max_abs(below[at_lower]), max_abs(above[at_upper]))
         behind, wrong = (max(map(lowest, pair)) for pair in ((below, above), self.push))
-        scale = np.array([max(b_max, Ax_max, ROUNDED * most * x_max) or 1.0, x_ref, r_ref, x_ref])
+        carried = max(b_max, Ax_max, ROUNDED * most * x_max, most * least) or 1.0
+        scale = np.array([carried, x_ref, r_ref, x_ref])
         worst = problem.comm.max(np.array([balance, behind, wrong, away])) / scale
         known = not self.broken and not left
         self.certificate = Certificate(*(worst.tolist() if known else [np.inf] * len(worst)))
