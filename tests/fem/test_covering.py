@@ -30,8 +30,8 @@ from vi_contact.run.static import static_equilibrium
 
 COMM = MPI.COMM_WORLD
 Q = 1e6
-SOFT, STIFF = 1e8, 1e16
-ROUNDED = 1e-6  # the ground gives way by SOFT / STIFF, which is felt where its facets are small
+SOFT, STIFF = 1e8, 1e14  # a larger contrast is lost in the factors of a PETSc without CHOLMOD
+ROUNDED = 5.0 * SOFT / STIFF  # the ground gives way by their ratio, a little more where its facets are small
 
 
 def pressed(mesh: Any, *, clamped: str, names: tuple[str, str]) -> tuple[ContactSurface, Array]:
@@ -83,7 +83,7 @@ def test_uniform_pressure_in_space(beyond, angle, simplices):
     )
     mesh = Blocks({"lower": lower, "upper": upper})
     surface, pressures = pressed(mesh, clamped="lower_bottom", names=("lower_top", "upper_bottom"))
-    assert pressures == pytest.approx(np.ones(surface.total), abs=1e-5)
+    assert pressures == pytest.approx(np.ones(surface.total), abs=10.0 * SOFT / STIFF)
     assert seen(surface).weights.sum() == pytest.approx(1.0, rel=1e-6)  # less of a facet is nothing
 
 
