@@ -47,7 +47,9 @@ def runs(count: int) -> list[Callable[[], object]]:
     problem = beam_problem(body, elements, normal_force=lambda t: 100.0, friction=law, start=start)
 
     def algorithm(name: str, friction: beam.TipFriction) -> object:
-        stepper = beam.BeamStepper(body, elements, DT, source.readings(DT)[name], source.published_mu, friction)
+        stepper = beam.BeamStepper(
+            body, elements, DT, source.readings(DT)[name], source.published_mu, friction
+        )
         return beam.run_beam(stepper, start, steps=STEPS)
 
     def contract() -> object:
@@ -64,9 +66,14 @@ def main() -> None:
     options.add_argument("--elements", type=int, nargs="+", default=[100, 1000, 10000])
     options.add_argument("--repeat", type=int, default=5)
     given = options.parse_args()
-    print(f"{STEPS} steps, seconds\n  elements   reading A   reading C   exact law   exact law through the contract")
+    print(
+        f"{STEPS} steps, seconds\n  elements   reading A   reading C   exact law   exact law through the contract"
+    )
     for count in given.elements:
-        print(f"  {count:8d}" + "".join(f"{best(action, given.repeat):12.3f}" for action in runs(count)))
+        print(
+            f"  {count:8d}"
+            + "".join(f"{best(action, given.repeat):12.3f}" for action in runs(count))
+        )
 
 
 if __name__ == "__main__":

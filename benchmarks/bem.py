@@ -73,18 +73,33 @@ def row(k: int, steps: int, *, errors: bool) -> dict[str, float]:
     start = time.process_time()
     problem.condensed()
     result["condense"] = time.process_time() - start
-    parts = [part.values for part in blocks.stretches] if isinstance(blocks, bem.CompressedBlocks) else [
-        blocks.single, blocks.double, blocks.hyper]
+    parts = (
+        [part.values for part in blocks.stretches]
+        if isinstance(blocks, bem.CompressedBlocks)
+        else [blocks.single, blocks.double, blocks.hyper]
+    )
     result["blocks MB"] = sum(part.nbytes for part in parts) / 1e6
-    return result | {"peak MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0 * 1.048576}
+    return result | {
+        "peak MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0 * 1.048576
+    }
 
 
 def cost(k: int, steps: int, way: str) -> dict[str, float | str]:
     """Seconds and memory of one size with dense ("direct") or compressed blocks."""
     start = time.process_time()
-    blocks = bem.energetic_blocks(bem.polygon(SQUARE, 1.0 / k), MATERIAL, dt=1.0 / k, steps=steps,
-                                  compressed=way == "compressed")
-    result: dict[str, float | str] = {"k": k, "steps": steps, "way": way, "assembly_s": time.process_time() - start}
+    blocks = bem.energetic_blocks(
+        bem.polygon(SQUARE, 1.0 / k),
+        MATERIAL,
+        dt=1.0 / k,
+        steps=steps,
+        compressed=way == "compressed",
+    )
+    result: dict[str, float | str] = {
+        "k": k,
+        "steps": steps,
+        "way": way,
+        "assembly_s": time.process_time() - start,
+    }
     problem = rod(blocks, smooth_load)
     start = time.process_time()
     problem.condensed()
@@ -94,7 +109,9 @@ def cost(k: int, steps: int, way: str) -> dict[str, float | str]:
         result["blocks_mb"] = sum(part.values.nbytes for part in blocks.stretches) / 1e6
         result["errors"] = [float(value) for value in blocks.errors]
     else:
-        result["blocks_mb"] = sum(part.nbytes for part in (blocks.single, blocks.double, blocks.hyper)) / 1e6
+        result["blocks_mb"] = (
+            sum(part.nbytes for part in (blocks.single, blocks.double, blocks.hyper)) / 1e6
+        )
     if k <= 40:
         start = time.process_time()
         motion = problem.solve()
@@ -102,7 +119,8 @@ def cost(k: int, steps: int, way: str) -> dict[str, float | str]:
         exact = echoes(motion.times, smooth_integral)[:, None]
         top = motion.displacement[:, 1][:, blocks.mesh.nodes_of(blocks.mesh.labels == 2)]
         result["error_against_exact"] = float(
-            np.linalg.norm(top - exact) / np.linalg.norm(np.broadcast_to(exact, top.shape)))
+            np.linalg.norm(top - exact) / np.linalg.norm(np.broadcast_to(exact, top.shape))
+        )
     result["peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0 * 1.048576
     return result
 
@@ -121,14 +139,17 @@ def costs(sides: list[int], steps: list[int]) -> dict:
     for row in rows:
         in_n, in_k = row["steps"] / direct["steps"], row["k"] / direct["k"]
         before = in_n * in_k**2 * direct["assembly_s"] + (
-            in_n**2 * in_k**2 * (row["k"] + 1) / (direct["k"] + 1) * direct["condensation_s"])
+            in_n**2 * in_k**2 * (row["k"] + 1) / (direct["k"] + 1) * direct["condensation_s"]
+        )
         row["ratio_to_direct"] = row["total_s"] / before
     growth = {}
     for name, way in (("before", "direct"), ("after", "compressed")):
         last = [measured("--cost", GROWTH[0], n, way) for n in GROWTH[1]]
         rows += last
-        growth[name] = {part: float(np.log2(last[-1][part] / last[-2][part]))
-                        for part in ("assembly_s", "condensation_s", "total_s")}
+        growth[name] = {
+            part: float(np.log2(last[-1][part] / last[-2][part]))
+            for part in ("assembly_s", "condensation_s", "total_s")
+        }
     return {"rows": rows, "growth_in_steps": growth}
 
 
@@ -137,7 +158,9 @@ def wave_errors(blocks: bem.EnergeticBlocks, k: int) -> dict[str, float]:
     for name, shear in (("pulse P", False), ("pulse S", True)):
         wave, mesh = pulse(shear=shear), blocks.mesh
         forces = bem.traction_forces(mesh, wave.traction, dt=blocks.dt, steps=4 * k)
-        exact = np.array([wave.displacement(mesh.points, blocks.dt * (j + 1)).T for j in range(4 * k)])
+        exact = np.array(
+            [wave.displacement(mesh.points, blocks.dt * (j + 1)).T for j in range(4 * k)]
+        )
         found = bem.BoundaryProblem(bem.PoincareSteklov(blocks, 1.0), forces).solve().displacement
         errors[name] = float(np.linalg.norm(found - exact) / np.linalg.norm(exact))
     return errors
@@ -145,12 +168,17 @@ def wave_errors(blocks: bem.EnergeticBlocks, k: int) -> dict[str, float]:
 
 def rod_errors(blocks: bem.EnergeticBlocks) -> dict[str, float]:
     errors, mesh = {}, blocks.mesh
-    loads = {"step": (lambda t: 1.0, lambda t: np.maximum(t, 0.0)), "sin²": (smooth_load, smooth_integral)}
+    loads = {
+        "step": (lambda t: 1.0, lambda t: np.maximum(t, 0.0)),
+        "sin²": (smooth_load, smooth_integral),
+    }
     for name, (load, integral) in loads.items():
         motion = rod(blocks, load).solve()
         exact = echoes(motion.times, integral)[:, None]
         top = motion.displacement[:, 1][:, mesh.nodes_of(mesh.labels == 2)]
-        errors[name] = float(np.linalg.norm(top - exact) / np.linalg.norm(np.broadcast_to(exact, top.shape)))
+        errors[name] = float(
+            np.linalg.norm(top - exact) / np.linalg.norm(np.broadcast_to(exact, top.shape))
+        )
         if name == "step":
             base = -motion.forces[:, 1][:, mesh.nodes_of(mesh.labels == 0)].sum(axis=1)
             middle = motion.times - 0.5 * blocks.dt
@@ -163,12 +191,16 @@ def rod_errors(blocks: bem.EnergeticBlocks) -> dict[str, float]:
 def long_run(ratio: float, *, k: int = 5, end: float = 60.0) -> str:
     """Greatest displacement (exact: 1) and work after the load in the first and last ten time units."""
     dt = ratio / k
-    blocks = bem.energetic_blocks(bem.polygon(SQUARE, 1.0 / k), MATERIAL, dt=dt, steps=round(end / dt))
+    blocks = bem.energetic_blocks(
+        bem.polygon(SQUARE, 1.0 / k), MATERIAL, dt=dt, steps=round(end / dt)
+    )
     motion = rod(blocks, smooth_load).solve()
     size = np.abs(motion.displacement[:, 1]).max(axis=1)
     early, late = (motion.times > 2.0) & (motion.times < 12.0), motion.times > end - 10.0
-    return (f"{ratio:5.2f} {blocks.steps:5d}  {size[early].max():.4f} {size[late].max():.4f}  "
-            f"{motion.work[early].max():.4f} {motion.work[late].max():.4f}")
+    return (
+        f"{ratio:5.2f} {blocks.steps:5d}  {size[early].max():.4f} {size[late].max():.4f}  "
+        f"{motion.work[early].max():.4f} {motion.work[late].max():.4f}"
+    )
 
 
 def thin(share: float, *, h: float = 0.1, end: float = 6.0) -> str:
@@ -182,12 +214,16 @@ def thin(share: float, *, h: float = 0.1, end: float = 6.0) -> str:
     motion = convolution_rod(operator, smooth_load).solve()
     exact = echoes(motion.times, smooth_integral)[:, None]
     top = motion.displacement[:, 1][:, mesh.nodes_of(mesh.labels == 2)]
-    errors.append(float(np.linalg.norm(top - exact) / np.linalg.norm(np.broadcast_to(exact, top.shape))))
+    errors.append(
+        float(np.linalg.norm(top - exact) / np.linalg.norm(np.broadcast_to(exact, top.shape)))
+    )
     return " ".join(f"{value:9.3g}" for value in (1.0 / share, *errors))
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--sides", type=int, nargs="*", default=[5, 10, 20])
     parser.add_argument("--steps", type=int, nargs="*", default=[60, 120, 240])
     parser.add_argument("--long", action="store_true")
@@ -199,7 +235,9 @@ def main() -> None:
     parser.add_argument("--one", type=int, nargs=3, help=argparse.SUPPRESS)
     chosen = parser.parse_args()
     if chosen.n and len(chosen.n) != len(chosen.k):
-        parser.error(f"--n has {len(chosen.n)} numbers, --k {len(chosen.k)}; give one number of steps for each k")
+        parser.error(
+            f"--n has {len(chosen.n)} numbers, --k {len(chosen.k)}; give one number of steps for each k"
+        )
     if chosen.one:
         print(json.dumps(row(chosen.one[0], chosen.one[1], errors=bool(chosen.one[2]))))
         return
@@ -213,8 +251,16 @@ def main() -> None:
     print(*(f"{name:>9}" for name in COLUMNS + ERRORS))
     for size in sizes:
         command = [sys.executable, __file__, "--one", *map(str, size)]
-        result = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
-        print(*(f"{result[name]:9.4g}" if name in result else f"{'':>9}" for name in COLUMNS + ERRORS), flush=True)
+        result = json.loads(
+            subprocess.run(command, check=True, capture_output=True, text=True).stdout
+        )
+        print(
+            *(
+                f"{result[name]:9.4g}" if name in result else f"{'':>9}"
+                for name in COLUMNS + ERRORS
+            ),
+            flush=True,
+        )
     if chosen.long:
         print("\nc_P dt/h, steps, greatest displacement early and late, work early and late")
         for ratio in (0.1, 0.25, 1.0, 4.0):

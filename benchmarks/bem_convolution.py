@@ -40,8 +40,24 @@ from vi_contact.bem.uzawa_space_time import SpaceTimeUzawa  # noqa: E402
 from vi_contact.core.errors import StepFailure  # noqa: E402
 
 METHODS = ("energetic", "convolution")
-COLUMNS = ("k", "assembly", "solve", "condense", "peak MB", "pulse P", "pulse S", "sin²", "step", "base", "max base",
-           "impulse", "E(2)", "Uzawa", "Uzawa/5", "W_0")
+COLUMNS = (
+    "k",
+    "assembly",
+    "solve",
+    "condense",
+    "peak MB",
+    "pulse P",
+    "pulse S",
+    "sin²",
+    "step",
+    "base",
+    "max base",
+    "impulse",
+    "E(2)",
+    "Uzawa",
+    "Uzawa/5",
+    "W_0",
+)
 Problem = Callable[..., Any]
 Forces = Callable[[float, int], np.ndarray]
 
@@ -50,11 +66,17 @@ def discretised(method: str, k: int) -> tuple[Problem, Callable[[Forces], np.nda
     """problem(forces, fixed=, contact=), and the loads it takes from mean forces of any number of steps."""
     mesh, dt, steps = bem.polygon(SQUARE, 1.0 / k), 1.0 / k, 6 * k
     if method == "energetic":
-        operator = bem.PoincareSteklov(bem.energetic_blocks(mesh, MATERIAL, dt=dt, steps=steps), MATERIAL.rho)
-        return lambda *a, **more: bem.BoundaryProblem(operator, *a, **more), lambda forces: forces(dt, steps)
+        operator = bem.PoincareSteklov(
+            bem.energetic_blocks(mesh, MATERIAL, dt=dt, steps=steps), MATERIAL.rho
+        )
+        return lambda *a, **more: bem.BoundaryProblem(operator, *a, **more), lambda forces: forces(
+            dt, steps
+        )
     transformed = convolution_operator(mesh, MATERIAL, dt=dt, steps=steps)
-    return (lambda *a, **more: bem.BoundaryProblem(transformed, *a, **more),
-            transformed.frequencies.substep_means)
+    return (
+        lambda *a, **more: bem.BoundaryProblem(transformed, *a, **more),
+        transformed.frequencies.substep_means,
+    )
 
 
 def row(method: str, k: int) -> dict[str, float]:
@@ -69,24 +91,42 @@ def row(method: str, k: int) -> dict[str, float]:
     result["solve"] = time.process_time() - start
     rod_errors(result, problem, loads, "step", lambda t: 1.0, lambda t: np.maximum(t, 0.0), k)
     pressed_square(result, problem, k)
-    return result | {"peak MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0 * 1.048576}
+    return result | {
+        "peak MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0 * 1.048576
+    }
 
 
 def pulse_error(problem: Problem, loads: Callable, k: int, *, shear: bool) -> float:
     wave, mesh = pulse(shear=shear), bem.polygon(SQUARE, 1.0 / k)
     forces = loads(lambda dt, steps: bem.traction_forces(mesh, wave.traction, dt=dt, steps=steps))
     exact = np.array([wave.displacement(mesh.points, (j + 1) / k).T for j in range(4 * k)])
-    return float(np.linalg.norm(problem(forces).solve().displacement[: 4 * k] - exact) / np.linalg.norm(exact))
+    return float(
+        np.linalg.norm(problem(forces).solve().displacement[: 4 * k] - exact)
+        / np.linalg.norm(exact)
+    )
 
 
-def rod_errors(result: dict, problem: Problem, loads: Callable, name: str, load: Callable, integral: Callable, k: int):
+def rod_errors(
+    result: dict,
+    problem: Problem,
+    loads: Callable,
+    name: str,
+    load: Callable,
+    integral: Callable,
+    k: int,
+):
     mesh = bem.polygon(SQUARE, 1.0 / k)
     sides = [mesh.nodes_of(mesh.labels == side) for side in range(4)]
-    forces = loads(lambda dt, steps: bem.traction_forces(
-        mesh, lambda x, n, t: n * load(t), dt=dt, steps=steps, elements=mesh.labels == 2))
+    forces = loads(
+        lambda dt, steps: bem.traction_forces(
+            mesh, lambda x, n, t: n * load(t), dt=dt, steps=steps, elements=mesh.labels == 2
+        )
+    )
     motion = problem(forces, fixed=np.stack([sides[1] | sides[3], sides[0]])).solve()
     exact, top = echoes(motion.times, integral)[:, None], motion.displacement[:, 1][:, sides[2]]
-    result[name] = float(np.linalg.norm(top - exact) / np.linalg.norm(np.broadcast_to(exact, top.shape)))
+    result[name] = float(
+        np.linalg.norm(top - exact) / np.linalg.norm(np.broadcast_to(exact, top.shape))
+    )
     if name == "step":
         base, middle = -motion.forces[:, 1][:, sides[0]].sum(axis=1), motion.times - 0.5 / k
         exact_base = np.where((middle > 1.0) & ((middle - 1.0) % 4.0 < 2.0), 2.0, 0.0)
@@ -96,13 +136,18 @@ def rod_errors(result: dict, problem: Problem, loads: Callable, name: str, load:
 
 def pressed_square(result: dict, problem: Problem, k: int) -> None:
     mesh = bem.polygon(SQUARE, 1.0 / k)
-    forces = bem.traction_forces(mesh, lambda x, n, t: -n, dt=1.0 / k, steps=6 * k, elements=mesh.labels == 2)
+    forces = bem.traction_forces(
+        mesh, lambda x, n, t: -n, dt=1.0 / k, steps=6 * k, elements=mesh.labels == 2
+    )
     whole = problem(forces, contact=mesh.labels == 0)
     start = time.process_time()
     contact = BoundaryContact(whole.condensed(), friction=Tresca(0.05))
     result["condense"] = time.process_time() - start
     run = march_contact(contact)
-    result["impulse"], result["E(2)"] = run.impulse[4 * k - 1, 1], whole.solve(run.forces).work[2 * k - 1]
+    result["impulse"], result["E(2)"] = (
+        run.impulse[4 * k - 1, 1],
+        whole.solve(run.forces).work[2 * k - 1],
+    )
     result["W_0"] = float(np.linalg.eigvalsh(contact.compliance.W[0])[-1])
     for name, share in (("Uzawa", 1.0), ("Uzawa/5", 0.2)):
         try:
@@ -113,7 +158,9 @@ def pressed_square(result: dict, problem: Problem, k: int) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--sides", type=int, nargs="*", default=[10, 20])
     parser.add_argument("--methods", nargs="*", choices=METHODS, default=METHODS)
     parser.add_argument("--one", nargs=2, help=argparse.SUPPRESS)
@@ -125,7 +172,9 @@ def main() -> None:
     for k in chosen.sides:
         for method in chosen.methods:
             command = [sys.executable, __file__, "--one", method, str(k)]
-            result = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+            result = json.loads(
+                subprocess.run(command, check=True, capture_output=True, text=True).stdout
+            )
             print(f"{method:>10}", *(f"{result[name]:9.5g}" for name in COLUMNS), flush=True)
 
 

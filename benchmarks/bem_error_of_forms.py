@@ -33,20 +33,28 @@ from demos.problems.error_of_forms import EXAMPLES, measure  # noqa: E402
 
 def table(rows: list[dict[str, Any]]) -> str:
     """A line per row."""
-    lines = [f"{'case':<32}{'form':<13}{'k':>4}{'error²':>11}{'reference':>11}{'energy':>11}{'slope':>7}  local"]
+    lines = [
+        f"{'case':<32}{'form':<13}{'k':>4}{'error²':>11}{'reference':>11}{'energy':>11}{'slope':>7}  local"
+    ]
     for row in rows:
         local = " ".join(f"{slope:.2f}" for slope in row["local_slopes"])
-        lines.append(f"{row['case']:<32}{row['form']:<13}{row['k']:>4}{row['error_squared']:>11.3e}"
-                     f"{row['reference_error']:>11.3e}{row['energy_difference']:>11.3e}{row['slope']:>7.2f}  {local}"
-                     + ("" if row["settled"] else "  not settled"))
+        lines.append(
+            f"{row['case']:<32}{row['form']:<13}{row['k']:>4}{row['error_squared']:>11.3e}"
+            f"{row['reference_error']:>11.3e}{row['energy_difference']:>11.3e}{row['slope']:>7.2f}  {local}"
+            + ("" if row["settled"] else "  not settled")
+        )
     return "\n".join(lines)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--levels", type=int, nargs="+", default=[5, 10, 20, 40])
     parser.add_argument("--examples", nargs="+", choices=list(EXAMPLES), default=list(EXAMPLES))
-    parser.add_argument("--supports", nargs="+", default=[], help="base: rollers, clamped, or a friction law")
+    parser.add_argument(
+        "--supports", nargs="+", default=[], help="base: rollers, clamped, or a friction law"
+    )
     parser.add_argument("--json", type=Path)
     parser.add_argument("--figure", type=Path)
     options = parser.parse_args()
@@ -54,11 +62,19 @@ def main() -> None:
     if options.json and options.json.exists():
         rows = json.loads(options.json.read_text())
     for example in options.examples:
-        start, supports = time.process_time(), [one for one in EXAMPLES[example].supports
-                                                if one in (options.supports or EXAMPLES[example].supports)]
+        start, supports = (
+            time.process_time(),
+            [
+                one
+                for one in EXAMPLES[example].supports
+                if one in (options.supports or EXAMPLES[example].supports)
+            ],
+        )
         found = measure(example, options.levels, *supports)
         rows = [row for row in rows if row["case"] not in {new["case"] for new in found}] + found
-        print(table(found), f"\n{time.process_time() - start:.0f} s of processor time\n", flush=True)
+        print(
+            table(found), f"\n{time.process_time() - start:.0f} s of processor time\n", flush=True
+        )
         if options.json:
             options.json.write_text(json.dumps(rows, indent=1) + "\n")
     if options.figure:

@@ -41,8 +41,20 @@ from vi_contact.bem.energetic import marched  # noqa: E402
 
 LAWS = {"none": vc.Frictionless(), "Tresca": vc.Tresca(0.05), "Coulomb": vc.Coulomb(0.5)}
 FORMS = ("symmetric", "unsymmetric")
-KEYS = ("k", "law", "form", "impulse", "energy", "impulse_difference", "energy_difference", "worst_certificate",
-        "negative_eigenvalues", "smallest_eigenvalue", "eigenvalues", "p_matrix")
+KEYS = (
+    "k",
+    "law",
+    "form",
+    "impulse",
+    "energy",
+    "impulse_difference",
+    "energy_difference",
+    "worst_certificate",
+    "negative_eigenvalues",
+    "smallest_eigenvalue",
+    "eigenvalues",
+    "p_matrix",
+)
 STEPS = {5: 20, 10: 16}
 TRIANGLE = [(0.0, 0.0), (1.0, 0.0), (1.0, 0.12)]
 
@@ -51,7 +63,9 @@ def spectrum(blocks: bem.EnergeticBlocks, form: str, steps: int) -> np.ndarray:
     """Eigenvalues of the symmetric part of the space-time matrix of S, on the whole boundary, in increments."""
     n = 2 * len(blocks.mesh)
     held = np.broadcast_to(np.eye(n), (steps, n, n))
-    columns = marched(blocks, np.ones(n, bool), np.zeros((steps, n, n)), held, symmetric=form == "symmetric")[2]
+    columns = marched(
+        blocks, np.ones(n, bool), np.zeros((steps, n, n)), held, symmetric=form == "symmetric"
+    )[2]
     whole = np.zeros((steps, n, steps, n))
     for k in range(steps):
         for j in range(k + 1):
@@ -63,28 +77,43 @@ def spectrum(blocks: bem.EnergeticBlocks, form: str, steps: int) -> np.ndarray:
 def contact(k: int, laws: list[str]) -> Iterator[dict[str, Any]]:
     """A row for each law and form."""
     given = square_problem(k, MATERIAL, dt=1.0 / k, steps=6 * k)
-    other = replace(given, operator=bem.PoincareSteklov(given.operator.blocks, MATERIAL.rho, symmetric=False))
+    other = replace(
+        given, operator=bem.PoincareSteklov(given.operator.blocks, MATERIAL.rho, symmetric=False)
+    )
     problems = dict(zip(FORMS, (given, other), strict=True))
     condensed = {form: problem.condensed() for form, problem in problems.items()}
-    values = {form: spectrum(given.operator.blocks, form, STEPS.get(k, 8)) if k <= 20 else np.zeros(0)
-              for form in FORMS}
+    values = {
+        form: spectrum(given.operator.blocks, form, STEPS.get(k, 8)) if k <= 20 else np.zeros(0)
+        for form in FORMS
+    }
     for law in laws:
         first: tuple[np.ndarray, np.ndarray] | None = None
         for form, problem in problems.items():
             run = bem.march_contact(bem.BoundaryContact(condensed[form], friction=LAWS[law]))
             impulse, energy = run.impulse, problem.solve(run.forces).work
             first = first or (impulse, energy)
-            away = [float(np.abs(one - base).max() / np.abs(base).max())
-                    for one, base in zip((impulse, energy), first, strict=True)]
-            numbers = (k, law, form, impulse[4 * k - 1, 1], energy[2 * k - 1], *away, run.worst,
-                       *below_zero(values[form]).values(),
-                       run.contact.p_matrix.sentence)
+            away = [
+                float(np.abs(one - base).max() / np.abs(base).max())
+                for one, base in zip((impulse, energy), first, strict=True)
+            ]
+            numbers = (
+                k,
+                law,
+                form,
+                impulse[4 * k - 1, 1],
+                energy[2 * k - 1],
+                *away,
+                run.worst,
+                *below_zero(values[form]).values(),
+                run.contact.p_matrix.sentence,
+            )
             yield dict(zip(KEYS, numbers, strict=True))
 
 
 def thin_rods() -> Iterator[dict[str, Any]]:
     """Errors and eigenvalues of rods of the width h/share."""
     for share in (1.0, 2.0, 5.0, 10.0, 20.0):
+
         def mesh(h: float, share: float = share) -> bem.BoundaryMesh:
             half = 0.5 * h / share
             return bem.polygon([(-half, -0.5), (half, -0.5), (half, 0.5), (-half, 0.5)], h)
@@ -94,8 +123,12 @@ def thin_rods() -> Iterator[dict[str, Any]]:
             motion = rod(blocks, smooth_load, symmetric=form == "symmetric").solve()
             exact = echoes(motion.times, smooth_integral)[:, None]
             top = motion.displacement[:, 1][:, blocks.mesh.nodes_of(blocks.mesh.labels == 2)]
-            error = float(np.linalg.norm(top - exact) / np.linalg.norm(np.broadcast_to(exact, top.shape)))
-            yield {"body": f"rod, w = h/{share:g}", "form": form, "error": error} | positivity(mesh(0.125), form)
+            error = float(
+                np.linalg.norm(top - exact) / np.linalg.norm(np.broadcast_to(exact, top.shape))
+            )
+            yield {"body": f"rod, w = h/{share:g}", "form": form, "error": error} | positivity(
+                mesh(0.125), form
+            )
 
 
 def triangle(h: float = 0.05) -> Iterator[dict[str, Any]]:
@@ -104,13 +137,20 @@ def triangle(h: float = 0.05) -> Iterator[dict[str, Any]]:
     blocks = bem.energetic_blocks(bem.polygon(TRIANGLE, h), MATERIAL, dt=h, steps=steps)
     for form in FORMS:
         for shear in (False, True):
-            wave, operator = pulse(shear=shear), bem.PoincareSteklov(blocks, 1.0, symmetric=form == "symmetric")
+            wave, operator = (
+                pulse(shear=shear),
+                bem.PoincareSteklov(blocks, 1.0, symmetric=form == "symmetric"),
+            )
             forces = bem.traction_forces(blocks.mesh, wave.traction, dt=h, steps=steps)
             found = bem.BoundaryProblem(operator, forces).solve().displacement
-            exact = np.array([wave.displacement(blocks.mesh.points, h * (j + 1)).T for j in range(steps)])
+            exact = np.array(
+                [wave.displacement(blocks.mesh.points, h * (j + 1)).T for j in range(steps)]
+            )
             error = float(np.linalg.norm(found - exact) / np.linalg.norm(exact))
             body = f"triangle of 7 degrees, pulse {'PS'[shear]}"
-            yield {"body": body, "form": form, "error": error} | positivity(bem.polygon(TRIANGLE, 0.125), form)
+            yield {"body": body, "form": form, "error": error} | positivity(
+                bem.polygon(TRIANGLE, 0.125), form
+            )
 
 
 def positivity(mesh: bem.BoundaryMesh, form: str) -> dict[str, Any]:
@@ -123,24 +163,36 @@ def below_zero(values: np.ndarray) -> dict[str, Any]:
     """How many of these eigenvalues are negative, the smallest, and how many there are; none where not computed."""
     if not len(values):
         return dict.fromkeys(("negative_eigenvalues", "smallest_eigenvalue", "eigenvalues"))
-    return {"negative_eigenvalues": int((values < 0.0).sum()), "smallest_eigenvalue": float(values[0]),
-            "eigenvalues": len(values)}
+    return {
+        "negative_eigenvalues": int((values < 0.0).sum()),
+        "smallest_eigenvalue": float(values[0]),
+        "eigenvalues": len(values),
+    }
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--sides", type=int, nargs="*", default=[5, 10, 20])
     parser.add_argument("--laws", nargs="*", default=list(LAWS), choices=list(LAWS))
     parser.add_argument("--json", action="store_true", help="print a list of rows and nothing else")
     parser.add_argument("--thin", action="store_true")
     chosen = parser.parse_args()
-    rows = [contact(k, chosen.laws) for k in chosen.sides] + ([thin_rods(), triangle()] if chosen.thin else [])
+    rows = [contact(k, chosen.laws) for k in chosen.sides] + (
+        [thin_rods(), triangle()] if chosen.thin else []
+    )
     found = []
     for row in (row for part in rows for row in part):
         found.append(row)
         if not chosen.json:
-            print(", ".join(f"{key} {value:.5g}" if isinstance(value, float) else f"{key} {value}"
-                            for key, value in row.items()), flush=True)
+            print(
+                ", ".join(
+                    f"{key} {value:.5g}" if isinstance(value, float) else f"{key} {value}"
+                    for key, value in row.items()
+                ),
+                flush=True,
+            )
     if chosen.json:
         print(json.dumps(found, indent=1, default=float))
 

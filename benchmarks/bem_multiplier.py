@@ -54,8 +54,22 @@ STEP = 0.9  # c_P dt / h: fronts then come inside of intervals, whatever their l
 TOLERANCE = 1e-6  # of certificates: before the front comes displacements are 1e-20, penetrations round-off of these
 RHO, MOST = 0.4, 2000  # of Uzawa's step, of 1/lambda_max(W[0]); of his iterations
 INNER = 0.375  # |x| up to which pressures are compared: corners of a rubbing square are singular
-KEYS = ("k", "law", "degree", "H_over_h", "DT_over_dt", "sigma", "testing", "inf_sup", "step", "oscillation",
-        "impulse_error", "energy_error", "multiplier_error", "uzawa")
+KEYS = (
+    "k",
+    "law",
+    "degree",
+    "H_over_h",
+    "DT_over_dt",
+    "sigma",
+    "testing",
+    "inf_sup",
+    "step",
+    "oscillation",
+    "impulse_error",
+    "energy_error",
+    "multiplier_error",
+    "uzawa",
+)
 
 
 @dataclass(frozen=True)
@@ -74,11 +88,18 @@ class Answer:
         return self.pressure[np.searchsorted(self.t[1:], t)][:, nearest]
 
 
-def answer(problem: bem.BoundaryProblem, run: bem.ContactRun, forces: np.ndarray, every: int = 1) -> Answer:
+def answer(
+    problem: bem.BoundaryProblem, run: bem.ContactRun, forces: np.ndarray, every: int = 1
+) -> Answer:
     """The answer of a run whose nodal forces are these."""
     work = np.concatenate([[0.0], problem.solve(forces).work[every - 1 :: every]])
-    return Answer(np.concatenate([[0.0], run.times]), np.concatenate([[0.0], run.impulse[:, 1]]), work,
-                  run.contact.compliance.points[:, 0], run.pressure)
+    return Answer(
+        np.concatenate([[0.0], run.times]),
+        np.concatenate([[0.0], run.impulse[:, 1]]),
+        work,
+        run.contact.compliance.points[:, 0],
+        run.pressure,
+    )
 
 
 def errors(found: Answer, fine: Answer) -> dict[str, Any]:
@@ -90,11 +111,15 @@ def errors(found: Answer, fine: Answer) -> dict[str, Any]:
     x, middle = np.linspace(-INNER, INNER, 193), (np.arange(480) + 0.5) / 480 * t[-1]
     pressure = fine.pressures(x, middle)
     return {
-        "t": t.tolist(), "force": (force + wrong).tolist(), "finest": force.tolist(),
+        "t": t.tolist(),
+        "force": (force + wrong).tolist(),
+        "finest": force.tolist(),
         "oscillation": float(np.abs(np.diff(wrong, 2)).max() / (4.0 * force.max())),
         "impulse_error": float(np.abs(found.impulse[:n] - exact).max() / exact.max()),
         "energy_error": float(np.abs(found.energy[:n] - energy).max() / energy.max()),
-        "multiplier_error": float(np.linalg.norm(found.pressures(x, middle) - pressure) / np.linalg.norm(pressure)),
+        "multiplier_error": float(
+            np.linalg.norm(found.pressures(x, middle) - pressure) / np.linalg.norm(pressure)
+        ),
     }
 
 
@@ -112,7 +137,9 @@ class Square:
 
     def finest(self, law: str) -> Answer:
         """The answer with nodal forces at the ends of steps."""
-        run = bem.march_contact(bem.BoundaryContact(self.compliance, friction=LAWS[law]), tolerance=TOLERANCE)
+        run = bem.march_contact(
+            bem.BoundaryContact(self.compliance, friction=LAWS[law]), tolerance=TOLERANCE
+        )
         return answer(self.problem, run, run.forces)
 
     def row(self, law: str, fine: Answer, **choice: Any) -> dict[str, Any]:
@@ -123,13 +150,26 @@ class Square:
         run = bem.march_contact(contact, tolerance=TOLERANCE)
         steps, degree = len(self.compliance.W), own.degree
         normal = contact.surface.owned
-        first = contact.W[0][np.ix_(normal, normal)] * MATERIAL.rho * MATERIAL.c_p / contact.compliance.dt
+        first = (
+            contact.W[0][np.ix_(normal, normal)]
+            * MATERIAL.rho
+            * MATERIAL.c_p
+            / contact.compliance.dt
+        )
         root = np.sqrt(contact.compliance.lengths)
-        constant = space_constant(mesh, elements, own.patch, degree) * time_constant(steps, own.interval, own.testing)
+        constant = space_constant(mesh, elements, own.patch, degree) * time_constant(
+            steps, own.interval, own.testing
+        )
         ends = law == "none" and own.testing == "end"
         return {
-            "k": self.k, "law": law, "degree": degree, "H_over_h": own.patch, "DT_over_dt": own.interval,
-            "sigma": own.sigma, "testing": own.testing, "inf_sup": constant,
+            "k": self.k,
+            "law": law,
+            "degree": degree,
+            "H_over_h": own.patch,
+            "DT_over_dt": own.interval,
+            "sigma": own.sigma,
+            "testing": own.testing,
+            "inf_sup": constant,
             "step": float(np.linalg.eigvalsh(0.5 * root[:, None] * (first + first.T) * root)[0]),
             **errors(answer(self.problem, run, own.forces(run.forces), own.interval), fine),
             "uzawa": iterations(contact) if ends else None,
@@ -148,18 +188,30 @@ def iterations(contact: bem.BoundaryContact) -> int | None:
 def choices(k: int) -> list[dict[str, Any]]:
     """Space alone, time alone, both; then linear multipliers; then weights."""
     pairs = [(r, 1) for r in RATIOS] + [(1, r) for r in RATIOS[1:]] + [(r, r) for r in RATIOS[1:]]
-    found: list[dict[str, Any]] = [{"patch": patch, "interval": interval, "testing": testing}
-                                   for testing in ("end", "mean") for patch, interval in pairs]
+    found: list[dict[str, Any]] = [
+        {"patch": patch, "interval": interval, "testing": testing}
+        for testing in ("end", "mean")
+        for patch, interval in pairs
+    ]
     found += [{"patch": r, "interval": r, "degree": 1} for r in RATIOS[1:]]
-    return found + [{"patch": 2, "interval": 2, "testing": "mean", "sigma": share * k / (2 * STEP)} for share in SIGMAS]
+    return found + [
+        {"patch": 2, "interval": 2, "testing": "mean", "sigma": share * k / (2 * STEP)}
+        for share in SIGMAS
+    ]
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--sides", type=int, nargs="*", default=[8, 16, 24])
     parser.add_argument("--finest", type=int, default=32)
-    parser.add_argument("--json", type=Path, help="file for all numbers; a file that exists is drawn without a run")
-    parser.add_argument("--figure", type=Path, help="picture of the errors of the finest of the sides")
+    parser.add_argument(
+        "--json", type=Path, help="file for all numbers; a file that exists is drawn without a run"
+    )
+    parser.add_argument(
+        "--figure", type=Path, help="picture of the errors of the finest of the sides"
+    )
     chosen = parser.parse_args()
     if chosen.json and chosen.json.exists():
         rows = json.loads(chosen.json.read_text())
@@ -173,8 +225,13 @@ def main() -> None:
             for law in LAWS:
                 for choice in choices(k):
                     rows.append(square.row(law, fine[law], **choice))
-                    print(*(f"{value:10.3g}" if isinstance(value, float) else f"{value:>10}"
-                            for value in (rows[-1][key] or 0 for key in KEYS)), flush=True)
+                    print(
+                        *(
+                            f"{value:10.3g}" if isinstance(value, float) else f"{value:>10}"
+                            for value in (rows[-1][key] or 0 for key in KEYS)
+                        ),
+                        flush=True,
+                    )
         if chosen.json:
             chosen.json.write_text(json.dumps(rows) + "\n")
     if chosen.figure:

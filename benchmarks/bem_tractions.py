@@ -45,27 +45,60 @@ def row(both: Tractions) -> dict[str, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--elements", type=int, nargs="+", default=[20], help="numbers of boundary elements on a side")
-    parser.add_argument("--cells", type=int, nargs="+", default=[80, 160], help="numbers of finite elements on a side")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--elements",
+        type=int,
+        nargs="+",
+        default=[20],
+        help="numbers of boundary elements on a side",
+    )
+    parser.add_argument(
+        "--cells",
+        type=int,
+        nargs="+",
+        default=[80, 160],
+        help="numbers of finite elements on a side",
+    )
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     material, rows = Square().material, []
-    condensed = {k: square_problem(k, material, dt=1.0 / k, steps=round(END * k)).condensed() for k in options.elements}
-    print(f"{'elements':>8} {'cells':>6} {'law':<12} {'traction':<9}", *(f"{name:>8}" for name in COLUMNS))
+    condensed = {
+        k: square_problem(k, material, dt=1.0 / k, steps=round(END * k)).condensed()
+        for k in options.elements
+    }
+    print(
+        f"{'elements':>8} {'cells':>6} {'law':<12} {'traction':<9}",
+        *(f"{name:>8}" for name in COLUMNS),
+    )
     for cells in options.cells:
         model = build(Square(cells=cells, pressure=1.0), MPI.COMM_WORLD)
         for law, friction in LAWS.items():
             problem = model.problem(friction=friction)
-            fine = vc.simulate(problem, dt=model.square.time_step, t_end=END, record=(vc.Contact(),), progress=False)
+            fine = vc.simulate(
+                problem,
+                dt=model.square.time_step,
+                t_end=END,
+                record=(vc.Contact(),),
+                progress=False,
+            )
             for k, compliance in condensed.items():
                 run = bem.march_contact(bem.BoundaryContact(compliance, friction=friction))
                 both = compared(run, problem.surface.whole(), fine.history)
-                for traction, pair in list(zip(("pressure", "shear"), both, strict=True))[: 1 if law == "none" else 2]:
+                for traction, pair in list(zip(("pressure", "shear"), both, strict=True))[
+                    : 1 if law == "none" else 2
+                ]:
                     found = row(pair)
-                    rows.append({"elements": k, "cells": cells, "law": law, "traction": traction, **found})
-                    print(f"{k:>8} {cells:>6} {law:<12} {traction:<9}",
-                          *(f"{found[name]:>8.4f}" for name in COLUMNS), flush=True)
+                    rows.append(
+                        {"elements": k, "cells": cells, "law": law, "traction": traction, **found}
+                    )
+                    print(
+                        f"{k:>8} {cells:>6} {law:<12} {traction:<9}",
+                        *(f"{found[name]:>8.4f}" for name in COLUMNS),
+                        flush=True,
+                    )
     if options.json:
         options.json.write_text(json.dumps(rows, indent=1) + "\n")
 

@@ -53,13 +53,20 @@ def sheared(n: float) -> list[Row]:
 def twisted(n: float) -> list[Row]:
     """The rows of torsion, the last one without slip."""
     problem = Torsion(n)
-    rows = [{"case": f"T = {row['T']:.2f} of sliding, c = {row['c']:.1f} a", **row} for row in problem.compared()]
+    rows = [
+        {"case": f"T = {row['T']:.2f} of sliding, c = {row['c']:.1f} a", **row}
+        for row in problem.compared()
+    ]
     return [*rows, {"case": "no slip", "moment": problem.without_slip()}]
 
 
 PROBLEMS: dict[str, list[Measure]] = {
-    "hertz": [*(pressed(kind) for kind in ("plane", "spheres", "block")), pressed("spheres", simplices=True)],
-    "mindlin": [sheared], "torsion": [twisted],
+    "hertz": [
+        *(pressed(kind) for kind in ("plane", "spheres", "block")),
+        pressed("spheres", simplices=True),
+    ],
+    "mindlin": [sheared],
+    "torsion": [twisted],
 }
 
 
@@ -73,8 +80,11 @@ def measured(name: str, measure: Measure, levels: list[float]) -> list[Row]:
             row |= {"problem": name, "cells": n, "seconds": time.perf_counter() - start}
             for before in [one for one in rows if one["case"] == row["case"]][-1:]:
                 ratio = np.log(n / before["cells"])
-                row |= {f"order_{key}": float(np.log(abs(before[key] / row[key])) / ratio)
-                        for key in TITLES[name] if row.get(key)}
+                row |= {
+                    f"order_{key}": float(np.log(abs(before[key] / row[key])) / ratio)
+                    for key in TITLES[name]
+                    if row.get(key)
+                }
             print(line(name, row), flush=True)
         rows += found
     return rows
@@ -82,14 +92,19 @@ def measured(name: str, measure: Measure, levels: list[float]) -> list[Row]:
 
 def header(name: str) -> str:
     """The titles of a table."""
-    return f"{name:<34} {'cells':>5} " + " ".join(f"{title + ' %':>9} order" for title in TITLES[name].values())
+    return f"{name:<34} {'cells':>5} " + " ".join(
+        f"{title + ' %':>9} order" for title in TITLES[name].values()
+    )
 
 
 def line(name: str, row: Row) -> str:
     """One row of it."""
     cells = [(row.get(key), row.get(f"order_{key}")) for key in TITLES[name]]
-    shown = (f"{'-' if error is None else format(100.0 * error, '.3f'):>9} "
-             f"{'' if order is None else format(order, '.1f'):>5}" for error, order in cells)
+    shown = (
+        f"{'-' if error is None else format(100.0 * error, '.3f'):>9} "
+        f"{'' if order is None else format(order, '.1f'):>5}"
+        for error, order in cells
+    )
     return f"{row['case']:<34} {row['cells']:>5g} " + " ".join(shown) + f" {row['seconds']:6.0f} s"
 
 
@@ -98,8 +113,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
     usual = {"hertz": [4.0, 8.0, 16.0], "mindlin": [4.0, 8.0, 12.0], "torsion": [4.0, 6.0, 8.0]}
     for name, levels in usual.items():
-        parser.add_argument(f"--{name}", type=float, nargs="*", default=levels, help="numbers of cells across a")
-    parser.add_argument("--json", type=Path, help="file for all figures: rows with problem, case, cells, errors")
+        parser.add_argument(
+            f"--{name}", type=float, nargs="*", default=levels, help="numbers of cells across a"
+        )
+    parser.add_argument(
+        "--json", type=Path, help="file for all figures: rows with problem, case, cells, errors"
+    )
     options = parser.parse_args()
     rows: list[Row] = []
     for name, measures in PROBLEMS.items():

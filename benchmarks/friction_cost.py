@@ -17,7 +17,13 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from step_cost import SCHEME, Factors, Linear, StepsWithContact, wall_cells  # first: it sets the number of threads
+from step_cost import (
+    SCHEME,
+    Factors,
+    Linear,
+    StepsWithContact,
+    wall_cells,
+)  # first: it sets the number of threads
 
 import vi_contact as vc
 from demos.problems.wall import Wall, build
@@ -27,7 +33,9 @@ from vi_contact.solvers.friction.extrapolation import Anderson
 ROUTES: dict[str, Any] = {
     "FrictionNewton": vc.Condensed(),
     "FixedPoint": vc.Condensed(friction_method=solvers.FixedPoint()),
-    "FixedPoint, Anderson": vc.Condensed(friction_method=solvers.FixedPoint(extrapolation=Anderson())),
+    "FixedPoint, Anderson": vc.Condensed(
+        friction_method=solvers.FixedPoint(extrapolation=Anderson())
+    ),
 }
 HEADER = (
     f"{'unknowns':>9} {'points':>6} {'route':<21} {'linear ms':>9} {'step ms':>9} {'ratio':>6} {'mean':>6} {'iter':>5}"
@@ -35,7 +43,9 @@ HEADER = (
 )
 
 
-def measured(problem: vc.ContactProblem, solver: Any, dt: float, count: int, linear: Linear) -> dict[str, Any]:
+def measured(
+    problem: vc.ContactProblem, solver: Any, dt: float, count: int, linear: Linear
+) -> dict[str, Any]:
     """``count`` steps with contact, each beside a linear step; a third as many before them are not counted."""
     steps = StepsWithContact(problem, solver, dt, count, linear)
     iterations, slipping = [], []
@@ -47,10 +57,14 @@ def measured(problem: vc.ContactProblem, solver: Any, dt: float, count: int, lin
             slipping.append(int((result.active & moved[:, 0]).sum()))
     seconds, plain, closed, worst = steps.seconds, steps.plain, steps.active, steps.worst
     return {
-        "linear": 1e3 * float(np.median(plain)), "step": 1e3 * float(np.median(seconds)),
-        "ratio": float(np.median(seconds) / np.median(plain)), "mean": float(np.mean(seconds) / np.mean(plain)),
-        "iterations": float(np.mean(iterations)), "closed": float(np.mean(closed)),
-        "slip": float(np.mean(slipping)) if slipping else 0.0, "worst": worst,
+        "linear": 1e3 * float(np.median(plain)),
+        "step": 1e3 * float(np.median(seconds)),
+        "ratio": float(np.median(seconds) / np.median(plain)),
+        "mean": float(np.mean(seconds) / np.mean(plain)),
+        "iterations": float(np.mean(iterations)),
+        "closed": float(np.mean(closed)),
+        "slip": float(np.mean(slipping)) if slipping else 0.0,
+        "worst": worst,
     }
 
 
@@ -77,7 +91,9 @@ def main() -> None:
     """Prints the table."""
     arguments = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
     arguments.add_argument("--sizes", type=float, nargs="+", default=[2e4, 2e5])
-    arguments.add_argument("--steps", type=int, default=60, help="number of steps with contact that are timed")
+    arguments.add_argument(
+        "--steps", type=int, default=60, help="number of steps with contact that are timed"
+    )
     arguments.add_argument("--mu", type=float, default=0.3)
     options = arguments.parse_args()
     print(HEADER, flush=True)

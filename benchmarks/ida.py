@@ -47,7 +47,9 @@ DEMANDS = ("contact_uplift:max", "contact_resultant:max", "u_x_top:min")
 def motions(folder: Path, count: int, duration: float) -> list[Path]:
     """Files of synthetic motions with a peak of 3 m/s²."""
     ground = ground_motion.KanaiTajimi(s0=0.01, omega_g=25.0)
-    envelope = ground_motion.Envelope(rise=0.1 * duration, end=0.6 * duration, decay=10.0 / duration)
+    envelope = ground_motion.Envelope(
+        rise=0.1 * duration, end=0.6 * duration, decay=10.0 / duration
+    )
     found = [folder / f"motion_{seed}.at2" for seed in range(1, count + 1)]
     for seed, path in enumerate(found, start=1):
         motion = ground_motion.synthetic(ground, duration, 0.01, seed=seed, envelope=envelope)
@@ -77,17 +79,31 @@ def measured(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
         finally:
             processes.TOGETHER = usual
         spent[way], passed[way] = seconds() - begin, time.perf_counter() - clock
-    failed = [row["reason"] for found in rows.values() for row in found if row["status"] != "finished"]
+    failed = [
+        row["reason"] for found in rows.values() for row in found if row["status"] != "finished"
+    ]
     if failed:
         sys.exit(f"{len(failed)} runs failed, the first because: {failed[0]}")
     names = [name.replace(":", "_") for name in DEMANDS]
-    ours, theirs = (np.array([[row[name] for name in names] for row in rows[way]]) for way in ("together", "apart"))
-    about = json.loads(next((folder / "apart" / "runs").glob("*/summary.json")).read_text(encoding="utf-8"))
+    ours, theirs = (
+        np.array([[row[name] for name in names] for row in rows[way]])
+        for way in ("together", "apart")
+    )
+    about = json.loads(
+        next((folder / "apart" / "runs").glob("*/summary.json")).read_text(encoding="utf-8")
+    )
     return {
-        "records": options.records, "scales": options.scales, "runs": len(rows["apart"]),
-        "unknowns": about["unknowns"], "steps": about["steps"], "seconds_apart": spent["apart"],
-        "seconds_together": spent["together"], "ratio": spent["together"] / spent["apart"], "jobs": options.jobs,
-        "wall_seconds_apart": passed["apart"], "wall_seconds_together": passed["together"],
+        "records": options.records,
+        "scales": options.scales,
+        "runs": len(rows["apart"]),
+        "unknowns": about["unknowns"],
+        "steps": about["steps"],
+        "seconds_apart": spent["apart"],
+        "seconds_together": spent["together"],
+        "ratio": spent["together"] / spent["apart"],
+        "jobs": options.jobs,
+        "wall_seconds_apart": passed["apart"],
+        "wall_seconds_together": passed["together"],
         "wall_ratio": passed["together"] / passed["apart"],
         "worst_difference": float(np.max(np.abs(ours - theirs) / np.abs(theirs).max(axis=0))),
     }
@@ -95,14 +111,22 @@ def measured(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--case", type=lambda text: Path(text).resolve(), default=CASE, help="a case file")
+    parser.add_argument(
+        "--case", type=lambda text: Path(text).resolve(), default=CASE, help="a case file"
+    )
     parser.add_argument("--set", dest="settings", action="append", default=[], metavar="KEY=VALUE")
     parser.add_argument("--records", type=int, default=20)
-    parser.add_argument("--scales", type=int, default=5, help="number of scales: 1, 2, 3 and so on times --step")
-    parser.add_argument("--step", type=float, default=0.5, help="step of the scales; scale 1 is a peak of 3 m/s²")
+    parser.add_argument(
+        "--scales", type=int, default=5, help="number of scales: 1, 2, 3 and so on times --step"
+    )
+    parser.add_argument(
+        "--step", type=float, default=0.5, help="step of the scales; scale 1 is a peak of 3 m/s²"
+    )
     parser.add_argument("--jobs", type=int, default=1, help="number of processes at a time")
     parser.add_argument("--duration", type=float, default=4.0, help="duration of a motion [s]")
-    parser.add_argument("--mesh", type=int, nargs=2, default=[4, 6], help="cells across and up in the own case")
+    parser.add_argument(
+        "--mesh", type=int, nargs=2, default=[4, 6], help="cells across and up in the own case"
+    )
     parser.add_argument("--json", type=Path, help="write the row into this file")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:

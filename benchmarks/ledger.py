@@ -49,16 +49,28 @@ SOLVERS: dict[str, Any] = {
     "Iterative()": vc.Iterative(),
     "Automatic()": vc.Automatic(),
 }
-KEEPING = ("Trapezoidal", "Midpoint", "Contact", "Zienkiewicz", "Moreau", "SS22", "Newmark")  # energy, in free flight
+KEEPING = (
+    "Trapezoidal",
+    "Midpoint",
+    "Contact",
+    "Zienkiewicz",
+    "Moreau",
+    "SS22",
+    "Newmark",
+)  # energy, in free flight
 SOFT = vc.LinearElastic(E=1.0e7, nu=0.3, rho=1000.0)
 COURANT, DIVISIONS, HEIGHT = 0.02, (16, 8), 1.0
 
 
 def block(*, free: bool) -> vc.ContactProblem:
     """The block; free: with a side clamped, in front of a plane that is out of reach."""
-    mesh, tags = fem.build_mesh(BlockMesh(lengths=(2.0, HEIGHT), divisions=DIVISIONS), MPI.COMM_WORLD)
+    mesh, tags = fem.build_mesh(
+        BlockMesh(lengths=(2.0, HEIGHT), divisions=DIVISIONS), MPI.COMM_WORLD
+    )
     held = {"clamped": tags["top"]} if free else {}
-    start = (lambda x: np.column_stack([HEIGHT - x[:, 1], x[:, 1] - HEIGHT])) if free else (1.0, -1.0)
+    start = (
+        (lambda x: np.column_stack([HEIGHT - x[:, 1], x[:, 1] - HEIGHT])) if free else (1.0, -1.0)
+    )
     system = fem.assemble(mesh, SOFT, initial_velocity=start, **held)
     plane = vc.HalfSpace((0.0, -10.0 if free else -1e-3), (0.0 if free else 0.1, 1.0))
     surface = fem.contact_surface(system, tags["bottom"], obstacle=plane)
@@ -73,8 +85,15 @@ def measured(scheme: Any, solver: Any, steps: int) -> dict[str, float]:
     dt = COURANT * HEIGHT / DIVISIONS[1] / speed
     for name in ("free", "thrown"):
         problem = block(free=name == "free")
-        solution = vc.simulate(problem, scheme=scheme, solver=solver, dt=dt, steps=steps, record=[vc.Energy()],
-                               progress=False)
+        solution = vc.simulate(
+            problem,
+            scheme=scheme,
+            solver=solver,
+            dt=dt,
+            steps=steps,
+            record=[vc.Energy()],
+            progress=False,
+        )
         found[f"defect, {name}"] = float(solution.facts["energy_defect"])
         if name == "free":
             total = solution.history["energy_kinetic"] + solution.history["energy_strain"]
@@ -85,10 +104,14 @@ def measured(scheme: Any, solver: Any, steps: int) -> dict[str, float]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--steps", type=int, default=1000, help="of each run")
-    parser.add_argument("--only", default="", help="schemes and solvers whose names have this in them")
+    parser.add_argument(
+        "--only", default="", help="schemes and solvers whose names have this in them"
+    )
     parser.add_argument("--json", action="store_true", help="print the numbers for programs")
     options = parser.parse_args()
-    logging.getLogger("vi_contact").setLevel(logging.ERROR)  # of schemes that gain energy where a contact opens
+    logging.getLogger("vi_contact").setLevel(
+        logging.ERROR
+    )  # of schemes that gain energy where a contact opens
     rows = []
     if not options.json and MPI.COMM_WORLD.rank == 0:
         print("| scheme | solver | drift | defect, free | defect, thrown |\n|---|---|---|---|---|")
@@ -96,12 +119,19 @@ def main() -> None:
         for solver_name, solver in SOLVERS.items():
             if options.only.lower() not in f"{scheme_name} {solver_name}".lower():
                 continue
-            row = {"scheme": scheme_name, "solver": solver_name, **measured(scheme, solver, options.steps)}
+            row = {
+                "scheme": scheme_name,
+                "solver": solver_name,
+                **measured(scheme, solver, options.steps),
+            }
             rows.append(row)
             if not options.json and MPI.COMM_WORLD.rank == 0:
                 drift = f"{row['drift']:.1e}" if scheme_name.startswith(KEEPING) else "-"
-                print(f"| `{scheme_name}` | `{solver_name}` | {drift} | {row['defect, free']:.1e} | "
-                      f"{row['defect, thrown']:.1e} |", flush=True)
+                print(
+                    f"| `{scheme_name}` | `{solver_name}` | {drift} | {row['defect, free']:.1e} | "
+                    f"{row['defect, thrown']:.1e} |",
+                    flush=True,
+                )
     if options.json and MPI.COMM_WORLD.rank == 0:
         print(json.dumps({"steps": options.steps, "rows": rows}, indent=2))
 

@@ -89,14 +89,20 @@ def block(comm: Any, cells: int) -> Block:
     mu, lam = E / (2.0 * (1.0 + nu)), E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
     gradient = ufl.Identity(2) + ufl.grad(u)
     J = ufl.det(gradient)
-    W = 0.5 * mu * (ufl.tr(gradient.T * gradient) - 2.0) - mu * ufl.ln(J) + 0.5 * lam * ufl.ln(J) ** 2
+    W = (
+        0.5 * mu * (ufl.tr(gradient.T * gradient) - 2.0)
+        - mu * ufl.ln(J)
+        + 0.5 * lam * ufl.ln(J) ** 2
+    )
     energy = W * ufl.dx
 
     top = compat.entities_where(on, 1, lambda x: np.isclose(x[1], HEIGHT))
     bc = dolfinx.fem.dirichletbc(g, compat.facet_dofs(V, top))
 
     # The floor bounds the vertical component at all nodes of the boundary; the others are free.
-    boundary = compat.facet_dofs(V, compat.entities_where(on, 1, lambda x: np.full(x.shape[1], True)))
+    boundary = compat.facet_dofs(
+        V, compat.entities_where(on, 1, lambda x: np.full(x.shape[1], True))
+    )
     floor.x.array[:] = -np.inf
     floor.x.array[2 * boundary + 1] = -V.tabulate_dof_coordinates()[boundary, 1]
     return Block(u, energy, ufl.derivative(energy, u), g, bc, floor)
@@ -108,7 +114,10 @@ class Snes:
     def __init__(self, posed: Block) -> None:
         self.posed, self.factors, V = posed, 0, posed.u.function_space
         self.n = V.dofmap.index_map_bs * V.dofmap.index_map.size_local
-        self.F, self.J = compat.compile_form(posed.F), compat.compile_form(ufl.derivative(posed.F, posed.u))
+        self.F, self.J = (
+            compat.compile_form(posed.F),
+            compat.compile_form(ufl.derivative(posed.F, posed.u)),
+        )
         held = compat.bc_values(posed.bc, len(posed.u.x.array))[0]
         self.held = held[held < self.n]
         self.A = compat.assemble_matrix(self.J)
@@ -175,7 +184,9 @@ class Snes:
         return converged, iterations
 
 
-def run(posed: Block, count: int, solve: Callable[[], Any]) -> tuple[list[Any], list[float], list[Any], int]:
+def run(
+    posed: Block, count: int, solve: Callable[[], Any]
+) -> tuple[list[Any], list[float], list[Any], int]:
     """Take the load steps until one fails; return what each gave, its time on the busiest rank, u, and failures."""
     given, seconds, fields = [], [], []
     for k in range(count):
@@ -209,7 +220,11 @@ def row(cells: int, step: float) -> dict[str, Any]:
     results, our_seconds, our_fields, our_failures = run(ours, count, by_vi)
     iterations, their_seconds, their_fields, their_failures = run(theirs, count, by_snes)
     both = min(len(our_fields), len(their_fields))
-    off = np.max(np.abs(our_fields[both - 1] - their_fields[both - 1]), initial=0.0) if both else np.nan
+    off = (
+        np.max(np.abs(our_fields[both - 1] - their_fields[both - 1]), initial=0.0)
+        if both
+        else np.nan
+    )
     return {
         "cells": cells,
         "step": step,
@@ -230,22 +245,33 @@ def row(cells: int, step: float) -> dict[str, Any]:
 def main(arguments: list[str] | None = None) -> int:
     """Measure, print, and write the rows if asked to."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--cells", type=int, nargs="+", default=[16, 32, 64], help="squares across the block")
-    parser.add_argument("--steps", type=float, nargs="+", default=[0.1, 0.2], help="how far the top moves in a step")
+    parser.add_argument(
+        "--cells", type=int, nargs="+", default=[16, 32, 64], help="squares across the block"
+    )
+    parser.add_argument(
+        "--steps", type=float, nargs="+", default=[0.1, 0.2], help="how far the top moves in a step"
+    )
     parser.add_argument("--json", type=Path, help="file for the rows")
     given = parser.parse_args(arguments)
     rows = []
-    vi.solve((first := block(COMM, 2)).F, first.u, lower=first.floor, bcs=[first.bc])  # the forms are compiled here
+    vi.solve(
+        (first := block(COMM, 2)).F, first.u, lower=first.floor, bcs=[first.bc]
+    )  # the forms are compiled here
     if COMM.rank == 0:
-        print("cells  step | vi.solve: solved, Newton, linear, certificate | SNES: solved, factors | time ratio")
+        print(
+            "cells  step | vi.solve: solved, Newton, linear, certificate | SNES: solved, factors | time ratio"
+        )
     for cells in given.cells:
         for step in given.steps:
             one = row(cells, step)
             rows.append(one)
             if COMM.rank == 0:
-                print(f"{cells:>5} {step:>5} | {one['solved']:>4} {one['iterations']:>4} {one['linear']:>4} "
-                      f"{one['certificate']:.0e} | {one['snes_solved']:>4} {one['snes_factorisations']:>4} | "
-                      f"{one['ratio']:.2f}", flush=True)
+                print(
+                    f"{cells:>5} {step:>5} | {one['solved']:>4} {one['iterations']:>4} {one['linear']:>4} "
+                    f"{one['certificate']:.0e} | {one['snes_solved']:>4} {one['snes_factorisations']:>4} | "
+                    f"{one['ratio']:.2f}",
+                    flush=True,
+                )
     if COMM.rank == 0 and given.json:
         given.json.write_text(json.dumps({"rows": rows}, indent=1))
     return 0

@@ -48,30 +48,44 @@ SHORTEST = 0.25  # m: edge of an element across the wall
 
 def wall(divisions: tuple[int, int] = (2, 12), degree: int = 1) -> vc.ContactProblem:
     """The wall beside the ground, with 3 % of damping."""
-    mesh, groups = fem.build_mesh(WallMesh(height=6.0, width=0.5, divisions=divisions), MPI.COMM_WORLD)
+    mesh, groups = fem.build_mesh(
+        WallMesh(height=6.0, width=0.5, divisions=divisions), MPI.COMM_WORLD
+    )
     w1, w2 = 2.0 * np.pi * 3.5, 2.0 * np.pi * 25.0
     damping = vc.Rayleigh(alpha=0.06 * w1 * w2 / (w1 + w2), beta=0.06 / (w1 + w2))
     system = fem.assemble(mesh, MASONRY, degree=degree, clamped=groups["base"], damping=damping)
     envelope = ground_motion.Envelope(rise=1.0, end=4.0, decay=1.0)
-    record = ground_motion.synthetic(ground_motion.KanaiTajimi(s0=0.01), 6.0, 0.005, seed=3, envelope=envelope)
+    record = ground_motion.synthetic(
+        ground_motion.KanaiTajimi(s0=0.01), 6.0, 0.005, seed=3, envelope=envelope
+    )
     shaking = vc.GroundMotion(ground_motion.scaled_to_pga(record, 3.0), direction=(1.0, 0.0))
-    return vc.ContactProblem(system, fem.contact_surface(system, groups["face"]), excitation=shaking)
+    return vc.ContactProblem(
+        system, fem.contact_surface(system, groups["face"]), excitation=shaking
+    )
 
 
 def readme_wall() -> vc.ContactProblem:
     """The wall of README, of 8 x 12 elements; a wave needs 0.26 ms for the shorter edge of an element."""
     mesh, tags = fem.build_mesh(WallMesh(height=9.0, width=6.0, divisions=(8, 12)), MPI.COMM_WORLD)
     concrete = vc.LinearElastic(E=2.0e10, nu=0.0, rho=2400.0)
-    system = fem.assemble(mesh, concrete, section=vc.PlaneStress(thickness=0.20), clamped=tags["base"])
-    ground = fem.contact_surface(system, tags["face"], obstacle=vc.HalfSpace(point=(6.0, 0.0), normal=(-1.0, 0.0)))
-    return vc.ContactProblem(system, ground, excitation=vc.Harmonic(3.0, 14.0, direction=(1.0, 0.0)))
+    system = fem.assemble(
+        mesh, concrete, section=vc.PlaneStress(thickness=0.20), clamped=tags["base"]
+    )
+    ground = fem.contact_surface(
+        system, tags["face"], obstacle=vc.HalfSpace(point=(6.0, 0.0), normal=(-1.0, 0.0))
+    )
+    return vc.ContactProblem(
+        system, ground, excitation=vc.Harmonic(3.0, 14.0, direction=(1.0, 0.0))
+    )
 
 
 def block() -> vc.ContactProblem:
     """A unit square of 16 x 16 elements that falls on the ground; a wave needs 1.7 ms for an element."""
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 1.0), divisions=(16, 16)), MPI.COMM_WORLD)
     rubber, weight = vc.LinearElastic(E=1000.0, nu=0.3, rho=1.0), fem.BodyForce((0.0, -10.0))
-    system = fem.assemble(mesh, rubber, section=vc.PlaneStrain(), loads=weight, initial_velocity=(0.1, -1.0))
+    system = fem.assemble(
+        mesh, rubber, section=vc.PlaneStrain(), loads=weight, initial_velocity=(0.1, -1.0)
+    )
     ground = vc.HalfSpace(point=(0.0, -0.05), normal=(0.0, 1.0))
     return vc.ContactProblem(system, fem.contact_surface(system, tags["bottom"], obstacle=ground))
 
@@ -81,7 +95,9 @@ def bar(case: Any) -> vc.ContactProblem:
     return build(Bar(case, elements=100, dimension=1), MPI.COMM_WORLD).problem()
 
 
-OTHERS: dict[str, tuple[Any, float, float]] = {  # name -> problem, time of a wave through an element [s], duration [s]
+OTHERS: dict[
+    str, tuple[Any, float, float]
+] = {  # name -> problem, time of a wave through an element [s], duration [s]
     "wall of README": (readme_wall, 0.75 / 2887.0, 2.0),
     "free block": (block, 1.0 / 16.0 / 36.69, 3.0),
     "clamped bar, ten bounces": (lambda: bar(PeriodicBar()), 0.01, 30.0),
@@ -91,7 +107,14 @@ OTHERS: dict[str, tuple[Any, float, float]] = {  # name -> problem, time of a wa
 
 def run(scheme: Any, dt: float, t_end: float, problem: Any = wall) -> vc.Solution:
     """The problem with this scheme and time step."""
-    return vc.simulate(problem(), scheme=scheme, dt=dt, t_end=t_end, record=[vc.Energy(), vc.Contact()], progress=False)
+    return vc.simulate(
+        problem(),
+        scheme=scheme,
+        dt=dt,
+        t_end=t_end,
+        record=[vc.Energy(), vc.Contact()],
+        progress=False,
+    )
 
 
 def told(created: float) -> str:
@@ -103,7 +126,9 @@ def main() -> None:
     """The table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--t-end", type=float, default=3.0, help="of the motion [s]")
-    parser.add_argument("--others", action="store_true", help="other bodies at other Courant numbers")
+    parser.add_argument(
+        "--others", action="store_true", help="other bodies at other Courant numbers"
+    )
     parser.add_argument("--only", default="", help="schemes whose name contains this")
     options = parser.parse_args()
     logging.getLogger("vi_contact").setLevel(logging.ERROR)  # the warning is what is measured
@@ -111,12 +136,24 @@ def main() -> None:
         for name, scheme in SCHEMES.items():
             for courant in (2.0, 8.0, 10.0, 16.0, 20.0, 32.0) if options.only in name else ():
                 done = run(scheme, courant * crossing, t_end, problem)
-                end = {what: done.facts["energy"][what] for what in ("energy_kinetic", "energy_strain", "work_input")}
-                print(title, name, f"Courant number {courant:g}: created {100.0 * done.facts['energy_created']:.2g} %,",
-                      ", ".join(f"{what} {value:.3g} J" for what, value in end.items()), flush=True)
+                end = {
+                    what: done.facts["energy"][what]
+                    for what in ("energy_kinetic", "energy_strain", "work_input")
+                }
+                print(
+                    title,
+                    name,
+                    f"Courant number {courant:g}: created {100.0 * done.facts['energy_created']:.2g} %,",
+                    ", ".join(f"{what} {value:.3g} J" for what, value in end.items()),
+                    flush=True,
+                )
     if options.others:
         return
-    speed = np.sqrt(MASONRY.E * (1.0 - MASONRY.nu) / ((1.0 + MASONRY.nu) * (1.0 - 2.0 * MASONRY.nu) * MASONRY.rho))
+    speed = np.sqrt(
+        MASONRY.E
+        * (1.0 - MASONRY.nu)
+        / ((1.0 + MASONRY.nu) * (1.0 - 2.0 * MASONRY.nu) * MASONRY.rho)
+    )
     heads = (f"{1e3 * dt:g} ms ({speed * dt / SHORTEST:.2g})" for dt in STEPS)
     print(f"| scheme | {' | '.join(heads)} |\n|---|{len(STEPS) * '---|'}")
     for name, scheme in SCHEMES.items():

@@ -48,8 +48,14 @@ def problems(size: float, count: int) -> tuple[list[vc.ContactProblem], float]:
     """Runs of one wall, and their time step."""
     model = build(Wall(divisions=divisions(size)), MPI.COMM_SELF, base_inertia="catalogue")
     one = model.problem("face")
-    motions = (replace(one.excitation, amplitude=0.5 + 0.1 * k, frequency=one.excitation.frequency * (1.0 + 0.05 * k))
-               for k in range(count))
+    motions = (
+        replace(
+            one.excitation,
+            amplitude=0.5 + 0.1 * k,
+            frequency=one.excitation.frequency * (1.0 + 0.05 * k),
+        )
+        for k in range(count)
+    )
     return [replace(one, excitation=motion) for motion in motions], model.time_step()
 
 
@@ -71,21 +77,32 @@ def measured(size: float, rounds: int) -> list[dict[str, Any]]:
     for count in RUNS:
         chosen = every[:count]
         ways: dict[str, Callable[[], list[Iterator[Any]]]] = {
-            "alone": lambda chosen=chosen: [vc.march(one, scheme=SCHEME, dt=dt, steps=steps) for one in chosen[:4]],
-            "together": lambda chosen=chosen: [vc.march_many(chosen, scheme=SCHEME, dt=dt, steps=steps)],
+            "alone": lambda chosen=chosen: [
+                vc.march(one, scheme=SCHEME, dt=dt, steps=steps) for one in chosen[:4]
+            ],
+            "together": lambda chosen=chosen: [
+                vc.march_many(chosen, scheme=SCHEME, dt=dt, steps=steps)
+            ],
         }
         found: dict[str, list[float]] = {name: [] for name in ways}
         for _ in range(rounds):
             for name, made in ways.items():
                 each = 1 if name == "alone" else count
-                found[name].append(float(np.mean([seconds_per_step(loop, each) for loop in made()])))
+                found[name].append(
+                    float(np.mean([seconds_per_step(loop, each) for loop in made()]))
+                )
         alone, together = (float(np.median(found[name])) for name in ways)
         ratios = [mine / lone for mine, lone in zip(found["together"], found["alone"], strict=True)]
-        rows.append({
-            "unknowns": len(every[0].equations.u0), "runs": count, "cost_ratio": float(np.median(ratios)),
-            "worst_difference": difference(chosen, dt, steps), "seconds_per_step": together,
-            "seconds_per_single_step": alone,
-        })
+        rows.append(
+            {
+                "unknowns": len(every[0].equations.u0),
+                "runs": count,
+                "cost_ratio": float(np.median(ratios)),
+                "worst_difference": difference(chosen, dt, steps),
+                "seconds_per_step": together,
+                "seconds_per_single_step": alone,
+            }
+        )
         print(line(rows[-1]), flush=True)
     return rows
 
@@ -95,7 +112,9 @@ def difference(chosen: list[vc.ContactProblem], dt: float, steps: int) -> float:
     worst, every = 0.0, max(steps // CHECKED, 1)
     for number, report in vc.march_many(chosen, scheme=SCHEME, dt=dt, steps=steps):
         if report.new.k % every == 0 and number < 2:
-            alone, _ = next(vc.march(chosen[number], scheme=SCHEME, dt=dt, steps=1, state=report.old))
+            alone, _ = next(
+                vc.march(chosen[number], scheme=SCHEME, dt=dt, steps=1, state=report.old)
+            )
             for ours, theirs in ((report.new.u, alone.u), (report.new.v, alone.v)):
                 worst = max(worst, float(np.abs(ours - theirs).max() / np.abs(theirs).max()))
     return worst
@@ -103,17 +122,23 @@ def difference(chosen: list[vc.ContactProblem], dt: float, steps: int) -> float:
 
 def line(row: dict[str, Any]) -> str:
     """A row of the table."""
-    return (f"{row['unknowns']:>8} {row['runs']:>5} {1e6 * row['seconds_per_step']:>14.0f} "
-            f"{1e6 * row['seconds_per_single_step']:>10.0f} {row['cost_ratio']:>6.2f} {row['worst_difference']:>11.1e}")
+    return (
+        f"{row['unknowns']:>8} {row['runs']:>5} {1e6 * row['seconds_per_step']:>14.0f} "
+        f"{1e6 * row['seconds_per_single_step']:>10.0f} {row['cost_ratio']:>6.2f} {row['worst_difference']:>11.1e}"
+    )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--sizes", type=float, nargs="+", default=list(SIZES), help="numbers of unknowns, about")
+    parser.add_argument(
+        "--sizes", type=float, nargs="+", default=list(SIZES), help="numbers of unknowns, about"
+    )
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--json", type=Path, help="write the rows into this file")
     options = parser.parse_args()
-    print(f"{'unknowns':>8} {'runs':>5} {'us/run + step':>14} {'alone us':>10} {'ratio':>6} {'difference':>11}")
+    print(
+        f"{'unknowns':>8} {'runs':>5} {'us/run + step':>14} {'alone us':>10} {'ratio':>6} {'difference':>11}"
+    )
     rows = [row for size in options.sizes for row in measured(size, options.rounds)]
     if options.json:
         options.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")

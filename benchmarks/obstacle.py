@@ -34,13 +34,28 @@ from vi_contact import vi  # noqa: E402
 from vi_contact.fem import compat  # noqa: E402
 
 COMM = MPI.COMM_WORLD
-QUICKEST = {"snes_linesearch_type": "none", "ksp_type": "preonly", "pc_type": "cholesky",
-            "pc_factor_mat_solver_type": "mumps", "mat_mumps_icntl_20": 0, "snes_max_it": 1000}
-DEFAULTS = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps", "mat_mumps_icntl_20": 0}
+QUICKEST = {
+    "snes_linesearch_type": "none",
+    "ksp_type": "preonly",
+    "pc_type": "cholesky",
+    "pc_factor_mat_solver_type": "mumps",
+    "mat_mumps_icntl_20": 0,
+    "snes_max_it": 1000,
+}
+DEFAULTS = {
+    "ksp_type": "preonly",
+    "pc_type": "lu",
+    "pc_factor_mat_solver_type": "mumps",
+    "mat_mumps_icntl_20": 0,
+}
 COLUMNS = ("case", "reason", "iterations", "wrong", "error", "vi_iterations", "vi_certificate")
 CASES = (  # what, size of u, whether it starts from the solution
-    ("from nothing", 1.0, False), ("u of size 1e-5", 1e-5, False), ("u of size 1e-7", 1e-7, False),
-    ("u of size 1e-9", 1e-9, False), ("u of size 1e8", 1e8, False), ("from the solution", 1.0, True),
+    ("from nothing", 1.0, False),
+    ("u of size 1e-5", 1e-5, False),
+    ("u of size 1e-7", 1e-7, False),
+    ("u of size 1e-9", 1e-9, False),
+    ("u of size 1e8", 1e8, False),
+    ("from the solution", 1.0, True),
 )
 
 
@@ -80,7 +95,11 @@ def plain(posed: Posed, options: dict[str, Any]) -> tuple[str, int, Any]:
     snes.solve(None, x)
     for key in options:
         database.delValue(f"plain_{key}")
-    names = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
+    names = {
+        value: name
+        for name, value in vars(PETSc.SNES.ConvergedReason).items()
+        if isinstance(value, int)
+    }
     return names[snes.getConvergedReason()], snes.getIterationNumber(), np.array(x.array_r)
 
 
@@ -104,10 +123,18 @@ def cost(cells: int) -> dict[str, Any]:
     n = len(x)
     difference = COMM.allreduce(float(np.max(np.abs(x - answer[:n]))), op=MPI.MAX)
     return {
-        "unknowns": posed.u.function_space.dofmap.index_map.size_global, "ranks": COMM.size, "route": result.method,
-        "cpu_seconds": ours, "iterations": result.inner, "certificate": result.certificate.worst,
-        "active": result.active[0], "plain_cpu_seconds": theirs, "plain_iterations": iterations,
-        "plain_reason": reason, "ratio": theirs / ours, "difference": difference,
+        "unknowns": posed.u.function_space.dofmap.index_map.size_global,
+        "ranks": COMM.size,
+        "route": result.method,
+        "cpu_seconds": ours,
+        "iterations": result.inner,
+        "certificate": result.certificate.worst,
+        "active": result.active[0],
+        "plain_cpu_seconds": theirs,
+        "plain_iterations": iterations,
+        "plain_reason": reason,
+        "ratio": theirs / ours,
+        "difference": difference,
     }
 
 
@@ -125,31 +152,55 @@ def failures(cells: int) -> list[dict[str, Any]]:
         reason, iterations, x = plain(posed, DEFAULTS)
         n = len(x)
         ours, theirs = result.lambda_lower.x.array[:n] > 0.0, x <= posed.lower.x.array[:n]
-        error, size = (COMM.allreduce(float(np.max(np.abs(one))), op=MPI.MAX) for one in (x - answer[:n], answer[:n]))
-        rows.append({
-            "case": case, "reason": reason, "iterations": iterations, "error": error / size,
-            "wrong": int(COMM.allreduce(int(np.count_nonzero(ours != theirs)))), "vi_iterations": result.inner,
-            "vi_certificate": result.certificate.worst,
-        })
+        error, size = (
+            COMM.allreduce(float(np.max(np.abs(one))), op=MPI.MAX)
+            for one in (x - answer[:n], answer[:n])
+        )
+        rows.append(
+            {
+                "case": case,
+                "reason": reason,
+                "iterations": iterations,
+                "error": error / size,
+                "wrong": int(COMM.allreduce(int(np.count_nonzero(ours != theirs)))),
+                "vi_iterations": result.inner,
+                "vi_certificate": result.certificate.worst,
+            }
+        )
     return rows
 
 
 def main(arguments: list[str]) -> int:
     """Measure, print, and write the numbers if asked to."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--cells", type=int, default=449, help="squares along a side; 449 are 2e5 unknowns")
-    parser.add_argument("--small", type=int, default=48, help="squares along a side where SNESVI's failures are shown")
+    parser.add_argument(
+        "--cells", type=int, default=449, help="squares along a side; 449 are 2e5 unknowns"
+    )
+    parser.add_argument(
+        "--small",
+        type=int,
+        default=48,
+        help="squares along a side where SNESVI's failures are shown",
+    )
     parser.add_argument("--json", type=Path, help="file for the numbers")
     given = parser.parse_args(arguments)
     numbers, rows = cost(given.cells), failures(given.small)
     if COMM.rank == 0:
-        print("\n".join(f"{key:>18}: {value:.4g}" if isinstance(value, float) else f"{key:>18}: {value}"
-                        for key, value in numbers.items()))
-        print(f"\n{'SNESVI by default':<18} {'reason':<24} {'its':>4} {'wrong':>6} {'error':>8}   "
-              "vi.solve: its, certificate")
+        print(
+            "\n".join(
+                f"{key:>18}: {value:.4g}" if isinstance(value, float) else f"{key:>18}: {value}"
+                for key, value in numbers.items()
+            )
+        )
+        print(
+            f"\n{'SNESVI by default':<18} {'reason':<24} {'its':>4} {'wrong':>6} {'error':>8}   "
+            "vi.solve: its, certificate"
+        )
         for row in rows:
             case, reason, its, wrong, error, ours, worst = (row[key] for key in COLUMNS)
-            print(f"{case:<18} {reason:<24} {its:>4} {wrong:>6} {error:>8.1e} {ours:>14} {worst:>12.1e}")
+            print(
+                f"{case:<18} {reason:<24} {its:>4} {wrong:>6} {error:>8.1e} {ours:>14} {worst:>12.1e}"
+            )
         if given.json:
             given.json.write_text(json.dumps({**numbers, "snesvi_by_default": rows}, indent=1))
     return 0

@@ -28,7 +28,9 @@ from typing import Any
 
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[name] = "1"
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
+sys.path.insert(
+    0, str(Path(__file__).resolve().parents[1])
+)  # run from the source tree without installing
 
 import numpy as np  # noqa: E402
 from mpi4py import MPI  # noqa: E402
@@ -40,7 +42,14 @@ from vi_contact.core.state_checks import initial_state  # noqa: E402
 
 COMM = MPI.COMM_WORLD
 ROCKING = np.array([0.03, -0.04, 0.0])  # rad/s
-HALVED = [(1.4, 5e-3), (0.7, 5e-3), (0.35, 5e-3), (0.7, 1e-2), (0.7, 2.5e-3), (0.7, 1.25e-3)]  # of CELLS, dt [s]
+HALVED = [
+    (1.4, 5e-3),
+    (0.7, 5e-3),
+    (0.35, 5e-3),
+    (0.7, 1e-2),
+    (0.7, 2.5e-3),
+    (0.7, 1.25e-3),
+]  # of CELLS, dt [s]
 
 
 class Timer:
@@ -59,7 +68,9 @@ class Timer:
         return found
 
 
-def cost(finer: float, steps: int, solver: vc.Condensed | vc.Iterative, gravity: bool) -> dict[str, Any]:
+def cost(
+    finer: float, steps: int, solver: vc.Condensed | vc.Iterative, gravity: bool
+) -> dict[str, Any]:
     """Return what set-up and steps of one mesh cost; without ``gravity`` its stage is left out, and the weight falls on
     bodies without stresses."""
     timer = Timer()
@@ -70,7 +81,9 @@ def cost(finer: float, steps: int, solver: vc.Condensed | vc.Iterative, gravity:
         state = timer("gravity", partial(vc.static_equilibrium, static, solver=vc.Condensed()))
         problem, state = timer("release", fem.release, static, state, problem)
     del static
-    marching = vc.march(problem, dt=raft.DT, steps=steps, state=thrown(problem, state), solver=solver)
+    marching = vc.march(
+        problem, dt=raft.DT, steps=steps, state=thrown(problem, state), solver=solver
+    )
     surface, begin = problem.surface, process_time()
     stamps, open_shares, changes, iterations, worst, method = [begin], [], [], [], 0.0, ""
     for new, report in marching:
@@ -84,10 +97,19 @@ def cost(finer: float, steps: int, solver: vc.Condensed | vc.Iterative, gravity:
         worst, method = max(worst, report.certificate.worst), report.result.method
     each = np.diff(stamps)
     return {
-        "factor": finer, "unknowns": round(COMM.allreduce(problem.system.rows)), "points": surface.total,
-        "method": method, **timer.seconds, "first step": float(each[0]), "step": float(each[1:].mean()),
-        "iterations": float(np.mean(iterations[1:])), "changes of the set": float(np.mean(changes[1:])),
-        "open": float(np.mean(open_shares)), "steps": steps, "worst": worst, "ranks": COMM.size,
+        "factor": finer,
+        "unknowns": round(COMM.allreduce(problem.system.rows)),
+        "points": surface.total,
+        "method": method,
+        **timer.seconds,
+        "first step": float(each[0]),
+        "step": float(each[1:].mean()),
+        "iterations": float(np.mean(iterations[1:])),
+        "changes of the set": float(np.mean(changes[1:])),
+        "open": float(np.mean(open_shares)),
+        "steps": steps,
+        "worst": worst,
+        "ranks": COMM.size,
         "peak GB": 1e-9 * COMM.allreduce(1024 * getrusage(RUSAGE_SELF).ru_maxrss),
     }
 
@@ -100,7 +122,9 @@ def thrown(problem: vc.ContactProblem, state: vc.State) -> vc.State:
     mine = np.flatnonzero(space.points[:, 2] > 0.0)
     building = max(COMM.allgather(int(bodies[mine[0]]) if len(mine) else -1))
     speed = np.where((bodies == building)[:, None], np.cross(ROCKING, space.points), 0.0)
-    moving = initial_state(vc.ContactProblem(system.changed(v0=space.restrict(speed)), problem.surface))
+    moving = initial_state(
+        vc.ContactProblem(system.changed(v0=space.restrict(speed)), problem.surface)
+    )
     return state.with_velocity(moving.v)
 
 
@@ -110,17 +134,29 @@ def halved() -> Iterator[dict[str, Any]]:
         problem, start = raft.stages(finer, COMM, vc.Condensed())
         weight = float(COMM.allreduce(start.r_n.sum()))
         begin = process_time()
-        solution = vc.simulate(problem, dt=dt, t_end=raft.T_END, state=start, solver=vc.Condensed(),
-                               record=raft.recorders(), progress=False)
+        solution = vc.simulate(
+            problem,
+            dt=dt,
+            t_end=raft.T_END,
+            state=start,
+            solver=vc.Condensed(),
+            record=raft.recorders(),
+            progress=False,
+        )
         yield {
-            "factor": finer, "dt": dt, "unknowns": round(COMM.allreduce(problem.system.rows)),
-            **raft.key_numbers(solution.history, weight), "worst certificate": solution.facts["worst_certificate"],
-            "energy defect": solution.facts["energy_defect"], "seconds": process_time() - begin,
+            "factor": finer,
+            "dt": dt,
+            "unknowns": round(COMM.allreduce(problem.system.rows)),
+            **raft.key_numbers(solution.history, weight),
+            "worst certificate": solution.facts["worst_certificate"],
+            "energy defect": solution.facts["energy_defect"],
+            "seconds": process_time() - begin,
         }
 
 
 def told(found: dict[str, Any]) -> str:
     """A row as lines of text."""
+
     def text(value: Any) -> str:
         return f"{value:.4g}" if isinstance(value, float) else str(value)
 
@@ -129,15 +165,24 @@ def told(found: dict[str, Any]) -> str:
 
 def main() -> None:
     parser = ArgumentParser(description=__doc__)
-    parser.add_argument("--sizes", nargs="+", choices=raft.SIZES, default=["2e4", "1e5"], help="unknowns, about")
+    parser.add_argument(
+        "--sizes", nargs="+", choices=raft.SIZES, default=["2e4", "1e5"], help="unknowns, about"
+    )
     parser.add_argument("--steps", type=int, default=20, help="number of steps in a row of costs")
-    parser.add_argument("--iterative", action="store_true", help="use Iterative() in place of Condensed()")
+    parser.add_argument(
+        "--iterative", action="store_true", help="use Iterative() in place of Condensed()"
+    )
     parser.add_argument("--no-gravity", action="store_true", help="leave out the gravity stage")
-    parser.add_argument("--halving", action="store_true", help="compute whole runs, on other meshes and steps")
+    parser.add_argument(
+        "--halving", action="store_true", help="compute whole runs, on other meshes and steps"
+    )
     parser.add_argument("--json", type=Path, help="file for all numbers")
     options = parser.parse_args()
     solver = vc.Iterative() if options.iterative else vc.Condensed()
-    costs = (cost(raft.SIZES[size], options.steps, solver, not options.no_gravity) for size in options.sizes)
+    costs = (
+        cost(raft.SIZES[size], options.steps, solver, not options.no_gravity)
+        for size in options.sizes
+    )
     found: list[dict[str, Any]] = []
     for one in halved() if options.halving else costs:
         found.append(one)

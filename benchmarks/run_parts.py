@@ -29,8 +29,22 @@ from vi_contact.run.march import March
 from vi_contact.solvers import certified, condensed
 from vi_contact.solvers.normal.active_set import ActiveSet, PreparedSets
 
-RUNS = (("wall", wall, 216), ("wall", wall, 2e4), ("wall", wall, 2e5), ("block in space", block, 2e4))
-PARTS = ("set-up", "forward", "small problem", "backward", "products", "certificate", "scheme and loop", "records")
+RUNS = (
+    ("wall", wall, 216),
+    ("wall", wall, 2e4),
+    ("wall", wall, 2e5),
+    ("block in space", block, 2e4),
+)
+PARTS = (
+    "set-up",
+    "forward",
+    "small problem",
+    "backward",
+    "products",
+    "certificate",
+    "scheme and loop",
+    "records",
+)
 COLOURS = ("#4d4d4d", "#1f77b4", "#ff7f0e", "#17becf", "#2ca02c", "#9467bd", "#bcbd22", "#d62728")
 
 
@@ -38,7 +52,11 @@ class Clock:
     """Counts the processor time of parts; a part that begins stops the one that called it."""
 
     def __init__(self) -> None:
-        self.seconds, self._open, self._since = dict.fromkeys(PARTS, 0.0), ["records"], time.thread_time()
+        self.seconds, self._open, self._since = (
+            dict.fromkeys(PARTS, 0.0),
+            ["records"],
+            time.thread_time(),
+        )
 
     def _book(self) -> None:
         now = time.thread_time()
@@ -89,13 +107,19 @@ class Clock:
 def watched(clock: Clock) -> Iterator[None]:
     """Counts the functions that make up the parts."""
     places: list[tuple[str, Any, str]] = [
-        ("set-up", condensed, "condense"), ("set-up", ActiveSet, "prepare"),
-        ("set-up", type(SCHEME), "effective_matrix"), ("forward", ContactLast, "forward"),
-        ("small problem", PreparedSets, "solve"), ("backward", ContactLast, "backward"),
-        ("products", PetscMatrix, "__matmul__"), ("products", PetscMatrix, "transpose_apply"),
+        ("set-up", condensed, "condense"),
+        ("set-up", ActiveSet, "prepare"),
+        ("set-up", type(SCHEME), "effective_matrix"),
+        ("forward", ContactLast, "forward"),
+        ("small problem", PreparedSets, "solve"),
+        ("backward", ContactLast, "backward"),
+        ("products", PetscMatrix, "__matmul__"),
+        ("products", PetscMatrix, "transpose_apply"),
         ("certificate", certified, "kkt_residual"),
     ]
-    kept = [(place, name, getattr(place, name)) for _, place, name in places] + [(March, "__iter__", March.__iter__)]
+    kept = [(place, name, getattr(place, name)) for _, place, name in places] + [
+        (March, "__iter__", March.__iter__)
+    ]
     for part, place, name in places:
         setattr(place, name, clock.counted(part, getattr(place, name)))
     March.__iter__ = clock.loop(March.__iter__)  # type: ignore[method-assign]
@@ -106,20 +130,35 @@ def watched(clock: Clock) -> Iterator[None]:
             setattr(place, name, function)
 
 
-def measured(name: str, build: Callable[[float, Any], Any], size: float, steps: int) -> dict[str, Any]:
+def measured(
+    name: str, build: Callable[[float, Any], Any], size: float, steps: int
+) -> dict[str, Any]:
     """The parts of one run."""
     clock = Clock()
     with tempfile.TemporaryDirectory() as folder, watched(clock), clock.part("records"):
         problem, dt, _ = build(size, None)
 
         def run(count: int) -> None:
-            vc.simulate(problem, scheme=SCHEME, solver=vc.Condensed(), dt=dt, steps=count, out=folder, progress=False)
+            vc.simulate(
+                problem,
+                scheme=SCHEME,
+                solver=vc.Condensed(),
+                dt=dt,
+                steps=count,
+                out=folder,
+                progress=False,
+            )
 
         run(1)  # what is made but once
         clock.forget()
         run(steps)
-    return {"problem": name, "unknowns": problem.system.rows, "points": problem.surface.total, "steps": steps,
-            "seconds": clock.seconds}
+    return {
+        "problem": name,
+        "unknowns": problem.system.rows,
+        "points": problem.surface.total,
+        "steps": steps,
+        "seconds": clock.seconds,
+    }
 
 
 def draw(rows: list[dict[str, Any]], file: Path) -> None:
@@ -152,7 +191,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--steps", type=int, default=200)
     parser.add_argument("--figure", type=Path)
-    parser.add_argument("--json", type=Path, help="file for all numbers; a file that exists is drawn without a run")
+    parser.add_argument(
+        "--json", type=Path, help="file for all numbers; a file that exists is drawn without a run"
+    )
     options = parser.parse_args()
     rows: list[dict[str, Any]] = []
     if options.json and options.json.exists():
@@ -160,7 +201,9 @@ def main() -> None:
     for name, build, size in () if rows else RUNS:
         rows.append(measured(name, build, size, options.steps))
     for row in rows:
-        parts = ", ".join(f"{part} {1e3 * seconds / row['steps']:.3g}" for part, seconds in row["seconds"].items())
+        parts = ", ".join(
+            f"{part} {1e3 * seconds / row['steps']:.3g}" for part, seconds in row["seconds"].items()
+        )
         print(f"{row['problem']}, {row['unknowns']} unknowns, ms a step: {parts}")
     if options.json:
         options.json.write_text(json.dumps(rows, indent=1) + "\n")

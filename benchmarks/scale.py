@@ -48,7 +48,9 @@ from vi_contact.fem.communicators import give_back, kept  # noqa: E402
 
 COMM = MPI.COMM_WORLD
 NU, CONTRAST, WEIGHT = 0.3, 10.0, 0.02  # E and rho of the lower layer are 1
-SPEED = float(np.sqrt(CONTRAST * (1.0 - NU) / ((1.0 + NU) * (1.0 - 2.0 * NU))))  # of P waves in the upper layer
+SPEED = float(
+    np.sqrt(CONTRAST * (1.0 - NU) / ((1.0 + NU) * (1.0 - 2.0 * NU)))
+)  # of P waves in the upper layer
 COURANTS, FAR = (1.0, 10.0), 100.0
 PUSH = 5e-4  # of the top in a step at C = 100 and in a static one
 LARGE = 5e5  # unknowns beyond which only C = 10 is run, on tetrahedra: what a machine of one person carries
@@ -119,14 +121,21 @@ def wavy(x: Any) -> Any:
 
 def divisions(unknowns: float, dimension: int) -> tuple[int, ...]:
     """Cells along the axes of a flat block with about so many unknowns."""
-    n = round((2.75 * unknowns) ** (1.0 / 3.0)) if dimension == 3 else round((2.0 * unknowns) ** 0.5)
+    n = (
+        round((2.75 * unknowns) ** (1.0 / 3.0))
+        if dimension == 3
+        else round((2.0 * unknowns) ** 0.5)
+    )
     high = max(round(n / 8.5), 2) if dimension == 3 else max(n // 4, 2)
     return (n,) * (dimension - 1) + (high,)
 
 
 def box(cells: tuple[int, ...], element: str) -> Any:
     """The mesh, built on all ranks together."""
-    top, ghosts = [1.0] * (len(cells) - 1) + [cells[-1] / cells[0]], dolfinx.mesh.GhostMode.shared_facet
+    top, ghosts = (
+        [1.0] * (len(cells) - 1) + [cells[-1] / cells[0]],
+        dolfinx.mesh.GhostMode.shared_facet,
+    )
     corners, kind = [np.zeros(len(cells)), np.array(top)], getattr(dolfinx.mesh.CellType, element)
     make = dolfinx.mesh.create_box if len(cells) == 3 else dolfinx.mesh.create_rectangle
     return make(COMM, corners, list(cells), kind, ghost_mode=ghosts)
@@ -135,12 +144,18 @@ def box(cells: tuple[int, ...], element: str) -> Any:
 def block(unknowns: float, element: str, *, pushed: bool = False, dimension: int = 3) -> Block:
     """The block, thrown, or at rest with its top pushed down slowly."""
     cells = divisions(unknowns, dimension)
-    kind = ELEMENTS[element] if dimension == 3 else {"hexahedra": "quadrilateral", "tetrahedra": "triangle"}[element]
+    kind = (
+        ELEMENTS[element]
+        if dimension == 3
+        else {"hexahedra": "quadrilateral", "tetrahedra": "triangle"}[element]
+    )
     mesh, up, h = box(cells, kind), dimension - 1, 1.0 / cells[0]
     height = cells[-1] * h
 
     def face(name: str, z: float) -> Any:
-        found = dolfinx.mesh.locate_entities_boundary(mesh, up, lambda x: np.abs(x[up] - z) < 0.1 * h)
+        found = dolfinx.mesh.locate_entities_boundary(
+            mesh, up, lambda x: np.abs(x[up] - z) < 0.1 * h
+        )
         return fem.Facets(name, found, mesh)
 
     def layer(name: str, low: float, high: float) -> Any:
@@ -154,10 +169,17 @@ def block(unknowns: float, element: str, *, pushed: bool = False, dimension: int
     materials = [(layer("soft", -1.0, halves), soft), (layer("hard", halves, 2.0), hard)]
     side, tilt = np.eye(dimension)[0], np.eye(dimension)[up]
     speed = -PUSH / (FAR * h / SPEED) * tilt
-    held = fem.Prescribed(face("top", height), lambda x, t: np.tile(speed * t, (len(x), 1)), tuple(speed))
+    held = fem.Prescribed(
+        face("top", height), lambda x, t: np.tile(speed * t, (len(x), 1)), tuple(speed)
+    )
     system = fem.assemble(
-        mesh, materials, prescribed=held if pushed else (), loads=fem.BodyForce(tuple(-WEIGHT * tilt)),
-        initial_velocity=None if pushed else lambda x: np.outer(0.01 * x[:, 0] - 0.025, tilt) + 0.01 * side,
+        mesh,
+        materials,
+        prescribed=held if pushed else (),
+        loads=fem.BodyForce(tuple(-WEIGHT * tilt)),
+        initial_velocity=None
+        if pushed
+        else lambda x: np.outer(0.01 * x[:, 0] - 0.025, tilt) + 0.01 * side,
     )
     surface = fem.contact_surface(system, face("bottom", 0.0), obstacle=vc.AnalyticGap(wavy))
     return Block(vc.ContactProblem(system, surface), h, element)
@@ -182,15 +204,22 @@ class Watched:
     def solve(self, step: Any) -> Any:
         before, operations, start = self.counts(), PETSc.Log.getFlops(), time.process_time()
         result = self.prepared.solve(step)
-        spent, flops = busiest(time.process_time() - start), busiest(PETSc.Log.getFlops() - operations)
+        spent, flops = (
+            busiest(time.process_time() - start),
+            busiest(PETSc.Log.getFlops() - operations),
+        )
         counts = {key: value - before[key] for key, value in self.counts().items()}
-        self.rows.append({"seconds": spent, "flops": flops, "iterations": result.iterations, **counts})
+        self.rows.append(
+            {"seconds": spent, "flops": flops, "iterations": result.iterations, **counts}
+        )
         self.last = [*self.last[-1:], step]
         return result
 
     def counts(self) -> dict[str, float]:
         work = getattr(self.prepared, "work", None)
-        return {name: getattr(work, name, 0) for name in ("linear_iterations", "products", "renewals")}
+        return {
+            name: getattr(work, name, 0) for name in ("linear_iterations", "products", "renewals")
+        }
 
 
 def product_seconds(A: Any) -> float:
@@ -225,11 +254,15 @@ def history(given: Block) -> vc.State:
     return deque((state for state, _ in marched), maxlen=1)[0]
 
 
-def dynamic(given: Block, state: vc.State | None, courant: float, solver: Any, steps: int, warm: int) -> dict[str, Any]:
+def dynamic(
+    given: Block, state: vc.State | None, courant: float, solver: Any, steps: int, warm: int
+) -> dict[str, Any]:
     """A row of steps from a state."""
     watched, worst, closed = Watched(solver), 0.0, []
     dt = given.dt(courant)
-    for _, report in vc.march(given.problem, solver=watched, dt=dt, steps=warm + steps, state=state):
+    for _, report in vc.march(
+        given.problem, solver=watched, dt=dt, steps=warm + steps, state=state
+    ):
         worst = max(worst, report.certificate.worst)
         closed.append(float(COMM.allreduce(int(report.new.active.sum()))))
         if len(closed) == warm:
@@ -266,18 +299,31 @@ def row(
     mean = {key: float(np.mean([one[key] for one in watched.rows])) for key in watched.rows[0]}
     own = hasattr(watched.prepared, "work")
     return {
-        "unknowns": given.unknowns, "points": int(COMM.allreduce(len(given.problem.surface.owned))), "closed": closed,
-        "dimension": int(given.problem.system.space.dimension), "element": given.element, "courant": courant,
-        "friction": type(given.problem.friction).__name__ if given.mu else None, "mu": given.mu,
+        "unknowns": given.unknowns,
+        "points": int(COMM.allreduce(len(given.problem.surface.owned))),
+        "closed": closed,
+        "dimension": int(given.problem.system.space.dimension),
+        "element": given.element,
+        "courant": courant,
+        "friction": type(given.problem.friction).__name__ if given.mu else None,
+        "mu": given.mu,
         "method": type(solver).__name__,
         "preconditioner": watched.prepared.kind if own else None,
-        "iterations": mean["iterations"], "linear_iterations": mean["linear_iterations"] if own else None,
-        "newton_steps": mean["iterations"] if given.mu else 0.0, "products": mean["products"] if own else None,
-        "renewals": mean["renewals"], "largest_renewals": max(one["renewals"] for one in watched.rows),
-        "cpu_products": mean["seconds"] / product, "setup_products": busiest(watched.setup) / product,
-        "seconds": mean["seconds"], "flops": mean["flops"], "product_seconds": product,
+        "iterations": mean["iterations"],
+        "linear_iterations": mean["linear_iterations"] if own else None,
+        "newton_steps": mean["iterations"] if given.mu else 0.0,
+        "products": mean["products"] if own else None,
+        "renewals": mean["renewals"],
+        "largest_renewals": max(one["renewals"] for one in watched.rows),
+        "cpu_products": mean["seconds"] / product,
+        "setup_products": busiest(watched.setup) / product,
+        "seconds": mean["seconds"],
+        "flops": mean["flops"],
+        "product_seconds": product,
         "over_linear": None if not linear else mean["linear_iterations"] / linear,
-        "peak_bytes": resident, "bytes_per_unknown": (resident - MEMORY.bare) / given.unknowns, "certificate": worst,
+        "peak_bytes": resident,
+        "bytes_per_unknown": (resident - MEMORY.bare) / given.unknowns,
+        "certificate": worst,
         "ranks": COMM.size,
     }
 
@@ -292,7 +338,9 @@ def rows_of(size: float, steps: int) -> Iterator[dict[str, Any]]:
         for courant in (10.0,) if size > LARGE else COURANTS:
             yield dynamic(given, state, courant, vc.Iterative(), steps, 2) | {"peak_bytes": set_up}
         for mu in (0.3, 0.8):
-            yield dynamic(given.rubbing(mu), state, 10.0, vc.Iterative(), steps, 2) | {"peak_bytes": set_up}
+            yield dynamic(given.rubbing(mu), state, 10.0, vc.Iterative(), steps, 2) | {
+                "peak_bytes": set_up
+            }
         if size <= LARGE:
             del given, state
             MEMORY.forget()
@@ -313,13 +361,32 @@ def small_rows(steps: int) -> Iterator[dict[str, Any]]:
                     yield dynamic(given, state, courant, solver, steps, 2)
 
 
-SHOWN = ("unknowns", "points", "closed", "element", "courant", "mu", "method", "preconditioner", "iterations",
-         "linear_iterations", "over_linear", "products", "renewals", "cpu_products", "setup_products", "seconds",
-         "flops", "bytes_per_unknown", "certificate")
+SHOWN = (
+    "unknowns",
+    "points",
+    "closed",
+    "element",
+    "courant",
+    "mu",
+    "method",
+    "preconditioner",
+    "iterations",
+    "linear_iterations",
+    "over_linear",
+    "products",
+    "renewals",
+    "cpu_products",
+    "setup_products",
+    "seconds",
+    "flops",
+    "bytes_per_unknown",
+    "certificate",
+)
 
 
 def told(found: dict[str, Any]) -> str:
     """A row as text."""
+
     def text(value: Any) -> str:
         return "-" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)
 
@@ -327,8 +394,12 @@ def told(found: dict[str, Any]) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--sizes", type=float, nargs="+", default=[6e4], help="numbers of unknowns, about")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--sizes", type=float, nargs="+", default=[6e4], help="numbers of unknowns, about"
+    )
     parser.add_argument("--steps", type=int, default=4, help="number of steps in a row")
     parser.add_argument("--no-small", action="store_true", help="leave out the condensed route")
     parser.add_argument("--json", type=Path, help="file for all numbers")

@@ -76,7 +76,9 @@ def oscillation(elements: int, courant: float, scheme: Any, mass: Any) -> float:
     bar = Bar(ThrownBar(), elements=elements)
     dt = bar.time_step(courant)
     worst = 0.0
-    for state, _ in march(build(bar, MPI.COMM_WORLD).problem(mass=mass), scheme, dt, int(1.067 / dt)):
+    for state, _ in march(
+        build(bar, MPI.COMM_WORLD).problem(mass=mass), scheme, dt, int(1.067 / dt)
+    ):
         if 0.6 < state.t < 1.067:
             worst = max(worst, abs(force(state) / bar.section / 300.0 - 1.0))
     return worst
@@ -109,25 +111,33 @@ def linear_step(report: Any, scheme: Any, dt: float) -> float:
     none = np.zeros(problem.surface.count)
     begin = time.perf_counter()
     step = scheme.step(problem, old, A, dt)
-    scheme.finish(problem, old, step, vc.StepResult(A.factor.solve(step.b), none, none > 0.0, 0, "linear"), dt)
+    scheme.finish(
+        problem, old, step, vc.StepResult(A.factor.solve(step.b), none, none > 0.0, 0, "linear"), dt
+    )
     return time.perf_counter() - begin
 
 
-def block(unknowns: float, scheme: Any, mass: Any, *, steps: int = 400, dt: float = 1e-3) -> dict[str, float]:
+def block(
+    unknowns: float, scheme: Any, mass: Any, *, steps: int = 400, dt: float = 1e-3
+) -> dict[str, float]:
     """The thrown unit square: E = 1000, nu = 0.3, rho = 1, gap 0.05, speed 1."""
     n = round(math.sqrt(unknowns / 2.0)) - 1
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 1.0), divisions=(n, n)), MPI.COMM_WORLD)
     rubber = vc.LinearElastic(E=1000.0, nu=0.3, rho=1.0)
     system = fem.assemble(mesh, rubber, section=vc.PlaneStrain(), initial_velocity=(0.0, -1.0))
     ground = vc.HalfSpace(point=(0.0, -0.05), normal=(0.0, 1.0))
-    problem = vc.ContactProblem(system, fem.contact_surface(system, tags["bottom"], obstacle=ground), mass=mass)
+    problem = vc.ContactProblem(
+        system, fem.contact_surface(system, tags["bottom"], obstacle=ground), mass=mass
+    )
     largest, seconds, linear, worst, flight = 0.0, [], [], 0.0, None
     loop = iter(march(problem, scheme, dt, steps))
     for _ in range(steps):
         begin = time.perf_counter()
         state, report = next(loop)
         spent = time.perf_counter() - begin
-        flight = flight or report  # linear steps start from it: no scheme has anything to do for contact there
+        flight = (
+            flight or report
+        )  # linear steps start from it: no scheme has anything to do for contact there
         largest, worst = max(largest, force(state)), max(worst, report.certificate.worst)
         if problem.surface.some(state.active):
             seconds.append(spent)
@@ -135,9 +145,13 @@ def block(unknowns: float, scheme: Any, mass: Any, *, steps: int = 400, dt: floa
     equations = report.problem.equations
     up = equations.influence[:, 1]
     return {
-        "unknowns": len(state.u), "energy": energy(report) / 0.5, "speed": float(up @ (equations.M @ state.v)),
-        "force": largest, "ms": 1e3 * float(np.median(seconds)),
-        "ratio": float(np.median(seconds) / np.median(linear)), "certificate": worst,
+        "unknowns": len(state.u),
+        "energy": energy(report) / 0.5,
+        "speed": float(up @ (equations.M @ state.v)),
+        "force": largest,
+        "ms": 1e3 * float(np.median(seconds)),
+        "ratio": float(np.median(seconds) / np.median(linear)),
+        "certificate": worst,
     }
 
 
@@ -156,22 +170,34 @@ def bar_row(elements: int, count: int, scheme: Any, mass: Any) -> dict[str, Any]
 
 
 def print_bars(rows: dict[str, Any], count: int) -> None:
-    print(f"| scheme | Courant | force error in the window | energy after 1, 4, {count} bounces | "
-          "L2 error of the force | largest force |\n|---|---|---|---|---|---|")
+    print(
+        f"| scheme | Courant | force error in the window | energy after 1, 4, {count} bounces | "
+        "L2 error of the force | largest force |\n|---|---|---|---|---|---|"
+    )
     for name, row in rows.items():
         for courant, found in row.items():
-            energies = ", ".join(number(e) for e in found["energies"][: 3 if courant != "0.1" else 2])
-            print(f"| {name} | {courant} | {found['oscillation']:.1e} | {energies} | {found['force_error']:.2f} | "
-                  f"{number(found['peak'])} |", flush=True)
+            energies = ", ".join(
+                number(e) for e in found["energies"][: 3 if courant != "0.1" else 2]
+            )
+            print(
+                f"| {name} | {courant} | {found['oscillation']:.1e} | {energies} | {found['force_error']:.2f} | "
+                f"{number(found['peak'])} |",
+                flush=True,
+            )
 
 
 def print_blocks(rows: dict[str, Any]) -> None:
-    print("| scheme | unknowns | energy | mean speed | largest force | ms per step | over a linear step |\n"
-          "|---|---|---|---|---|---|---|")
+    print(
+        "| scheme | unknowns | energy | mean speed | largest force | ms per step | over a linear step |\n"
+        "|---|---|---|---|---|---|---|"
+    )
     for name, row in rows.items():
         for found in row:
-            print(f"| {name} | {found['unknowns']} | {number(found['energy'])} | {found['speed']:.3f} | "
-                  f"{number(found['force'])} | {found['ms']:.2f} | {found['ratio']:.1f} |", flush=True)
+            print(
+                f"| {name} | {found['unknowns']} | {number(found['energy'])} | {found['speed']:.3f} | "
+                f"{number(found['force'])} | {found['ms']:.2f} | {found['ratio']:.1f} |",
+                flush=True,
+            )
 
 
 def main() -> None:
@@ -185,14 +211,24 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     logging.getLogger("vi_contact").setLevel(logging.ERROR)
-    chosen = {name: pair for name, pair in SCHEMES.items() if not options.only or options.only in name}
-    bars = {} if options.no_bars else {n: bar_row(options.elements, options.bounces, *s) for n, s in chosen.items()}
+    chosen = {
+        name: pair for name, pair in SCHEMES.items() if not options.only or options.only in name
+    }
+    bars = (
+        {}
+        if options.no_bars
+        else {n: bar_row(options.elements, options.bounces, *s) for n, s in chosen.items()}
+    )
     print_bars(bars, options.bounces)
-    blocks = {name: [block(size, *pair) for size in options.blocks] for name, pair in chosen.items()}
+    blocks = {
+        name: [block(size, *pair) for size in options.blocks] for name, pair in chosen.items()
+    }
     print()
     print_blocks(blocks)
     if options.json:
-        options.json.write_text(json.dumps({"bars": bars, "blocks": blocks}, indent=1), encoding="utf-8")
+        options.json.write_text(
+            json.dumps({"bars": bars, "blocks": blocks}, indent=1), encoding="utf-8"
+        )
 
 
 if __name__ == "__main__":

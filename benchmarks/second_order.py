@@ -48,7 +48,8 @@ Row = dict[str, Any]
 ELEMENTS = {"P1": (1, True), "Q1": (1, False), "P2": (2, True), "Q2": (2, False)}
 SLENDER = 8  # length over height
 SECTIONS = {  # of the cantilever: dimension, section, Poisson's ratio
-    "in space": (3, None, 0.3), "plane stress": (2, vc.PlaneStress(1.0), 0.3),
+    "in space": (3, None, 0.3),
+    "plane stress": (2, vc.PlaneStress(1.0), 0.3),
     "plane strain, nu = 0.4999": (2, vc.PlaneStrain(), 0.4999),
 }
 
@@ -70,11 +71,16 @@ def cantilever(body: str, cells: int, element: str) -> tuple[float, SemiDiscrete
     degree, simplices = ELEMENTS[element]
     lengths = (float(SLENDER), *(1.0,) * (d - 1))
     mesh, tags = fem.build_mesh(
-        BlockMesh(lengths=lengths, divisions=tuple(int(n) * cells for n in lengths), simplices=simplices), MPI.COMM_SELF
+        BlockMesh(
+            lengths=lengths, divisions=tuple(int(n) * cells for n in lengths), simplices=simplices
+        ),
+        MPI.COMM_SELF,
     )
     rollers = [fem.Prescribed(tags["back"], components=(2,))] if d == 3 else []
     material = vc.LinearElastic(E=1.0, nu=nu, rho=1.0)
-    system = fem.assemble(mesh, material, section=section, clamped=tags["left"], prescribed=rollers, degree=degree)
+    system = fem.assemble(
+        mesh, material, section=section, clamped=tags["left"], prescribed=rollers, degree=degree
+    )
     values = eigsh(matrix(system.K), 1, matrix(system.M), sigma=0.0, return_eigenvectors=False)
     return float(np.sqrt(values[0])), system
 
@@ -87,8 +93,16 @@ def bending(cells: list[int]) -> list[Row]:
         for n in cells:
             for element, (degree, _) in ELEMENTS.items():
                 found, system = cantilever(body, n // degree, element)
-                rows.append({"problem": f"bending, {body}", "cells": n, "element": element, "unknowns": system.rows,
-                             "entries": entries(system), "frequency": 100.0 * (found / exact - 1.0)})
+                rows.append(
+                    {
+                        "problem": f"bending, {body}",
+                        "cells": n,
+                        "element": element,
+                        "unknowns": system.rows,
+                        "entries": entries(system),
+                        "frequency": 100.0 * (found / exact - 1.0),
+                    }
+                )
     return rows
 
 
@@ -99,16 +113,23 @@ def hertz(cells: list[int]) -> list[Row]:
     for n in cells:
         for element, (degree, simplices) in ELEMENTS.items():
             h, growth = a / n * degree, 1.15**degree
-            axes = [even_then_growing(h, 1.5 * a, span * a, growth=growth), growing(h, span * a, growth=growth)]
+            axes = [
+                even_then_growing(h, 1.5 * a, span * a, growth=growth),
+                growing(h, span * a, growth=growth),
+            ]
 
             def placed(x: Any, axes: Any = axes) -> Any:
                 even = [np.linspace(0.0, 1.0, len(nodes)) for nodes in axes]
                 return np.column_stack([np.interp(x[:, i], even[i], axes[i]) for i in range(2)])
 
-            spec = BlockMesh(divisions=tuple(len(p) - 1 for p in axes), simplices=simplices, deform=placed)
+            spec = BlockMesh(
+                divisions=tuple(len(p) - 1 for p in axes), simplices=simplices, deform=placed
+            )
             mesh, tags = fem.build_mesh(spec, MPI.COMM_SELF)
             system = fem.assemble(
-                mesh, vc.LinearElastic(E=0.91, nu=0.3, rho=1.0), degree=degree,
+                mesh,
+                vc.LinearElastic(E=0.91, nu=0.3, rho=1.0),
+                degree=degree,
                 prescribed=fem.Prescribed(tags["left"], components=(0,)),
                 loads=fem.Traction(tags["top"], (0.0, -0.5 * exact.force / (span * a))),
             )
@@ -116,9 +137,17 @@ def hertz(cells: list[int]) -> list[Row]:
             surface = fem.contact_surface(system, tags["bottom"], obstacle=ground)
             state, w = vc.static_equilibrium(vc.ContactProblem(system, surface)), surface.weights
             p = exact.pressure(surface.points[:, 0])
-            rows.append({"problem": "hertz", "cells": n, "element": element, "unknowns": system.rows,
-                         "entries": entries(system), "in contact": int(np.sum(state.r_n > 0.0)),
-                         "pressure": 100.0 * float(np.sqrt(w @ (state.r_n / w - p) ** 2 / (w @ p**2)))})
+            rows.append(
+                {
+                    "problem": "hertz",
+                    "cells": n,
+                    "element": element,
+                    "unknowns": system.rows,
+                    "entries": entries(system),
+                    "in contact": int(np.sum(state.r_n > 0.0)),
+                    "pressure": 100.0 * float(np.sqrt(w @ (state.r_n / w - p) ** 2 / (w @ p**2))),
+                }
+            )
     return rows
 
 
@@ -127,15 +156,37 @@ def impact(cells: list[int]) -> list[Row]:
     case, rows = ThrownBar(), []
     for n in cells:
         for element, (degree, triangles) in ELEMENTS.items():
-            bar = Bar(case, elements=n // degree, across=4 // degree, dimension=2, triangles=triangles, degree=degree)
+            bar = Bar(
+                case,
+                elements=n // degree,
+                across=4 // degree,
+                dimension=2,
+                triangles=triangles,
+                degree=degree,
+            )
             model, dt = build(bar, MPI.COMM_SELF), bar.time_step(0.5 / degree)
-            found = np.array([(state.t, state.r_n.sum()) for state, _ in vc.march(
-                model.problem(), dt=dt, steps=round(1.5 / dt))])
-            t, away = found[:, 0], (found[:, 1] / bar.section - case.force(found[:, 0])) / case.pressure
+            found = np.array(
+                [
+                    (state.t, state.r_n.sum())
+                    for state, _ in vc.march(model.problem(), dt=dt, steps=round(1.5 / dt))
+                ]
+            )
+            t, away = (
+                found[:, 0],
+                (found[:, 1] / bar.section - case.force(found[:, 0])) / case.pressure,
+            )
             span, middle = (t > 0.3) & (t < 1.4), (t > 0.6) & (t < 1.067)
-            rows.append({"problem": "impact", "cells": n, "element": element, "unknowns": model.system.rows,
-                         "entries": entries(model.system), "force": 100.0 * float(np.sqrt(np.mean(away[span] ** 2))),
-                         "ringing": 100.0 * float(np.abs(away[middle]).max())})
+            rows.append(
+                {
+                    "problem": "impact",
+                    "cells": n,
+                    "element": element,
+                    "unknowns": model.system.rows,
+                    "entries": entries(model.system),
+                    "force": 100.0 * float(np.sqrt(np.mean(away[span] ** 2))),
+                    "ringing": 100.0 * float(np.abs(away[middle]).max()),
+                }
+            )
     return rows
 
 
@@ -143,12 +194,16 @@ def line(row: Row) -> str:
     """One row for people."""
     told = ("frequency", "pressure", "force", "ringing", "in contact")
     values = " ".join(f"{name} {row[name]:.3g}" for name in told if name in row)
-    return (f"{row['problem']:<34} {row['cells']:>4} {row['element']} {row['unknowns']:>7} unknowns "
-            f"{row['entries']:>5.1f} entries  {values}")
+    return (
+        f"{row['problem']:<34} {row['cells']:>4} {row['element']} {row['unknowns']:>7} unknowns "
+        f"{row['entries']:>5.1f} entries  {values}"
+    )
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     for problem, cells in (("bending", [2, 4, 8]), ("hertz", [8, 16]), ("impact", [50, 100])):
         parser.add_argument(f"--{problem}", type=int, nargs="*", default=cells)
     parser.add_argument("--json", type=Path)

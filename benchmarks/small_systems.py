@@ -51,7 +51,11 @@ class Bare:
         equations, self.dt, self.load = problem.equations, dt, problem.equations.load
         self.M, self.K = (self._csr(matrix) for matrix in (equations.M, equations.K))
         self.A = (4.0 / dt**2 * self.M + self.K).tocsr()
-        self.points, self.gap0, self.state = problem.surface.owned, problem.surface.gap0, initial_state(problem)
+        self.points, self.gap0, self.state = (
+            problem.surface.owned,
+            problem.surface.gap0,
+            initial_state(problem),
+        )
 
     @staticmethod
     def _csr(matrix: Any) -> sp.csr_matrix:
@@ -65,7 +69,11 @@ class Bare:
         units = np.zeros((A.shape[0], len(points)))
         units[points, np.arange(len(points))] = 1.0
         columns = factor.solve(units)
-        G, norm, largest = columns[points], np.abs(columns[points]).sum(axis=1).max(), A.diagonal().max()
+        G, norm, largest = (
+            columns[points],
+            np.abs(columns[points]).sum(axis=1).max(),
+            A.diagonal().max(),
+        )
         u, v, t, worst = self.state.u, self.state.v, 0.0, 0.0
         active, known = np.zeros(len(points), dtype=bool), b""
         for _ in range(steps):
@@ -96,7 +104,9 @@ class Bare:
             u, t = x, t + dt
         return u, worst
 
-    def _certificate(self, Ax: Any, b: Any, x: Any, r: Any, guess: Any, active: Any, largest: float) -> float:
+    def _certificate(
+        self, Ax: Any, b: Any, x: Any, r: Any, guess: Any, active: Any, largest: float
+    ) -> float:
         """The residuals of vi_contact's certificate without friction."""
         residual, gap = Ax - b, self.gap0 - x[self.points]
         residual[self.points] += r
@@ -106,7 +116,13 @@ class Bare:
             return 0.0
         balance = np.abs(residual).max() / max(b_max, np.abs(Ax).max(), 1e-5 * largest * x_max)
         apart = np.abs(np.where(active, gap, 0.0)).max() / x_ref
-        return max(balance, -gap.min() / x_ref, -r.min() / r_ref, apart, np.abs(np.where(active, 0.0, r)).max() / r_ref)
+        return max(
+            balance,
+            -gap.min() / x_ref,
+            -r.min() / r_ref,
+            apart,
+            np.abs(np.where(active, 0.0, r)).max() / r_ref,
+        )
 
 
 LIBRARIES = "import time, scipy, dolfinx; print(time.process_time())"
@@ -128,12 +144,16 @@ def start_up(rounds: int) -> tuple[float, list[float]]:
     """Processor time [s] from command to first step, the median, and its ratios to that of importing the libraries."""
     found: dict[str, list[float]] = {LIBRARIES: [], FIRST_STEP: []}
     with tempfile.TemporaryDirectory() as folder:
-        cached = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+        cached = {
+            name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"
+        }
         cached["PYTHONPYCACHEPREFIX"] = f"{folder}/byte_code"
         for _ in range(rounds + 1):
             for code, times in found.items():
                 command = [sys.executable, "-c", code, f"{folder}/run"]
-                ended = subprocess.run(command, capture_output=True, text=True, check=True, env=cached)
+                ended = subprocess.run(
+                    command, capture_output=True, text=True, check=True, env=cached
+                )
                 times.append(float(ended.stdout))
     libraries, first = (np.array(times[1:]) for times in found.values())
     return float(np.median(first)), (first / libraries).tolist()
@@ -159,14 +179,22 @@ def measured(steps: int, rounds: int) -> list[dict[str, Any]]:
 
     def simulate() -> np.ndarray:
         with tempfile.TemporaryDirectory() as folder:
-            return vc.simulate(problem, scheme=SCHEME, dt=dt, steps=steps, out=folder, progress=False).state.u
+            return vc.simulate(
+                problem, scheme=SCHEME, dt=dt, steps=steps, out=folder, progress=False
+            ).state.u
 
     routes: dict[str, Callable[[], Any]] = {"march": march, "simulate": simulate}
-    found, ratios, expected = {name: [] for name in ("bare", *routes)}, {name: [] for name in routes}, bare.march(steps)
+    found, ratios, expected = (
+        {name: [] for name in ("bare", *routes)},
+        {name: [] for name in routes},
+        bare.march(steps),
+    )
     for name, work in routes.items():
         off = np.abs(work() - expected[0]).max() / np.abs(expected[0]).max()
         if not off < 1e-9:
-            raise SystemExit(f"{name} and the bare loop differ by {off:.1e}: they do not march the same problem")
+            raise SystemExit(
+                f"{name} and the bare loop differ by {off:.1e}: they do not march the same problem"
+            )
     lone = partial(bare.march, steps)
     for _ in range(rounds):
         for name, work in routes.items():
@@ -177,13 +205,26 @@ def measured(steps: int, rounds: int) -> list[dict[str, Any]]:
     factorisation = spent(lambda: SCHEME.effective_matrix(problem, dt).factor)[0]
     set_up = spent(lambda: next(vc.march(problem, scheme=SCHEME, dt=dt, steps=1)))[0]
     common = {
-        "unknowns": model.system.space.unknowns, "points": problem.surface.total, "dimension": 2, "problem": "wall",
-        "friction": False, "setup_seconds": set_up, "setup_over_factorisation": set_up / factorisation,
-        "certificate": worst[0], "bare_seconds_per_step": float(np.median(found["bare"])),
+        "unknowns": model.system.space.unknowns,
+        "points": problem.surface.total,
+        "dimension": 2,
+        "problem": "wall",
+        "friction": False,
+        "setup_seconds": set_up,
+        "setup_over_factorisation": set_up / factorisation,
+        "certificate": worst[0],
+        "bare_seconds_per_step": float(np.median(found["bare"])),
     }
-    return [common | {"method": name, "ratio_median": float(np.median(ratios[name])),
-                      "ratio_mean": float(np.mean(ratios[name])), "seconds_per_step": float(np.median(found[name]))}
-            for name in routes]
+    return [
+        common
+        | {
+            "method": name,
+            "ratio_median": float(np.median(ratios[name])),
+            "ratio_mean": float(np.mean(ratios[name])),
+            "seconds_per_step": float(np.median(found[name])),
+        }
+        for name in routes
+    ]
 
 
 def main() -> None:
@@ -193,16 +234,28 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="write the rows into this file")
     options = parser.parse_args()
     rows = measured(options.steps, options.rounds)
-    print(f"{'unknowns':>8} {'points':>6}  {'method':<9} {'ratio':>6} {'mean':>6} {'us/step':>8} {'bare us':>8} "
-          f"{'certificate':>11}")
+    print(
+        f"{'unknowns':>8} {'points':>6}  {'method':<9} {'ratio':>6} {'mean':>6} {'us/step':>8} {'bare us':>8} "
+        f"{'certificate':>11}"
+    )
     for row in rows:
-        print(f"{row['unknowns']:>8} {row['points']:>6}  {row['method']:<9} {row['ratio_median']:>6.2f} "
-              f"{row['ratio_mean']:>6.2f} {1e6 * row['seconds_per_step']:>8.0f} "
-              f"{1e6 * row['bare_seconds_per_step']:>8.0f} {row['certificate']:>11.1e}")
+        print(
+            f"{row['unknowns']:>8} {row['points']:>6}  {row['method']:<9} {row['ratio_median']:>6.2f} "
+            f"{row['ratio_mean']:>6.2f} {1e6 * row['seconds_per_step']:>8.0f} "
+            f"{1e6 * row['bare_seconds_per_step']:>8.0f} {row['certificate']:>11.1e}"
+        )
     first, ratios = start_up(options.rounds)
-    print(f"start-up: {first:.2f} s to the first step, {np.median(ratios):.2f} times scipy and dolfinx")
-    rows.append({"method": "start-up", "seconds": first, "ratio_median": float(np.median(ratios)),
-                 "ratio_mean": float(np.mean(ratios))})
+    print(
+        f"start-up: {first:.2f} s to the first step, {np.median(ratios):.2f} times scipy and dolfinx"
+    )
+    rows.append(
+        {
+            "method": "start-up",
+            "seconds": first,
+            "ratio_median": float(np.median(ratios)),
+            "ratio_mean": float(np.mean(ratios)),
+        }
+    )
     if options.json:
         options.json.write_text(json.dumps(rows, indent=2) + "\n", encoding="utf-8")
 

@@ -57,7 +57,10 @@ def shaken_box(sides: str, distance: float) -> np.ndarray:
     mesh, tags = fem.build_mesh(block, MPI.COMM_WORLD)
     middle = mesh.geometry.x[geometry_dofmap(mesh)].mean(axis=1)
     inside = (np.abs(middle[:, 0]) < 0.5 * BOX[0]) & (middle[:, 1] > -BOX[1])
-    box, soil = (fem.Cells(n, np.flatnonzero(m).astype(np.int32), mesh) for n, m in (("box", inside), ("s", ~inside)))
+    box, soil = (
+        fem.Cells(n, np.flatnonzero(m).astype(np.int32), mesh)
+        for n, m in (("box", inside), ("s", ~inside))
+    )
     ends = [tags["left"], tags["right"]]
     boundary: dict[str, Any] = {
         "rollers": {"prescribed": [fem.Prescribed(one, components=(1,)) for one in ends]},
@@ -67,7 +70,9 @@ def shaken_box(sides: str, distance: float) -> np.ndarray:
         "free": {},
     }[sides]
     damping = vc.Rayleigh.from_frequencies(2.0, 8.0, xi1=0.03, xi2=0.03)
-    system = fem.assemble(mesh, [(box, CONCRETE), (soil, SOIL)], clamped=tags["bottom"], damping=damping, **boundary)
+    system = fem.assemble(
+        mesh, [(box, CONCRETE), (soil, SOIL)], clamped=tags["bottom"], damping=damping, **boundary
+    )
     node = system.space.find_nodes(np.array([[0.0, 0.0]]))
     march = vc.march(linear(system, excitation=SHAKE), dt=DT, steps=STEPS)
     return np.array([system.space.sample(state.u, node, state.t)[0] for state, _ in march])
@@ -76,14 +81,22 @@ def shaken_box(sides: str, distance: float) -> np.ndarray:
 def shaken_box_in_space(distance: float) -> np.ndarray:
     """History of the displacement (steps, 3) of a box, 8 m x 8 m x 4 m in 8 m of soil, tied sides at ``distance``."""
     width, h = 8.0 + 2.0 * distance, 2.0
-    block = BlockMesh(lengths=(width, 8.0, width), divisions=(round(width / h), 4, round(width / h)),
-                      corner=(-0.5 * width, -8.0, -0.5 * width))
+    block = BlockMesh(
+        lengths=(width, 8.0, width),
+        divisions=(round(width / h), 4, round(width / h)),
+        corner=(-0.5 * width, -8.0, -0.5 * width),
+    )
     mesh, tags = fem.build_mesh(block, MPI.COMM_WORLD)
     middle = np.abs(mesh.geometry.x[geometry_dofmap(mesh)].mean(axis=1))
     inside = middle.max(axis=1) < 4.0
-    box, soil = (fem.Cells(n, np.flatnonzero(m).astype(np.int32), mesh) for n, m in (("box", inside), ("s", ~inside)))
+    box, soil = (
+        fem.Cells(n, np.flatnonzero(m).astype(np.int32), mesh)
+        for n, m in (("box", inside), ("s", ~inside))
+    )
     system = fem.assemble(
-        mesh, [(box, CONCRETE), (soil, SOIL)], clamped=tags["bottom"],
+        mesh,
+        [(box, CONCRETE), (soil, SOIL)],
+        clamped=tags["bottom"],
         tied=[fem.Tied(tags[a], tags[b]) for a, b in PAIRS],
         damping=vc.Rayleigh.from_frequencies(2.0, 8.0, xi1=0.03, xi2=0.03),
     )
@@ -93,13 +106,18 @@ def shaken_box_in_space(distance: float) -> np.ndarray:
 
 def level_box(width: float, sides: str) -> np.ndarray:
     """History of the velocity (steps, 3) in the middle of the surface of 8 m of level soil on a compliant base."""
-    block = BlockMesh(lengths=(width, 8.0, width), divisions=(round(width / 2.0), 8, round(width / 2.0)),
-                      corner=(-0.5 * width, -8.0, -0.5 * width))
+    block = BlockMesh(
+        lengths=(width, 8.0, width),
+        divisions=(round(width / 2.0), 8, round(width / 2.0)),
+        corner=(-0.5 * width, -8.0, -0.5 * width),
+    )
     mesh, tags = fem.build_mesh(block, MPI.COMM_WORLD)
     waves = [vc.Ricker(1.0, 4.0, direction=tuple(e)) for e in np.eye(3)]
     base = fem.CompliantBase(tags["bottom"], motion=upgoing(waves, dt=1e-3))
     tied = [fem.Tied(tags[a], tags[b]) for a, b in PAIRS] if sides == "tied" else ()
-    around = [fem.Dashpots(tags[one]) for pair in PAIRS for one in pair] if sides == "dashpots" else []
+    around = (
+        [fem.Dashpots(tags[one]) for pair in PAIRS for one in pair] if sides == "dashpots" else []
+    )
     system = fem.assemble(mesh, SOIL, tied=tied, dashpots=[base, *around])
     return surface_history(system, vc.march(linear(system), dt=DT, steps=100), 1)
 
@@ -107,29 +125,46 @@ def level_box(width: float, sides: str) -> np.ndarray:
 def surface_history(system: Any, march: Any, derivative: int) -> np.ndarray:
     """u or v (steps, 3) in the middle of the surface."""
     node = system.space.find_nodes(np.zeros((1, 3)))
-    return np.array([system.space.sample((state.u, state.v)[derivative], node, state.t)[0] for state, _ in march])
+    return np.array(
+        [
+            system.space.sample((state.u, state.v)[derivative], node, state.t)[0]
+            for state, _ in march
+        ]
+    )
 
 
 def box_tables() -> None:
     reference = shaken_box_in_space(48.0)[:, 0]
     for depths in (0.5, 1.0, 2.0, 3.0):
-        error = np.abs(shaken_box_in_space(8.0 * depths)[:, 0] - reference).max() / np.abs(reference).max()
+        error = (
+            np.abs(shaken_box_in_space(8.0 * depths)[:, 0] - reference).max()
+            / np.abs(reference).max()
+        )
         print(f"tied sides {depths:g} depths away: {100 * error:.2g} %", flush=True)
     for width in (8.0, 16.0, 32.0):
         exact = level_box(width, "tied")
         for sides in ("dashpots", "free"):
             error = np.abs(level_box(width, sides) - exact).max(axis=0) / np.abs(exact).max(axis=0)
-            print(f"level ground {width / 8.0:g} depths wide, {sides}: {np.round(100 * error)} %", flush=True)
+            print(
+                f"level ground {width / 8.0:g} depths wide, {sides}: {np.round(100 * error)} %",
+                flush=True,
+            )
 
 
 def dashpot_table(angles: Sequence[float], cells: int) -> None:
-    print("| angle | P table | P packet | P measured | S table | S packet | S measured |\n" + "|---" * 7 + "|")
+    print(
+        "| angle | P table | P packet | P measured | S table | S packet | S measured |\n"
+        + "|---" * 7
+        + "|"
+    )
     for angle in angles:
         row = [f"{angle:g}°"]
         for wave in "PS":
             material, slope = vc.LinearElastic(E=1.0, nu=NU, rho=1.0), math.radians(angle)
             exact = dashpot_energy(material, slope, wave=wave)
-            measured, packet = energy_sent_back(MPI.COMM_WORLD, material, wave, slope, length=LENGTH, cells=cells)
+            measured, packet = energy_sent_back(
+                MPI.COMM_WORLD, material, wave, slope, length=LENGTH, cells=cells
+            )
             row += [f"{exact:.5f}", f"{packet:.5f}", f"{measured:.5f}"]
         print("| " + " | ".join(row) + " |", flush=True)
 
@@ -138,9 +173,16 @@ def side_table(depths: Sequence[float]) -> None:
     reference = shaken_box("free field", 12.0 * DEPTH)
     largest = np.abs(reference[:, 0]).max()
     print(f"largest displacement {largest:.4g} m", flush=True)
-    print("| sides | " + " | ".join(f"{d:g} depths" for d in depths) + " |\n|" + "---|" * (len(depths) + 1))
+    print(
+        "| sides | "
+        + " | ".join(f"{d:g} depths" for d in depths)
+        + " |\n|"
+        + "---|" * (len(depths) + 1)
+    )
     for sides in ("rollers", "tied", "free field", "dashpots", "free"):
-        errors = [np.abs(shaken_box(sides, d * DEPTH) - reference)[:, 0].max() / largest for d in depths]
+        errors = [
+            np.abs(shaken_box(sides, d * DEPTH) - reference)[:, 0].max() / largest for d in depths
+        ]
         print(f"| {sides} | " + " | ".join(f"{100 * e:.2g} %" for e in errors) + " |", flush=True)
 
 

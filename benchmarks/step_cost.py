@@ -51,9 +51,21 @@ from vi_contact.meshes.block import BlockMesh  # noqa: E402
 from vi_contact.meshes.channel import ChannelMesh  # noqa: E402
 
 SCHEME = vc.ZienkiewiczWoodTaylor(phi=0.5)
-SIZES = {"wall": (216, 2e3, 2e4, 2e5), "channel": (216, 2e3, 2e4, 2e5), "block": (2e4, 6e4), "square": (2e4, 2e5)}
-SERVES = {"wall": (0.0, np.inf), "channel": (0.0, np.inf), "block": (5e3, 1e5), "square": (5e3, np.inf)}
-PETSC_IN_SPACE = 3e4  # unknowns beyond which PETSc's own factorisation in three dimensions takes minutes
+SIZES = {
+    "wall": (216, 2e3, 2e4, 2e5),
+    "channel": (216, 2e3, 2e4, 2e5),
+    "block": (2e4, 6e4),
+    "square": (2e4, 2e5),
+}
+SERVES = {
+    "wall": (0.0, np.inf),
+    "channel": (0.0, np.inf),
+    "block": (5e3, 1e5),
+    "square": (5e3, np.inf),
+}
+PETSC_IN_SPACE = (
+    3e4  # unknowns beyond which PETSc's own factorisation in three dimensions takes minutes
+)
 SHORT_STEPS = 5e3  # unknowns below which ten times as many steps are timed
 RUBBING = vc.Coulomb(0.4)
 Problem = tuple[vc.ContactProblem, float, Any]  # with its dt and the state it starts from
@@ -82,7 +94,9 @@ def wall(size: float, friction: Any) -> Problem:
 
 def buried(size: float, friction: Any) -> Problem:
     """The buried channel at rest under its weight; at 2e5 unknowns 232 contact points."""
-    model = channel.build(channel.Channel(ChannelMesh(size=0.14 * math.sqrt(2e4 / size))), MPI.COMM_SELF)
+    model = channel.build(
+        channel.Channel(ChannelMesh(size=0.14 * math.sqrt(2e4 / size))), MPI.COMM_SELF
+    )
     problem = model.problem(friction=friction)
     return problem, model.channel.time_step(), vc.static_equilibrium(problem, solver=vc.Condensed())
 
@@ -90,12 +104,17 @@ def buried(size: float, friction: Any) -> Problem:
 def block(size: float, friction: Any) -> Problem:
     """A cube, clamped at its top, shaken over the ground that it just touches."""
     n, f = math.floor((size / 3.0) ** (1.0 / 3.0) - 2.0 / 3.0), 400.0
-    mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 1.0, 1.0), divisions=(n, n, n)), MPI.COMM_SELF)
+    mesh, tags = fem.build_mesh(
+        BlockMesh(lengths=(1.0, 1.0, 1.0), divisions=(n, n, n)), MPI.COMM_SELF
+    )
     system = fem.assemble(mesh, vc.LinearElastic(E=3e10, nu=0.2, rho=2400.0), clamped=tags["top"])
     ground = vc.HalfSpace(point=(0.0, 0.0, 0.0), normal=(0.0, 1.0, 0.0))
     problem = vc.ContactProblem(
-        system, fem.contact_surface(system, tags["bottom"], obstacle=ground), mass=vc.ConsistentMass(),
-        impact=vc.Inelastic(), excitation=vc.Harmonic(1.0, f, direction=(0.3, 1.0, 0.0)),
+        system,
+        fem.contact_surface(system, tags["bottom"], obstacle=ground),
+        mass=vc.ConsistentMass(),
+        impact=vc.Inelastic(),
+        excitation=vc.Harmonic(1.0, f, direction=(0.3, 1.0, 0.0)),
     )
     return rubbing(problem, friction), 1.0 / (40.0 * f), None
 
@@ -105,7 +124,11 @@ def rubbing(problem: vc.ContactProblem, friction: Any) -> vc.ContactProblem:
     return problem if friction is None else replace(problem, friction=friction)
 
 
-PROBLEMS: dict[str, Callable[[float, Any], Problem]] = {"wall": wall, "channel": buried, "block": block}
+PROBLEMS: dict[str, Callable[[float, Any], Problem]] = {
+    "wall": wall,
+    "channel": buried,
+    "block": block,
+}
 
 
 class Cholmod:
@@ -115,7 +138,9 @@ class Cholmod:
         ends, columns, values = matrix.mat.getValuesCSR()
         A = sp.csr_matrix((values, columns, ends), shape=(len(ends) - 1,) * 2)
         mine, contact_last.SHORT_COLUMNS = contact_last.SHORT_COLUMNS, 0.0
-        self.factor = contact_last.ContactLast(cholmod(SerialComm()), A, np.zeros(0, dtype=np.int64))
+        self.factor = contact_last.ContactLast(
+            cholmod(SerialComm()), A, np.zeros(0, dtype=np.int64)
+        )
         contact_last.SHORT_COLUMNS = mine
 
     def solve(self, b: np.ndarray) -> np.ndarray:
@@ -127,8 +152,13 @@ class Cholmod:
 
 def petsc(kind: str, order: str) -> Callable[[Any], Any]:
     """What factorises by PETSc's own Cholesky, in this order, or by MUMPS in its own."""
+
     def factorise(matrix: Any) -> Any:
-        options = {"pc_type": "cholesky", "pc_factor_mat_solver_type": kind, "pc_factor_mat_ordering_type": order}
+        options = {
+            "pc_type": "cholesky",
+            "pc_factor_mat_solver_type": kind,
+            "pc_factor_mat_ordering_type": order,
+        }
         database = PETSc.Options(PREFIX)
         for name, value in options.items():
             database[name] = value
@@ -137,6 +167,7 @@ def petsc(kind: str, order: str) -> Callable[[Any], Any]:
         finally:
             for name in options:
                 database.delValue(name)
+
     return factorise
 
 
@@ -144,8 +175,14 @@ class Factors:
     """One matrix, factorised in several ways. ``setup``: seconds of each; small ones are made again, as caches warm."""
 
     def __init__(self, matrix: Any, dimension: int) -> None:
-        order = "nd" if dimension == 3 else "amd"  # in space nested dissection is three times as fast
-        makers = {"PETSc": petsc("petsc", order), "MUMPS": petsc("mumps", "amd"), "CHOLMOD": Cholmod}
+        order = (
+            "nd" if dimension == 3 else "amd"
+        )  # in space nested dissection is three times as fast
+        makers = {
+            "PETSc": petsc("petsc", order),
+            "MUMPS": petsc("mumps", "amd"),
+            "CHOLMOD": Cholmod,
+        }
         if dimension == 3 and matrix.rows > PETSC_IN_SPACE:
             del makers["PETSc"]
         self.setup: dict[str, float] = {}
@@ -208,8 +245,15 @@ class StepsWithContact:
     steps. ``seconds`` of each; ``plain``: of the linear steps by the fastest factor; ``active``: points in contact;
     ``worst``: certificate of all steps."""
 
-    def __init__(self, problem: vc.ContactProblem, solver: Any, dt: float, count: int, linear: Linear,
-                 state: vc.State | None = None) -> None:
+    def __init__(
+        self,
+        problem: vc.ContactProblem,
+        solver: Any,
+        dt: float,
+        count: int,
+        linear: Linear,
+        state: vc.State | None = None,
+    ) -> None:
         self.loop = vc.march(problem, scheme=SCHEME, solver=solver, dt=dt, steps=10**6, state=state)
         self.count, self.linear, self.worst = count, linear, 0.0
         self.seconds: list[float] = []
@@ -255,12 +299,21 @@ def measure(name: str, given: Problem, factors: Factors, count: int) -> dict[str
     setup, own = set_up(problem, dt, scale), factors.setup.get("PETSc")
     median, mean, plain = np.median(steps.seconds), np.mean(steps.seconds), steps.plain
     return {
-        "unknowns": linear.A.matrix.rows, "points": surface.total, "dimension": surface.points.shape[1],
-        "problem": name, "method": "condensed", "friction": repr(problem.friction) if problem.frictional else None,
-        "ratio_median": float(median / np.median(plain)), "ratio_mean": float(mean / np.mean(plain)),
-        "setup_seconds": setup, "setup_over_factorisation": None if own is None else setup / own,
-        "setup_over_cholmod": setup / factors.setup["CHOLMOD"], "seconds_per_step": float(median),
-        "seconds_per_linear_step": float(np.median(plain)), "linear": linear.fastest(), "certificate": steps.worst,
+        "unknowns": linear.A.matrix.rows,
+        "points": surface.total,
+        "dimension": surface.points.shape[1],
+        "problem": name,
+        "method": "condensed",
+        "friction": repr(problem.friction) if problem.frictional else None,
+        "ratio_median": float(median / np.median(plain)),
+        "ratio_mean": float(mean / np.mean(plain)),
+        "setup_seconds": setup,
+        "setup_over_factorisation": None if own is None else setup / own,
+        "setup_over_cholmod": setup / factors.setup["CHOLMOD"],
+        "seconds_per_step": float(median),
+        "seconds_per_linear_step": float(np.median(plain)),
+        "linear": linear.fastest(),
+        "certificate": steps.worst,
         "closed": float(np.mean(steps.active)),
     }
 
@@ -287,24 +340,45 @@ class Before:
 def square(size: float) -> dict[str, Any]:
     """The static problem of Signorini, both ways in turn."""
     n = math.ceil(math.sqrt(0.5 * size) - 0.5)
-    mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 1.0), divisions=(n, n), simplices=True), MPI.COMM_SELF)
-    system = fem.assemble(mesh, vc.LinearElastic(E=1.0, nu=0.3, rho=1.0), clamped=tags["top"],
-                          loads=fem.BodyForce((0.0, -0.05)))
+    mesh, tags = fem.build_mesh(
+        BlockMesh(lengths=(1.0, 1.0), divisions=(n, n), simplices=True), MPI.COMM_SELF
+    )
+    system = fem.assemble(
+        mesh,
+        vc.LinearElastic(E=1.0, nu=0.3, rho=1.0),
+        clamped=tags["top"],
+        loads=fem.BodyForce((0.0, -0.05)),
+    )
     ground = vc.AnalyticGap(lambda x: 0.05 * (x[:, 0] - 0.5) ** 2)
-    problem = vc.ContactProblem(system, fem.contact_surface(system, tags["bottom"], obstacle=ground))
+    problem = vc.ContactProblem(
+        system, fem.contact_surface(system, tags["bottom"], obstacle=ground)
+    )
     seconds: dict[str, list[float]] = {"before": [], "now": []}
     for _ in range(3 if size < 1e5 else 1):
         states = {}
         for name, solver in (("before", Before()), ("now", vc.Condensed())):
-            spent, states[name] = timed(lambda solver=solver: vc.static_equilibrium(problem, solver=solver))
+            spent, states[name] = timed(
+                lambda solver=solver: vc.static_equilibrium(problem, solver=solver)
+            )
             seconds[name].append(spent)
     one, other = states["now"], states["before"]
     before, now = (float(np.median(seconds[name])) for name in ("before", "now"))
     return {
-        "unknowns": system.rows, "points": problem.surface.total, "dimension": 2, "problem": "unit square, static",
-        "method": "condensed", "friction": None, "ratio_median": None, "ratio_mean": None, "setup_seconds": None,
-        "setup_over_factorisation": None, "seconds_per_step": now, "certificate": certificate(problem, one),
-        "seconds_before": before, "over_before": now / before, "closed": float(one.active.sum()),
+        "unknowns": system.rows,
+        "points": problem.surface.total,
+        "dimension": 2,
+        "problem": "unit square, static",
+        "method": "condensed",
+        "friction": None,
+        "ratio_median": None,
+        "ratio_mean": None,
+        "setup_seconds": None,
+        "setup_over_factorisation": None,
+        "seconds_per_step": now,
+        "certificate": certificate(problem, one),
+        "seconds_before": before,
+        "over_before": now / before,
+        "closed": float(one.active.sum()),
         "difference": float(np.abs(one.u - other.u).max() / np.abs(other.u).max()),
     }
 
@@ -313,16 +387,26 @@ def certificate(problem: vc.ContactProblem, state: vc.State) -> float:
     """Residual of equilibrium of a static state, over its largest force."""
     system = problem.static_load
     forces = system.K @ state.u
-    residual = forces - system.load.at_rest(0.0) + problem.surface.reaction_load(state.r_n, len(state.u))
+    residual = (
+        forces - system.load.at_rest(0.0) + problem.surface.reaction_load(state.r_n, len(state.u))
+    )
     return float(np.abs(residual).max() / np.abs(state.r_n).max())
 
 
 COLUMNS = (  # title, width, format, key
-    ("unknowns", 8, "d", "unknowns"), ("points", 6, "d", "points"), ("closed", 6, ".0f", "closed"),
-    ("problem", 20, "s", "problem"), ("friction", 12, "s", "friction"), ("ms", 9, ".3f", "ms"),
-    ("linear", 8, "s", "linear"), ("median", 6, ".2f", "ratio_median"), ("mean", 6, ".2f", "ratio_mean"),
-    ("set-up s", 8, ".3f", "setup_seconds"), ("/PETSc", 6, ".2f", "setup_over_factorisation"),
-    ("/CHOLMOD", 8, ".2f", "setup_over_cholmod"), ("before", 6, ".2f", "over_before"),
+    ("unknowns", 8, "d", "unknowns"),
+    ("points", 6, "d", "points"),
+    ("closed", 6, ".0f", "closed"),
+    ("problem", 20, "s", "problem"),
+    ("friction", 12, "s", "friction"),
+    ("ms", 9, ".3f", "ms"),
+    ("linear", 8, "s", "linear"),
+    ("median", 6, ".2f", "ratio_median"),
+    ("mean", 6, ".2f", "ratio_mean"),
+    ("set-up s", 8, ".3f", "setup_seconds"),
+    ("/PETSc", 6, ".2f", "setup_over_factorisation"),
+    ("/CHOLMOD", 8, ".2f", "setup_over_cholmod"),
+    ("before", 6, ".2f", "over_before"),
     ("certificate", 11, ".0e", "certificate"),
 )
 
@@ -331,15 +415,22 @@ def line(row: dict[str, Any]) -> str:
     """One row of the table."""
     shown = row | {"ms": 1e3 * row["seconds_per_step"]}
     cells = ((shown.get(key), width, form) for _, width, form, key in COLUMNS)
-    return " ".join(f"{'-':>{width}}" if value is None else f"{value:>{width}{form}}" for value, width, form in cells)
+    return " ".join(
+        f"{'-':>{width}}" if value is None else f"{value:>{width}{form}}"
+        for value, width, form in cells
+    )
 
 
 def main() -> None:
     """Prints the table and writes it with --json."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
-    parser.add_argument("--sizes", type=float, nargs="+", help="numbers of unknowns (default: as in the guide)")
+    parser.add_argument(
+        "--sizes", type=float, nargs="+", help="numbers of unknowns (default: as in the guide)"
+    )
     parser.add_argument("--problems", nargs="+", default=list(SIZES), choices=list(SIZES))
-    parser.add_argument("--steps", type=int, default=40, help="number of steps with contact that are timed")
+    parser.add_argument(
+        "--steps", type=int, default=40, help="number of steps with contact that are timed"
+    )
     parser.add_argument("--json", type=Path, help="file for all numbers")
     options = parser.parse_args()
     print(" ".join(f"{title:>{width}}" for title, width, _, _ in COLUMNS), flush=True)
@@ -357,7 +448,9 @@ def main() -> None:
             if not (least <= size <= most if options.sizes else size in SIZES[name]):
                 continue
             many = 10 if size < SHORT_STEPS else 1
-            for row in [square(size)] if name == "square" else measured(name, size, many * options.steps):
+            for row in (
+                [square(size)] if name == "square" else measured(name, size, many * options.steps)
+            ):
                 add(row)
 
 

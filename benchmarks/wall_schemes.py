@@ -29,15 +29,27 @@ SCHEMES = {  # the first column of the table -> what is added to vi-contact run 
     "`Newmark`": ["--scheme", "Newmark"],
     "`HHT`": ["--scheme", "HHT"],
     "`GeneralisedAlpha.spectral_radius` of 0.8": [
-        "--scheme", "GeneralisedAlpha.spectral_radius", "--set", "scheme.rho_inf=0.8"],
+        "--scheme",
+        "GeneralisedAlpha.spectral_radius",
+        "--set",
+        "scheme.rho_inf=0.8",
+    ],
     "`Houbolt`": ["--scheme", "Houbolt"],
     "`ContactStabilisedNewmark`": ["--scheme", "ContactStabilisedNewmark"],
     "`ContactStabilisedNewmark` with `projected = false` (Kane)": [
-        "--scheme", "ContactStabilisedNewmark", "--set", "scheme.projected=false"],
+        "--scheme",
+        "ContactStabilisedNewmark",
+        "--set",
+        "scheme.projected=false",
+    ],
     "`MoreauJean`": ["--scheme", "MoreauJean"],
     "`Midpoint`": ["--scheme", "Midpoint"],
     "`Newmark` on `ConsistentMass`, with the impact rule": [
-        "--set", 'scheme={type="Newmark"}', "--set", "mass.type=ConsistentMass"],
+        "--set",
+        'scheme={type="Newmark"}',
+        "--set",
+        "mass.type=ConsistentMass",
+    ],
 }
 FINER = 16
 LOSSES = ("loss_contact", "loss_impact", "loss_algorithmic")
@@ -49,7 +61,9 @@ def run(words: list[str], finer: int = 1) -> tuple[str, str]:
     with tempfile.TemporaryDirectory() as folder:
         said = io.StringIO()
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            status = command(["run", "wall", *words, *steps, "--set", "fields=", "--quiet", "--out", folder])
+            status = command(
+                ["run", "wall", *words, *steps, "--set", "fields=", "--quiet", "--out", folder]
+            )
         if status:
             raise SystemExit(said.getvalue())
         with open(Path(folder) / "history.csv", encoding="utf-8", newline="") as file:
@@ -67,7 +81,9 @@ def row(name: str, coarse: tuple[str, str], fine: tuple[str, str]) -> str:
 def main() -> None:
     """Print the table."""
     options = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    options.add_argument("--only", nargs="+", metavar="NAME", help="rows that begin with these names")
+    options.add_argument(
+        "--only", nargs="+", metavar="NAME", help="rows that begin with these names"
+    )
     given = options.parse_args()
     print(f"| scheme | dt | dt/{FINER} | energy taken, dt | dt/{FINER} |\n|---|---|---|---|---|")
     for name, words in SCHEMES.items():

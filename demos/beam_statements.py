@@ -17,7 +17,9 @@ import json
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
+sys.path.insert(
+    0, str(Path(__file__).resolve().parents[1])
+)  # run from the source tree without installing
 
 from demos.pictures.beam_statements import plot_statements
 from demos.problems.beam_statements import HEAD, NEGLIGIBLE, VISCOSITIES, Row, row
@@ -35,10 +37,18 @@ def main(quick: bool = False, as_json: bool = False, out: Path = OUT) -> list[Ro
     if as_json:
         print(json.dumps([one.told() for one in rows], indent=1))
         return rows
-    both = [f"{one.reading} at a2 = {one.a2:g} s" for one in rows if one.statement_1 and one.statement_2]
+    both = [
+        f"{one.reading} at a2 = {one.a2:g} s" for one in rows if one.statement_1 and one.statement_2
+    ]
     print(HEAD, *[one.line() for one in rows], sep="\n")
-    print(f"\nStatement 2 holds where friction takes less than {NEGLIGIBLE:g} of what viscosity takes.")
-    print(f"Both statements hold for {', '.join(both)}." if both else "No reading satisfies both statements.")
+    print(
+        f"\nStatement 2 holds where friction takes less than {NEGLIGIBLE:g} of what viscosity takes."
+    )
+    print(
+        f"Both statements hold for {', '.join(both)}."
+        if both
+        else "No reading satisfies both statements."
+    )
     out.mkdir(parents=True, exist_ok=True)
     plot_statements(rows, out / "beam_statements.png")
     print(f"\nThe figure is in {out}.")

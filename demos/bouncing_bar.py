@@ -17,7 +17,9 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
+sys.path.insert(
+    0, str(Path(__file__).resolve().parents[1])
+)  # run from the source tree without installing
 
 from mpi4py import MPI
 
@@ -55,9 +57,13 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
     histories, numbers = {}, {}
     for name, (scheme, mass) in SCHEMES.items():
         solution = vc.simulate(
-            model.problem(mass=mass), scheme=scheme, dt=dt, steps=steps,
+            model.problem(mass=mass),
+            scheme=scheme,
+            dt=dt,
+            steps=steps,
             record=(vc.Energy(), vc.Contact(), vc.Probe(model.probes())),
-            out=out / name.split(":")[0].replace(",", "").replace(" ", "_"), progress=progress,
+            out=out / name.split(":")[0].replace(",", "").replace(" ", "_"),
+            progress=progress,
         )
         history = solution.history
         histories[name] = history
@@ -79,7 +85,10 @@ def table(numbers: dict[str, float]) -> str:
     """Return the energies and forces over their exact values."""
     lines = [f"{'scheme':<44} {'energy at the end':>18} {'largest':>9} {'largest force':>14}"]
     for name in SCHEMES:
-        row = [numbers[f"{name}: {what}"] for what in ("energy at the end", "largest energy", "largest force")]
+        row = [
+            numbers[f"{name}: {what}"]
+            for what in ("energy at the end", "largest energy", "largest force")
+        ]
         lines.append(f"{name:<44} {row[0]:>18.4f} {row[1]:>9.4f} {row[2]:>14.2f}")
     return "\n".join(lines)
 

@@ -19,7 +19,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
+sys.path.insert(
+    0, str(Path(__file__).resolve().parents[1])
+)  # run from the source tree without installing
 
 import numpy as np
 from matplotlib.path import Path as Outline
@@ -28,7 +30,12 @@ from mpi4py import MPI
 import vi_contact as vc
 from demos.pictures.boundary import SHEAR, Curve, Panel, Shot, plot_boundary_snapshots, plot_panels
 from demos.problems import disk, embedded, square
-from demos.problems.boundary_elements import disk_contact, disk_problem, embedded_problem, square_problem
+from demos.problems.boundary_elements import (
+    disk_contact,
+    disk_problem,
+    embedded_problem,
+    square_problem,
+)
 from demos.problems.compare_tractions import Tractions, compared
 from demos.problems.interior import interior_displacement
 from vi_contact import bem
@@ -37,18 +44,34 @@ from vi_contact.cli import status_of
 # Parameters ----------------------------------------------------------------------------------------------------------
 ELEMENTS = {"square": 20, "steel": 10, "concrete": 10, "ball": 80}  # along a side, around the ball
 QUICK = {"square": 6, "steel": 5, "concrete": 4, "ball": 24}
-CELLS = {"square": 160, "steel": 20, "concrete": 10, "ball": 0.04}  # of the finite elements; size of those of the ball
+CELLS = {
+    "square": 160,
+    "steel": 20,
+    "concrete": 10,
+    "ball": 0.04,
+}  # of the finite elements; size of those of the ball
 QUICK_CELLS = {"square": 10, "steel": 5, "concrete": 4, "ball": 0.15}
 LAWS = {
-    "square": {"no friction": vc.Frictionless(), "Tresca 0.05": vc.Tresca(0.05), "Coulomb 0.5": vc.Coulomb(0.5)},
+    "square": {
+        "no friction": vc.Frictionless(),
+        "Tresca 0.05": vc.Tresca(0.05),
+        "Coulomb 0.5": vc.Coulomb(0.5),
+    },
     "steel": {"no friction": vc.Frictionless(), "Coulomb 0.3": vc.Coulomb(0.3)},
     "concrete": {"no friction": vc.Frictionless(), "Coulomb 0.75": vc.Coulomb(0.75)},
     "ball": {"no friction": vc.Frictionless(), "Coulomb 2": vc.Coulomb(2.0)},
 }
-TITLES = {"square": "square", "steel": "concrete on steel", "concrete": "concrete in concrete", "ball": "tennis ball"}
+TITLES = {
+    "square": "square",
+    "steel": "concrete on steel",
+    "concrete": "concrete in concrete",
+    "ball": "tennis ball",
+}
 T_END = {"square": 6.0, "steel": 0.02, "concrete": 0.02, "ball": 4.0}  # [s]
 SHOTS = {  # [s]
-    "square": (0.5, 1.5, 2.5, 4.0), "steel": (0.005, 0.01, 0.015, 0.02), "concrete": (0.005, 0.01, 0.015, 0.02),
+    "square": (0.5, 1.5, 2.5, 4.0),
+    "steel": (0.005, 0.01, 0.015, 0.02),
+    "concrete": (0.005, 0.01, 0.015, 0.02),
     "ball": (0.5, 1.0, 1.2, 4.0),
 }
 MAGNIFIED = {"square": 0.3, "steel": 500.0, "concrete": 500.0, "ball": 1.0}
@@ -90,7 +113,9 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
         for law, answer in answers[name].items():
             numbers |= {f"{name}, {law}: {what}": value for what, value in results(answer).items()}
             window = None if name == "square" else WINDOW
-            numbers |= {f"{name}, {law}: {what}": value for what, value in uzawa(answer.run, window).items()}
+            numbers |= {
+                f"{name}, {law}: {what}": value for what, value in uzawa(answer.run, window).items()
+            }
             if progress and comm.rank == 0:
                 print(f"{TITLES[name]}, {law}: done", flush=True)
     if comm.rank == 0:
@@ -110,7 +135,11 @@ def example(name: str, size: int, cells: float, comm: Any) -> dict[str, Answer]:
     for law, friction in LAWS[name].items():
         run = bem.march_contact(replace(contact, friction=friction))
         solution = vc.simulate(
-            problem(friction=friction), dt=fem_dt, t_end=T_END[name], record=(vc.Energy(), vc.Contact()), progress=False
+            problem(friction=friction),
+            dt=fem_dt,
+            t_end=T_END[name],
+            record=(vc.Energy(), vc.Contact()),
+            progress=False,
         )
         answers[law] = Answer(run, solve(run.forces), solution.history, problem().surface.whole())
     return answers
@@ -123,15 +152,25 @@ def boundary_elements(name: str, size: int) -> tuple[bem.BoundaryContact, Any, f
     pressure = partial(pressure_of, data)
     dt = {"square": 1.0, "steel": 4.0, "concrete": 4.0}.get(name, 1.0) / size / data.material.c_p
     if name == "concrete":
-        inside = embedded_problem(size, box.material, dt=dt, steps=round(T_END[name] / dt), pressure=pressure)
+        inside = embedded_problem(
+            size, box.material, dt=dt, steps=round(T_END[name] / dt), pressure=pressure
+        )
         two = inside.bodies
-        return inside.contact(), lambda forces: tuple(zip((two.one, two.two), two.solve(forces), strict=True)), dt
+        return (
+            inside.contact(),
+            lambda forces: tuple(zip((two.one, two.two), two.solve(forces), strict=True)),
+            dt,
+        )
     if name == "ball":
         ball = disk.Disk()
         dt = 2.0 * np.pi * ball.radius / size / ball.material.c_p
-        one = disk_problem(size, ball.material, dt=dt, steps=int(T_END[name] / dt), radius=ball.radius)
+        one = disk_problem(
+            size, ball.material, dt=dt, steps=int(T_END[name] / dt), radius=ball.radius
+        )
         return disk_contact(one, PUSH), lambda forces: ((one, one.solve(forces)),), dt
-    one = square_problem(size, data.material, dt=dt, steps=round(T_END[name] / dt), pressure=pressure)
+    one = square_problem(
+        size, data.material, dt=dt, steps=round(T_END[name] / dt), pressure=pressure
+    )
     return bem.BoundaryContact(one.condensed()), lambda forces: ((one, one.solve(forces)),), dt
 
 
@@ -146,8 +185,14 @@ def finite_elements(name: str, cells: float, comm: Any) -> tuple[Any, float]:
         model = disk.build(disk.Disk(size=cells, push=PUSH), comm)
         return model.problem, model.disk.time_step
     if name == "concrete":
-        return embedded.build(embedded.Embedded(square.concrete(cells=int(cells))), comm).problem, 1e-3 / cells
-    data = square.concrete(int(cells)) if name == "steel" else square.Square(cells=int(cells), pressure=1.0)
+        return embedded.build(
+            embedded.Embedded(square.concrete(cells=int(cells))), comm
+        ).problem, 1e-3 / cells
+    data = (
+        square.concrete(int(cells))
+        if name == "steel"
+        else square.Square(cells=int(cells), pressure=1.0)
+    )
     return square.build(data, comm).problem, (1e-3 / cells if name == "steel" else data.time_step)
 
 
@@ -158,13 +203,19 @@ def results(answer: Answer) -> dict[str, float]:
     fine = np.interp(run.times, history["t"], answer.fem_energy)
     force = history["contact_resultant"]
     impulse = np.cumsum(0.5 * np.diff(history["t"]) * (force[1:] + force[:-1]))
-    both = [np.interp(end, run.times, run.r_n.sum(axis=1).cumsum() * run.contact.compliance.dt),
-            np.interp(end, history["t"][1:], impulse)]
+    both = [
+        np.interp(end, run.times, run.r_n.sum(axis=1).cumsum() * run.contact.compliance.dt),
+        np.interp(end, history["t"][1:], impulse),
+    ]
     return {
-        "energy": float(answer.energy[-1]), "fem energy": float(fine[-1]),
+        "energy": float(answer.energy[-1]),
+        "fem energy": float(fine[-1]),
         "energy off": float(np.sqrt(np.mean((answer.energy - fine) ** 2)) / fine.max()),
-        "impulse": float(both[0]), "fem impulse": float(both[1]), "friction": float(run.friction_loss[-1]),
-        "fem friction": float(history["loss_friction"][-1]), "certificate": run.worst,
+        "impulse": float(both[0]),
+        "fem impulse": float(both[1]),
+        "friction": float(run.friction_loss[-1]),
+        "fem friction": float(history["loss_friction"][-1]),
+        "certificate": run.worst,
     }
 
 
@@ -178,19 +229,35 @@ def uzawa(run: bem.ContactRun, window: int | None) -> dict[str, float]:
 
 def draw(answers: dict[str, dict[str, Answer]], out: Path, chosen_shots: slice) -> None:
     """Draw snapshots with friction, tractions of both methods, energies with and without friction."""
-    rows = {TITLES[name]: shots(name, list(laws.values())[-1], SHOTS[name][chosen_shots])
-            for name, laws in answers.items()}
-    plot_boundary_snapshots(rows, out / "snapshots.png", title="Boundary elements, Coulomb friction: deformed bodies "
-                            "and what the support does to them")
-    chosen = (("square", "Tresca 0.05", (1.5, 2.5, 3.5)), ("square", "Coulomb 0.5", (1.5, 2.5, 3.5)),
-              ("steel", "Coulomb 0.3", (0.01, 0.015, 0.02)), ("ball", "Coulomb 2", (0.3, 0.6, 0.9)))
+    rows = {
+        TITLES[name]: shots(name, list(laws.values())[-1], SHOTS[name][chosen_shots])
+        for name, laws in answers.items()
+    }
+    plot_boundary_snapshots(
+        rows,
+        out / "snapshots.png",
+        title="Boundary elements, Coulomb friction: deformed bodies "
+        "and what the support does to them",
+    )
+    chosen = (
+        ("square", "Tresca 0.05", (1.5, 2.5, 3.5)),
+        ("square", "Coulomb 0.5", (1.5, 2.5, 3.5)),
+        ("steel", "Coulomb 0.3", (0.01, 0.015, 0.02)),
+        ("ball", "Coulomb 2", (0.3, 0.6, 0.9)),
+    )
     columns = [tractions(name, law, answers[name][law], times) for name, law, times in chosen]
-    plot_panels(list(zip(*columns, strict=True)), out / "tractions.png",
-                title="Contact tractions on the nodes of the boundary elements: boundary elements (lines), "
-                      "finite elements (dots)")
+    plot_panels(
+        list(zip(*columns, strict=True)),
+        out / "tractions.png",
+        title="Contact tractions on the nodes of the boundary elements: boundary elements (lines), "
+        "finite elements (dots)",
+    )
     pairs = (("square", "steel"), ("concrete", "ball"))
-    plot_panels([[energies(name, answers[name]) for name in pair] for pair in pairs], out / "energies.png",
-                title="Energy with and without friction: boundary elements (lines), finite elements (dots)")
+    plot_panels(
+        [[energies(name, answers[name]) for name in pair] for pair in pairs],
+        out / "energies.png",
+        title="Energy with and without friction: boundary elements (lines), finite elements (dots)",
+    )
 
 
 def shots(name: str, answer: Answer, times: Sequence[float]) -> list[Shot]:
@@ -198,19 +265,25 @@ def shots(name: str, answer: Answer, times: Sequence[float]) -> list[Shot]:
     run, contact, scale = answer.run, answer.run.contact, MAGNIFIED[name]
     steps = [int(np.argmin(np.abs(run.times - t))) for t in times]
     inside = [points_inside(problem.operator.mesh) for problem, _ in answer.bodies]
-    moved = [interior_displacement(problem.operator, motion, x, steps=steps)
-             for x, (problem, motion) in zip(inside, answer.bodies, strict=True)]
+    moved = [
+        interior_displacement(problem.operator, motion, x, steps=steps)
+        for x, (problem, motion) in zip(inside, answer.bodies, strict=True)
+    ]
     drawn = []
     for row, k in enumerate(steps):
-        outlines = tuple(problem.operator.mesh.points + scale * motion.displacement[k].T
-                         for problem, motion in answer.bodies)
+        outlines = tuple(
+            problem.operator.mesh.points + scale * motion.displacement[k].T
+            for problem, motion in answer.bodies
+        )
         one, motion = answer.bodies[0]
         nodes = contact.compliance.nodes
         arrows = run.forces[k].reshape(2, -1).T / contact.compliance.lengths[:, None]
         dots = np.concatenate([x + scale * u[row] for x, u in zip(inside, moved, strict=True)])
         feet = one.operator.mesh.points[nodes] + scale * motion.displacement[k][:, nodes].T
         support = {"square": -0.5, "steel": -0.5, "ball": PUSH(float(run.times[k]))}.get(name)
-        moment = f"t = {1e3 * run.times[k]:.3g} ms" if T_END[name] < 1.0 else f"t = {run.times[k]:.3g} s"
+        moment = (
+            f"t = {1e3 * run.times[k]:.3g} ms" if T_END[name] < 1.0 else f"t = {run.times[k]:.3g} s"
+        )
         magnified = "" if scale == 1.0 else f", u x {scale:g}"
         drawn.append(Shot(moment + magnified, outlines, dots, feet, arrows, support))
     return drawn
@@ -221,7 +294,9 @@ def points_inside(mesh: bem.BoundaryMesh, spacing: float = 0.2) -> np.ndarray:
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     x, y = (np.arange(a + 0.5 * spacing, b, spacing) for a, b in zip(low, high, strict=True))
     lattice = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    sides = np.concatenate([(1 - a) * mesh.points + a * mesh.points[mesh.after] for a in np.arange(0.0, 1.0, 0.125)])
+    sides = np.concatenate(
+        [(1 - a) * mesh.points + a * mesh.points[mesh.after] for a in np.arange(0.0, 1.0, 0.125)]
+    )
     near = np.hypot(*(lattice[:, None] - sides).transpose(2, 0, 1)).min(axis=1)
     return lattice[Outline(mesh.points).contains_points(lattice) & (near > 0.3 * spacing)]
 
@@ -247,18 +322,38 @@ def energies(name: str, laws: dict[str, Answer]) -> Panel:
     for (law, answer), colour in zip(laws.items(), COLOURS, strict=False):
         every = max(1, len(answer.fem["t"]) // 40)
         curves.append(Curve(law, factor * answer.run.times, answer.energy, colour))
-        curves.append(Curve("", factor * answer.fem["t"][::every], answer.fem_energy[::every], colour, marked=True))
+        curves.append(
+            Curve(
+                "",
+                factor * answer.fem["t"][::every],
+                answer.fem_energy[::every],
+                colour,
+                marked=True,
+            )
+        )
     return Panel(TITLES[name], "energy", "J/m", tuple(curves), f"time [{unit}]")
 
 
 def table(numbers: dict[str, float]) -> str:
     """Return a line per example and law."""
-    columns = ("energy", "fem energy", "energy off", "impulse", "fem impulse", "friction", "fem friction", "uzawa",
-               "uzawa off", "certificate")
+    columns = (
+        "energy",
+        "fem energy",
+        "energy off",
+        "impulse",
+        "fem impulse",
+        "friction",
+        "fem friction",
+        "uzawa",
+        "uzawa off",
+        "certificate",
+    )
     lines = [f"{'':<24}" + "".join(f"{name:>13}" for name in columns)]
     for name, laws in LAWS.items():
         for law in laws:
-            values = "".join(f"{numbers.get(f'{name}, {law}: {what}', np.nan):>13.5g}" for what in columns)
+            values = "".join(
+                f"{numbers.get(f'{name}, {law}: {what}', np.nan):>13.5g}" for what in columns
+            )
             lines.append(f"{name + ', ' + law:<24}{values}")
     return "\n".join(lines)
 

@@ -19,7 +19,9 @@ from argparse import ArgumentParser
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
+sys.path.insert(
+    0, str(Path(__file__).resolve().parents[1])
+)  # run from the source tree without installing
 
 import numpy as np
 from mpi4py import MPI
@@ -39,7 +41,9 @@ from vi_contact.plots.histories import History
 from vi_contact.run.static import static_equilibrium
 
 # Parameters ----------------------------------------------------------------------------------------------------------
-CHANNEL = Channel(ChannelMesh(width=24.0, depth=8.0, outer_width=4.0, height=3.0, wall=0.5, slab=0.5, size=0.5))  # [m]
+CHANNEL = Channel(
+    ChannelMesh(width=24.0, depth=8.0, outer_width=4.0, height=3.0, wall=0.5, slab=0.5, size=0.5)
+)  # [m]
 AMPLITUDE = 2.0  # of the bedrock's acceleration [m/s²], at 2 Hz
 MU = 0.5
 STEPS = 400
@@ -48,7 +52,11 @@ FRAMES_EVERY = 2  # steps
 TIMES = (1.35, 1.6, 1.875)  # of the snapshots [s]
 FILM = (1.0, 2.0)  # [s]
 OUT = Path("results/channel")
-RUNS = {"sliding freely": {}, f"Coulomb, mu = {MU:g}": {"friction": vc.Coulomb(MU)}, "bilateral": {"bilateral": True}}
+RUNS = {
+    "sliding freely": {},
+    f"Coulomb, mu = {MU:g}": {"friction": vc.Coulomb(MU)},
+    "bilateral": {"bilateral": True},
+}
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
@@ -58,18 +66,35 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
     dt, histories, numbers = CHANNEL.time_step(), {}, {}
     for name, options in RUNS.items():
         problem = model.problem(excitation=CHANNEL.harmonic(AMPLITUDE), **options)
-        weighing = static_equilibrium(problem, solver=vc.Condensed())  # the channel's weight, contact active
+        weighing = static_equilibrium(
+            problem, solver=vc.Condensed()
+        )  # the channel's weight, contact active
         scheme = vc.ZienkiewiczWoodTaylor(phi=0.5)
         solution = vc.simulate(
-            problem, scheme=scheme, dt=dt, steps=40 if quick else STEPS, state=weighing, record=model.recorders(),
-            fields=fem.XDMF(every=FRAMES_EVERY), out=folder(out, name), progress=progress,
+            problem,
+            scheme=scheme,
+            dt=dt,
+            steps=40 if quick else STEPS,
+            state=weighing,
+            record=model.recorders(),
+            fields=fem.XDMF(every=FRAMES_EVERY),
+            out=folder(out, name),
+            progress=progress,
         )
         routes = vc.CrossChecked(vc.Condensed(), [REFERENCE])  # two routes to every step
-        vc.simulate(problem, scheme=scheme, solver=routes, dt=dt, steps=4 if quick else CHECKED, state=weighing,
-                    progress=False)
+        vc.simulate(
+            problem,
+            scheme=scheme,
+            solver=routes,
+            dt=dt,
+            steps=4 if quick else CHECKED,
+            state=weighing,
+            progress=False,
+        )
         histories[name] = solution.history
         found = key_numbers(solution.history) | {
-            "certificate": solution.facts["worst_certificate"], "energy defect": solution.facts["energy_defect"],
+            "certificate": solution.facts["worst_certificate"],
+            "energy defect": solution.facts["energy_defect"],
             "cross-check": routes.worst,
         }
         numbers |= {f"{name}: {key}": value for key, value in found.items()}
@@ -79,7 +104,9 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
     contact = model.surface.whole()
     if comm.rank == 0:
         draw(contact, histories, out, quick)
-        print(f"\nFigures and the film are in {out}, histories and ParaView files in folders below it.")
+        print(
+            f"\nFigures and the film are in {out}, histories and ParaView files in folders below it."
+        )
     comm.Barrier()  # nobody leaves before the figures are there
     return numbers
 
@@ -91,13 +118,19 @@ def folder(out: Path, name: str) -> Path:
 
 def key_numbers(history: History) -> dict[str, float]:
     """Return openings of the walls' tops and feet, how often both walls' are open, rocking, largest pressure."""
-    left, right = pictures.opening(history, "19", (-1.0, 0.0)), pictures.opening(history, "13", (1.0, 0.0))
+    left, right = (
+        pictures.opening(history, "19", (-1.0, 0.0)),
+        pictures.opening(history, "13", (1.0, 0.0)),
+    )
     u_1, u_7 = history["u_y_1"], history["u_y_7"]
     tiny = 1e-9 * max(left.max(), right.max())
     return {
-        "opening left": float(history["opening_left"].max()), "opening right": float(history["opening_right"].max()),
+        "opening left": float(history["opening_left"].max()),
+        "opening right": float(history["opening_right"].max()),
         "both tops open": float(np.mean((left > tiny) & (right > tiny))) if tiny > 0.0 else 0.0,
-        "settlement": float(u_1[0]), "u_y of point 1, min": float(u_1.min()), "u_y of point 1, max": float(u_1.max()),
+        "settlement": float(u_1[0]),
+        "u_y of point 1, min": float(u_1.min()),
+        "u_y of point 1, max": float(u_1.max()),
         "correlation of 1 and 7": float(np.corrcoef(u_1, u_7)[0, 1]),
         "pressure": float(np.max(history["pressure"])),
     }
@@ -110,25 +143,61 @@ def draw(contact: vc.ContactSurface, runs: Mapping[str, History], out: Path, qui
     outline = pictures.Outline.of(contact.points, contact.normals)
     points = {str(number): CHANNEL.point(number) for number in range(1, 20)}
     plot_layout(
-        folder(out, sliding), points, out / "layout.png", title="The channel in its layer (compare Fig. 6)",
-        soil=f"soil\n{summary(CHANNEL.soil)}", concrete=f"concrete\n{summary(CHANNEL.concrete)}",
+        folder(out, sliding),
+        points,
+        out / "layout.png",
+        title="The channel in its layer (compare Fig. 6)",
+        soil=f"soil\n{summary(CHANNEL.soil)}",
+        concrete=f"concrete\n{summary(CHANNEL.concrete)}",
         ends="ends of the layer\n$u_y$ = 0, $u_x$ free",
     )
     plot_excitation(runs[sliding], out / "excitation.png", title="Acceleration of the bedrock")
-    pictures.plot_openings(runs[sliding], out / "openings.png", title="Openings of the interface (compare Fig. 7)")
-    pictures.plot_rocking(runs[sliding], out / "rocking.png", title="Bottom corners (compare Fig. 8)")
-    plot_beside(runs, bilateral, out / "beside.png", title="Unilateral and bilateral contact (compare Fig. 9)")
-    pictures.plot_interface(unilateral, outline, out / "interface.png", title="Interface between channel and soil")
-    pictures.plot_envelope(unilateral, outline, out / "envelope.png", title="Envelopes along the outline")
-    plot_states(runs[coulomb], out / "states.png", position=outline.places(), axis_label="arc length [m]",
-                title=f"Interface, {coulomb}")
+    pictures.plot_openings(
+        runs[sliding], out / "openings.png", title="Openings of the interface (compare Fig. 7)"
+    )
+    pictures.plot_rocking(
+        runs[sliding], out / "rocking.png", title="Bottom corners (compare Fig. 8)"
+    )
+    plot_beside(
+        runs,
+        bilateral,
+        out / "beside.png",
+        title="Unilateral and bilateral contact (compare Fig. 9)",
+    )
+    pictures.plot_interface(
+        unilateral, outline, out / "interface.png", title="Interface between channel and soil"
+    )
+    pictures.plot_envelope(
+        unilateral, outline, out / "envelope.png", title="Envelopes along the outline"
+    )
+    plot_states(
+        runs[coulomb],
+        out / "states.png",
+        position=outline.places(),
+        axis_label="arc length [m]",
+        title=f"Interface, {coulomb}",
+    )
     times, film = (TIMES, np.arange(*FILM, 0.025)) if not quick else ((0.4,), (0.2, 0.4))
-    plot_moments({name: folder(out, name) for name in unilateral}, times, out / "moments.png",
-                 title="Channel and soil", magnified=500.0)
-    tops = {"top of the left wall": pictures.opening(runs[sliding], "19", (-1.0, 0.0)),
-            "of the right wall": pictures.opening(runs[sliding], "13", (1.0, 0.0))}
-    animate(folder(out, sliding), out / "channel.gif", title=sliding, magnified=300.0, history=runs[sliding],
-            times=film, openings=tops)
+    plot_moments(
+        {name: folder(out, name) for name in unilateral},
+        times,
+        out / "moments.png",
+        title="Channel and soil",
+        magnified=500.0,
+    )
+    tops = {
+        "top of the left wall": pictures.opening(runs[sliding], "19", (-1.0, 0.0)),
+        "of the right wall": pictures.opening(runs[sliding], "13", (1.0, 0.0)),
+    }
+    animate(
+        folder(out, sliding),
+        out / "channel.gif",
+        title=sliding,
+        magnified=300.0,
+        history=runs[sliding],
+        times=film,
+        openings=tops,
+    )
     for name, history in () if quick else runs.items():
         plot_energy(history, folder(out, name) / "energy.png", title=f"Energy ledger, {name}")
 

@@ -16,7 +16,9 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
+sys.path.insert(
+    0, str(Path(__file__).resolve().parents[1])
+)  # run from the source tree without installing
 
 from mpi4py import MPI
 
@@ -51,7 +53,11 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
     numbers: dict[str, float] = {}
     for name, friction in FRICTION.items():
         solution = vc.simulate(
-            model.problem(friction=friction), dt=dt, t_end=T_END, out=out / name, progress=progress,
+            model.problem(friction=friction),
+            dt=dt,
+            t_end=T_END,
+            out=out / name,
+            progress=progress,
             record=(vc.Energy(), vc.Contact(), vc.Probe(model.probes())),
             fields=fem.XDMF(every=round(TIMES[0] / dt)),
         )
@@ -79,14 +85,25 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 def draw(histories: Mapping[str, History], out: Path, ground: float) -> None:
     """Draw snapshots and histories."""
     plot_snapshots(
-        {name: out / name for name in FRICTION}, TIMES[1:], out / "snapshots.png", support=lambda t: ground,
-        magnified=MAGNIFIED, title="Concrete in concrete, with the tractions on the box",
+        {name: out / name for name in FRICTION},
+        TIMES[1:],
+        out / "snapshots.png",
+        support=lambda t: ground,
+        magnified=MAGNIFIED,
+        title="Concrete in concrete, with the tractions on the box",
     )
     quantities = (
-        ("energy", "energy", "J"), ("loss_friction", "work of friction", "J"),
-        ("contact_force_y", "force on the floor", "N"), ("u_y_top", "$u_y$, top", "m"),
+        ("energy", "energy", "J"),
+        ("loss_friction", "work of friction", "J"),
+        ("contact_force_y", "force on the floor", "N"),
+        ("u_y_top", "$u_y$, top", "m"),
     )
-    plot_runs(histories, quantities, out / "energies.png", title="Concrete in concrete, with and without friction")
+    plot_runs(
+        histories,
+        quantities,
+        out / "energies.png",
+        title="Concrete in concrete, with and without friction",
+    )
 
 
 def table(numbers: Mapping[str, float]) -> str:
@@ -95,7 +112,9 @@ def table(numbers: Mapping[str, float]) -> str:
     columns = (*energies, "friction", "floor", "walls")
     lines = [f"{'energies [J], shares of load':<30}" + "".join(f"{name:>11}" for name in columns)]
     for name in FRICTION:
-        lines.append(f"{name:<30}" + "".join(f"{numbers[f'{name}: {column}']:>11.4f}" for column in columns))
+        lines.append(
+            f"{name:<30}" + "".join(f"{numbers[f'{name}: {column}']:>11.4f}" for column in columns)
+        )
     return "\n".join(lines)
 
 

@@ -16,7 +16,9 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
+sys.path.insert(
+    0, str(Path(__file__).resolve().parents[1])
+)  # run from the source tree without installing
 
 from mpi4py import MPI
 
@@ -48,7 +50,11 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
     energy_s, corner_s, force_s = static(BOX, T_END)
     for name, friction in FRICTION.items():
         solution = vc.simulate(
-            model.problem(friction=friction), dt=dt, t_end=T_END, out=folder(out, name), progress=progress,
+            model.problem(friction=friction),
+            dt=dt,
+            t_end=T_END,
+            out=folder(out, name),
+            progress=progress,
             record=(vc.Energy(), vc.Contact(), vc.Probe(model.probes())),
             fields=fem.XDMF(every=round(TIMES[0] / dt)),
         )
@@ -92,24 +98,46 @@ def draw(histories: Mapping[str, History], out: Path, times: Sequence[float]) ->
     runs = {name: folder(out, name) for name in FRICTION}
     support = -0.5 * BOX.side
     plot_snapshots(
-        runs, times, out / "snapshots.png", support=lambda t: support, magnified=MAGNIFIED,
+        runs,
+        times,
+        out / "snapshots.png",
+        support=lambda t: support,
+        magnified=MAGNIFIED,
         title="Concrete on steel, with the tractions it feels",
     )
-    plot_tractions(runs, TIMES, out / "tractions.png", title="Contact tractions on the base of the concrete box")
+    plot_tractions(
+        runs,
+        TIMES,
+        out / "tractions.png",
+        title="Contact tractions on the base of the concrete box",
+    )
     quantities = (
-        ("energy", "energy", "J"), ("contact_resultant", "contact force", "N"), ("u_x_corner", "$u_x$, corner", "m"),
+        ("energy", "energy", "J"),
+        ("contact_resultant", "contact force", "N"),
+        ("u_x_corner", "$u_x$, corner", "m"),
         ("u_y_top", "$u_y$, top", "m"),
     )
-    plot_runs(histories, quantities, out / "energies.png", title="Concrete on steel, with and without friction")
+    plot_runs(
+        histories,
+        quantities,
+        out / "energies.png",
+        title="Concrete on steel, with and without friction",
+    )
 
 
 def table(numbers: Mapping[str, float]) -> str:
     """Return a table of energies over time, and the end over the static solution without friction."""
     columns = [f"E({1e3 * t:g} ms)" for t in TIMES]
     ends = ("energy", "corner", "force")
-    lines = [f"{'energies [J], ends / static':<28}" + "".join(f"{name:>12}" for name in (*columns, *ends))]
+    lines = [
+        f"{'energies [J], ends / static':<28}"
+        + "".join(f"{name:>12}" for name in (*columns, *ends))
+    ]
     for name in FRICTION:
-        lines.append(f"{name:<28}" + "".join(f"{numbers[f'{name}: {column}']:>12.4f}" for column in (*columns, *ends)))
+        lines.append(
+            f"{name:<28}"
+            + "".join(f"{numbers[f'{name}: {column}']:>12.4f}" for column in (*columns, *ends))
+        )
     return "\n".join(lines)
 
 

@@ -18,7 +18,9 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
+sys.path.insert(
+    0, str(Path(__file__).resolve().parents[1])
+)  # run from the source tree without installing
 
 import numpy as np
 from mpi4py import MPI
@@ -94,7 +96,11 @@ def thin_limit(
     """Compute the bar's foot for every width, and beside it the exact inequality on the same mesh."""
     model, numbers, case = build(bar, MPI.COMM_WORLD), {}, bar.case
     name, t_end = type(case).__name__, T_END[type(case)]
-    speed = case.speed if isinstance(case, ThrownBar) else float(np.sqrt(2.0 * case.gravity * case.height))
+    speed = (
+        case.speed
+        if isinstance(case, ThrownBar)
+        else float(np.sqrt(2.0 * case.gravity * case.height))
+    )
     problem = model.problem(mass=vc.ConsistentMass())
     schemes = {"exact inequality": (vc.Midpoint(), bar.time_step(0.5))}
     for metric in metrics:
@@ -107,25 +113,43 @@ def thin_limit(
     curve = (fine, case.height + case.displacement(0.0, fine), case.force(fine))
     impulse, runs = float(np.mean(curve[2])) * t_end, {}
     if MPI.COMM_WORLD.rank == 0:
-        print(f"\n{name:24s} {'rms error of the foot [m]':>26s} {'energy left':>12s} {'impulse / exact':>16s}")
+        print(
+            f"\n{name:24s} {'rms error of the foot [m]':>26s} {'energy left':>12s} {'impulse / exact':>16s}"
+        )
     for label, (scheme, dt) in schemes.items():
         t, y, p, lost = marched(problem, scheme, dt, t_end)
         runs[label] = (t, y, p)
-        row = (float(np.sqrt(np.mean((y - case.height - case.displacement(0.0, t)) ** 2))),
-               1.0 - lost / (0.5 * case.rho * case.length * bar.section * speed**2), float(np.sum(p)) * dt / impulse)
-        numbers |= {f"{name} {label}: {what}": x for what, x in zip(("error", "energy", "impulse"), row, strict=True)}
+        row = (
+            float(np.sqrt(np.mean((y - case.height - case.displacement(0.0, t)) ** 2))),
+            1.0 - lost / (0.5 * case.rho * case.length * bar.section * speed**2),
+            float(np.sum(p)) * dt / impulse,
+        )
+        numbers |= {
+            f"{name} {label}: {what}": x
+            for what, x in zip(("error", "energy", "impulse"), row, strict=True)
+        }
         if MPI.COMM_WORLD.rank == 0:
             print(f"{label:24s} {row[0]:26.4f} {row[1]:12.4f} {row[2]:16.4f}")
     if MPI.COMM_WORLD.rank == 0:
-        shown = {f"layer, b = {width:g} m": runs[f"{metrics[-1].name} b {width:g}"] for width in widths[::2]}
+        shown = {
+            f"layer, b = {width:g} m": runs[f"{metrics[-1].name} b {width:g}"]
+            for width in widths[::2]
+        }
         plot_layered_bar(shown, curve, out / f"{name}.png")
-        errors = {f"metric {metric.name}": (np.array(widths), np.array(
-            [numbers[f"{name} {metric.name} b {width:g}: error"] for width in widths])) for metric in metrics}
+        errors = {
+            f"metric {metric.name}": (
+                np.array(widths),
+                np.array([numbers[f"{name} {metric.name} b {width:g}: error"] for width in widths]),
+            )
+            for metric in metrics
+        }
         plot_thin_limit(errors, out / f"{name}_limit.png", quantity="rms error of the foot [m]")
     return numbers
 
 
-def shaken_wall(widths: tuple[float, ...], steps: int, periods: float, out: Path) -> dict[str, float]:
+def shaken_wall(
+    widths: tuple[float, ...], steps: int, periods: float, out: Path
+) -> dict[str, float]:
     """Run case b of the wall: how far its contact points are from those of the midpoint rule with gap >= 0."""
     model = wall.build(wall.Wall(), MPI.COMM_WORLD, base_inertia="catalogue")
     exact = model.problem("b", impact=None, mass=vc.ConsistentMass())
@@ -141,19 +165,25 @@ def shaken_wall(widths: tuple[float, ...], steps: int, periods: float, out: Path
     numbers["wall: largest displacement"] = float(np.max(np.abs(reference)))
     for width in widths:
         mass = np.sqrt(concrete.E * concrete.rho) * width / WALL_SPEED
-        law = contact_layer(
-            0.5, mass=mass, speed=WALL_SPEED, width=width, metric=Metric.FLAT
-        )
+        law = contact_layer(0.5, mass=mass, speed=WALL_SPEED, width=width, metric=Metric.FLAT)
         scheme = BoundaryLayer(law=law)
         found = displacements(replace(exact, surface=law.set_back(exact.surface)), scheme)
         errors.append(float(np.sqrt(np.mean((found - reference) ** 2))))
-        numbers |= {f"wall b {width:g}: error": errors[-1], f"wall b {width:g}: deepest": float(found.max())}
+        numbers |= {
+            f"wall b {width:g}: error": errors[-1],
+            f"wall b {width:g}: deepest": float(found.max()),
+        }
         if MPI.COMM_WORLD.rank == 0:
-            print(f"wall, b = {1e6 * width:g} µm: rms distance to the exact inequality {1e6 * errors[-1]:.3f} µm, "
-                  f"into it {1e6 * found.max():.3f} µm (amplitude {1e6 * np.max(np.abs(reference)):.1f} µm)")
+            print(
+                f"wall, b = {1e6 * width:g} µm: rms distance to the exact inequality {1e6 * errors[-1]:.3f} µm, "
+                f"into it {1e6 * found.max():.3f} µm (amplitude {1e6 * np.max(np.abs(reference)):.1f} µm)"
+            )
     if MPI.COMM_WORLD.rank == 0:
-        plot_thin_limit({"wall, case b": (np.array(widths), np.array(errors))}, out / "wall_limit.png",
-                        quantity="rms distance of the contact points [m]")
+        plot_thin_limit(
+            {"wall, case b": (np.array(widths), np.array(errors))},
+            out / "wall_limit.png",
+            quantity="rms distance of the contact points [m]",
+        )
     return numbers
 
 

@@ -18,7 +18,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
+sys.path.insert(
+    0, str(Path(__file__).resolve().parents[1])
+)  # run from the source tree without installing
 
 import dolfinx
 import numpy as np
@@ -36,7 +38,18 @@ from vi_contact.solvers import ReducedNewton
 WIDTH = 0.05  # l
 HEIGHT = 0.1
 ACROSS = 8  # cells; the strip has ten times as many along it
-STRAINS = (0.4, 0.8, 1.0, 1.3, 1.6, 1.0, 0.4, 1.2, 1.6, 2.0)  # of the homogeneous bar, over the critical one
+STRAINS = (
+    0.4,
+    0.8,
+    1.0,
+    1.3,
+    1.6,
+    1.0,
+    0.4,
+    1.2,
+    1.6,
+    2.0,
+)  # of the homogeneous bar, over the critical one
 PULLS = (0.5, 0.8, 0.95, 1.02, 1.1, 1.2)  # of the bar that breaks
 LEFT = 1e-8  # of the stiffness where d = 1
 SETTLED, ROUNDS = 1e-5, 1500  # of d, between two rounds; and how many, at most
@@ -50,14 +63,25 @@ class Bar:
 
     def __init__(self, comm: Any, across: int, held: bool) -> None:
         self.comm, self.across, self.rounds, self.worst = comm, across, 0, 0.0
-        on = dolfinx.mesh.create_rectangle(comm, [[-0.5, 0.0], [0.5, HEIGHT]], [10 * across, across])
+        on = dolfinx.mesh.create_rectangle(
+            comm, [[-0.5, 0.0], [0.5, HEIGHT]], [10 * across, across]
+        )
         V = compat.lagrange(on, 1)
         self.u, self.d, self.before = (dolfinx.fem.Function(V) for _ in range(3))
         self.pull = dolfinx.fem.Constant(on, 0.0)
-        ends = [dolfinx.fem.locate_dofs_topological(V, 1, dolfinx.mesh.locate_entities_boundary(
-            on, 1, lambda x, at=at: np.isclose(x[0], at))) for at in (-0.5, 0.5)]
+        ends = [
+            dolfinx.fem.locate_dofs_topological(
+                V,
+                1,
+                dolfinx.mesh.locate_entities_boundary(on, 1, lambda x, at=at: np.isclose(x[0], at)),
+            )
+            for at in (-0.5, 0.5)
+        ]
         zero = dolfinx.fem.Constant(on, 0.0)
-        self.ends = [dolfinx.fem.dirichletbc(zero, ends[0], V), dolfinx.fem.dirichletbc(self.pull, ends[1], V)]
+        self.ends = [
+            dolfinx.fem.dirichletbc(zero, ends[0], V),
+            dolfinx.fem.dirichletbc(self.pull, ends[1], V),
+        ]
         self.sound = [dolfinx.fem.dirichletbc(zero, one, V) for one in ends] if held else []
         v, w = ufl.TestFunction(V), ufl.TrialFunction(V)
         left = (1.0 - self.d) ** 2 + LEFT
@@ -79,13 +103,19 @@ class Bar:
             result = vi.solve(self.growth, self.d, lower=self.before, upper=1.0, bcs=self.sound)
             self.worst = max(self.worst, linear.certificate.worst, result.certificate.worst)
             self.rounds += 1
-            if self.comm.allreduce(float(np.max(np.abs(self.d.x.array - last))), op=MPI.MAX) < SETTLED:
+            if (
+                self.comm.allreduce(float(np.max(np.abs(self.d.x.array - last))), op=MPI.MAX)
+                < SETTLED
+            ):
                 break
         return self.energies()
 
     def energies(self) -> tuple[float, float, float]:
         """Return elastic and surface energy over Gc H, and the mean stress."""
-        found = [float(self.comm.allreduce(dolfinx.fem.assemble_scalar(one))) / HEIGHT for one in self.parts]
+        found = [
+            float(self.comm.allreduce(dolfinx.fem.assemble_scalar(one))) / HEIGHT
+            for one in self.parts
+        ]
         return found[0], found[1], found[2]
 
     def crack_alone(self) -> float:
@@ -106,11 +136,19 @@ def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
     numbers["homogeneous: stress error"] = float(np.max(np.abs(found - known)))
     numbers["homogeneous: certificate"] = even.worst
 
-    bar, pulls = Bar(comm, ACROSS // 2 if quick else ACROSS, held=True), PULLS[-1:] if quick else PULLS
+    bar, pulls = (
+        Bar(comm, ACROSS // 2 if quick else ACROSS, held=True),
+        PULLS[-1:] if quick else PULLS,
+    )
     energies = np.array([bar.load(one * strain)[:2] for one in pulls])
     h = HEIGHT / bar.across
-    numbers |= {"elastic": energies[-1, 0], "surface": energies[-1, 1], "h / l": h / WIDTH,
-                "rounds": float(bar.rounds), "certificate": bar.worst}
+    numbers |= {
+        "elastic": energies[-1, 0],
+        "surface": energies[-1, 1],
+        "h / l": h / WIDTH,
+        "rounds": float(bar.rounds),
+        "certificate": bar.worst,
+    }
     broken = gathered(bar.d)
     numbers["crack alone"], numbers["1 + h / (2 l)"] = bar.crack_alone(), 1.0 + 0.5 * h / WIDTH
     alone = gathered(bar.d)
@@ -122,12 +160,18 @@ def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
         away = np.linspace(-9.0, 9.0, 801)
         near = np.maximum(np.abs(away) - 0.5 * float(np.ptp(x[open_])) / WIDTH, 0.0)
         out.mkdir(parents=True, exist_ok=True)
-        path = np.interp(np.linspace(0, len(STRAINS), 500), np.arange(len(STRAINS) + 1), (0.0, *STRAINS))
+        path = np.interp(
+            np.linspace(0, len(STRAINS), 500), np.arange(len(STRAINS) + 1), (0.0, *STRAINS)
+        )
         place = (x - numbers["middle"]) / WIDTH
-        plot_crack((STRAINS, found, path, homogeneous(path * strain, WIDTH)[1] / stress), pulls,
-                   {"elastic": energies[:, 0], "surface": energies[:, 1]},
-                   {"just broken": (place, broken[1][axis]), "the crack alone": (place, alone[1][axis])},
-                   (away, np.exp(-near)), out / "crack.png")
+        plot_crack(
+            (STRAINS, found, path, homogeneous(path * strain, WIDTH)[1] / stress),
+            pulls,
+            {"elastic": energies[:, 0], "surface": energies[:, 1]},
+            {"just broken": (place, broken[1][axis]), "the crack alone": (place, alone[1][axis])},
+            (away, np.exp(-near)),
+            out / "crack.png",
+        )
         print("\n".join(f"{name:<28} {value:.6g}" for name, value in numbers.items()))
         print(f"\nThe figure is in {out}.")
     comm.Barrier()

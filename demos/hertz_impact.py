@@ -14,7 +14,9 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
+sys.path.insert(
+    0, str(Path(__file__).resolve().parents[1])
+)  # run from the source tree without installing
 
 import numpy as np
 from mpi4py import MPI
@@ -42,19 +44,29 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
         model = build(replace(BALL, cells=cells), comm)
         problem, dt = model.problem(), model.time_step(STEPS // 2 if quick else STEPS)
         solution = vc.simulate(
-            problem, dt=dt, t_end=1.2 * model.exact.duration,
+            problem,
+            dt=dt,
+            t_end=1.2 * model.exact.duration,
             record=(vc.Energy(), vc.Contact(), vc.Probe({"centre": model.probes()["centre"]})),
-            out=out / f"{cells}_cells", progress=progress,
+            out=out / f"{cells}_cells",
+            progress=progress,
         )
         curves[name] = curve = curves_of(model, problem, solution)
         values = (
-            curve.approach.max() / model.exact.approach, np.count_nonzero(curve.force) * dt / model.exact.duration,
-            curve.force.max() / model.exact.deepest.force, -(np.diff(curve.approach)[-1] / dt) / BALL.speed,
-            solution.facts["worst_certificate"], solution.facts["energy_defect"],
+            curve.approach.max() / model.exact.approach,
+            np.count_nonzero(curve.force) * dt / model.exact.duration,
+            curve.force.max() / model.exact.deepest.force,
+            -(np.diff(curve.approach)[-1] / dt) / BALL.speed,
+            solution.facts["worst_certificate"],
+            solution.facts["energy_defect"],
         )
-        numbers |= {f"{name}: {what}": float(value) for what, value in zip(COLUMNS, values, strict=True)}
+        numbers |= {
+            f"{name}: {what}": float(value) for what, value in zip(COLUMNS, values, strict=True)
+        }
     if comm.rank == 0:
-        plot_impact(curves, model.exact, lambda t: hertz_motion(model.exact, t), out / "hertz_impact.png")
+        plot_impact(
+            curves, model.exact, lambda t: hertz_motion(model.exact, t), out / "hertz_impact.png"
+        )
         print(table(numbers))
         print(f"\nFigure and histories are in {out}.")
     comm.Barrier()
@@ -79,8 +91,11 @@ def table(numbers: dict[str, float]) -> str:
     lines = [f"{'over the quasi-static theory':<30}" + "".join(f"{what:>14}" for what in COLUMNS)]
     for name in dict.fromkeys(key.split(":")[0] for key in numbers):
         values = [numbers[f"{name}: {what}"] for what in COLUMNS]
-        lines.append(f"{name:<30}" + "".join(f"{v:>14.4f}" for v in values[:4])
-                     + "".join(f"{v:>14.1e}" for v in values[4:]))
+        lines.append(
+            f"{name:<30}"
+            + "".join(f"{v:>14.4f}" for v in values[:4])
+            + "".join(f"{v:>14.1e}" for v in values[4:])
+        )
     return "\n".join(lines)
 
 

@@ -13,7 +13,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
+sys.path.insert(
+    0, str(Path(__file__).resolve().parents[1])
+)  # run from the source tree without installing
 
 import numpy as np
 from mpi4py import MPI
@@ -56,8 +58,11 @@ def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
         errors = {
             "largest error of u": [numbers[f"{cells}: error"] for cells in meshes],
             "contact radius, from the area of active cells": [
-                abs(radius(numbers, cells) - known.radius) for cells in meshes],
-            "force, relative": [abs(numbers[f"{cells}: force"] / known.force - 1.0) for cells in meshes],
+                abs(radius(numbers, cells) - known.radius) for cells in meshes
+            ],
+            "force, relative": [
+                abs(numbers[f"{cells}: force"] / known.force - 1.0) for cells in meshes
+            ],
         }
         assert drawn is not None
         plot_membrane(*drawn, sizes, errors, out / "obstacle.png")
@@ -74,13 +79,20 @@ def radius(numbers: dict[str, float], cells: int) -> float:
 
 def table(numbers: dict[str, float], meshes: tuple[int, ...], known: Membrane) -> str:
     """Return the errors of all meshes."""
-    lines = [f"exact: contact radius {known.radius:.5f}, force {known.force:.5f}", "",
-             f"{'cells':>6} {'error of u':>11} {'farthest active':>16} {'from area':>10} {'force':>9} "
-             f"{'certificate':>12}"]
+    lines = [
+        f"exact: contact radius {known.radius:.5f}, force {known.force:.5f}",
+        "",
+        f"{'cells':>6} {'error of u':>11} {'farthest active':>16} {'from area':>10} {'force':>9} "
+        f"{'certificate':>12}",
+    ]
     for cells in meshes:
-        error, far, force, worst = (numbers[f"{cells}: {name}"] for name in ("error", "radius", "force", "certificate"))
-        lines.append(f"{cells:>6} {error:>11.2e} {far:>16.5f} {radius(numbers, cells):>10.5f} {force:>9.5f} "
-                     f"{worst:>12.1e}")
+        error, far, force, worst = (
+            numbers[f"{cells}: {name}"] for name in ("error", "radius", "force", "certificate")
+        )
+        lines.append(
+            f"{cells:>6} {error:>11.2e} {far:>16.5f} {radius(numbers, cells):>10.5f} {force:>9.5f} "
+            f"{worst:>12.1e}"
+        )
     return "\n".join(lines)
 
 

@@ -15,7 +15,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
+sys.path.insert(
+    0, str(Path(__file__).resolve().parents[1])
+)  # run from the source tree without installing
 
 import numpy as np
 
@@ -41,14 +43,19 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
     out.mkdir(parents=True, exist_ok=True)
     numbers = table(STIFFNESSES[2:3] if quick else STIFFNESSES)
     plot_particle(
-        {"c = 0": [(f"k = {k:g}", impact(k, 0.0)) for k in STIFFNESSES],
-         "k = 1": [(f"c = {c:g}", impact(1.0, c)) for c in DAMPERS]}, out / "figure_1.png",
+        {
+            "c = 0": [(f"k = {k:g}", impact(k, 0.0)) for k in STIFFNESSES],
+            "k = 1": [(f"c = {c:g}", impact(1.0, c)) for c in DAMPERS],
+        },
+        out / "figure_1.png",
     )
     plot_parameters(np.linspace(0.25, 10.0, 12 if quick else 79), DAMPERS, out / "figure_2.png")
     numbers |= readings(RATIOS[:1] if quick else RATIOS, out)
     layer = layer_for(WANTED, mass=MASS, speed=SPEED, width=WIDTH)
     numbers["wanted"] = ParticleImpact(layer, MASS, SPEED).restitution
-    print(f"\nFor e = {WANTED:g} at half the layer's depth: k = {layer.k:.6f} N/m, c = {layer.c:.6f} N")
+    print(
+        f"\nFor e = {WANTED:g} at half the layer's depth: k = {layer.k:.6f} N/m, c = {layer.c:.6f} N"
+    )
     if progress:
         print(f"Figures are in {out}.")
     return numbers
@@ -67,9 +74,13 @@ def table(stiffnesses: tuple[float, ...]) -> dict[str, float]:
         for c in DAMPERS:
             one = impact(k, c)
             found = collide(one.layer)
-            worst = max(worst, abs(found.restitution - one.restitution), abs(found.duration - one.duration))
-            print(f"{k:6g} {c:6g} {one.restitution:10.6f} {one.poisson_covector:9.6f} {one.compression_time:9.6f} "
-                  f"{one.duration:10.6f} {one.deepest:10.6f}")
+            worst = max(
+                worst, abs(found.restitution - one.restitution), abs(found.duration - one.duration)
+            )
+            print(
+                f"{k:6g} {c:6g} {one.restitution:10.6f} {one.poisson_covector:9.6f} {one.compression_time:9.6f} "
+                f"{one.duration:10.6f} {one.deepest:10.6f}"
+            )
             numbers |= {f"e {k:g} {c:g}": one.restitution, f"t_f {k:g} {c:g}": one.duration}
     print(f"largest difference between closed form and integration: {worst:.1e}")
     return numbers | {"closed form - integration": worst}
@@ -95,7 +106,9 @@ def readings(ratios: tuple[float, ...], out: Path) -> dict[str, float]:
     for metric in Metric:
         for ratio in (*ratios, 1.0):
             found = collide(Layer(WIDTH, k=1.0, c=1.0, start=ratio * WIDTH), metric)
-            print(f" {metric.name:9s} {ratio:6g} {found.restitution:9.5f} {found.duration:10.5f} {found.deepest:10.5f}")
+            print(
+                f" {metric.name:9s} {ratio:6g} {found.restitution:9.5f} {found.duration:10.5f} {found.deepest:10.5f}"
+            )
             numbers[f"{metric.name} {ratio:g}"] = found.restitution
     layers = {ratio: Layer(WIDTH, k=1.0, c=1.0, start=ratio * WIDTH) for ratio in ratios}
     curves = {f"a/b = {ratio:g}": motion(layer) for ratio, layer in layers.items()}

@@ -23,7 +23,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
+sys.path.insert(
+    0, str(Path(__file__).resolve().parents[1])
+)  # run from the source tree without installing
 
 import numpy as np
 from mpi4py import MPI
@@ -41,25 +43,46 @@ from vi_contact.plots.faces import plot_faces
 SOIL = vc.LinearElastic.from_wave_speeds(400.0, 200.0, 1900.0)  # c_P, c_S [m/s], rho [kg/m³]
 ROCK = vc.LinearElastic.from_wave_speeds(1600.0, 800.0, 2400.0)  # below the base
 CONCRETE = vc.LinearElastic(E=2.5e10, nu=0.2, rho=2500.0)
-RAFT, CORE, STOREYS, LAYER = (12.0, 9.0, 1.5), (0.75, 0.0, 8.0, 6.0), (4.0, 4.0, 4.0), (42.0, 36.0, 12.0)  # [m]
-CELLS = np.array([1.2, 0.8, 4.0])  # [m] of the building, of the soil under the raft (finer: it is softer) and far off
+RAFT, CORE, STOREYS, LAYER = (
+    (12.0, 9.0, 1.5),
+    (0.75, 0.0, 8.0, 6.0),
+    (4.0, 4.0, 4.0),
+    (42.0, 36.0, 12.0),
+)  # [m]
+CELLS = np.array(
+    [1.2, 0.8, 4.0]
+)  # [m] of the building, of the soil under the raft (finer: it is softer) and far off
 SIZES = {"2e4": 0.7, "1e5": 0.34, "3e5": 0.235, "1e6": 0.16}  # unknowns, about -> factor of CELLS
-SOLVERS = {size: vc.Iterative() if size == "1e6" else vc.Condensed() for size in SIZES}  # a factor of 1e6: 30 GB
+SOLVERS = {
+    size: vc.Iterative() if size == "1e6" else vc.Condensed() for size in SIZES
+}  # a factor of 1e6: 30 GB
 MU = 0.5
 PEAKS, SEEDS = (2.0, 1.6, 1.0), (1, 2, 3)  # of an outcrop of the rock along x, y, z [m/s²]
-DAMPING = vc.Rayleigh(alpha=0.0, beta=0.03 / (np.pi * 4.0))  # 3 % at 4 Hz; alpha would brake the rocking
+DAMPING = vc.Rayleigh(
+    alpha=0.0, beta=0.03 / (np.pi * 4.0)
+)  # 3 % at 4 Hz; alpha would brake the rocking
 DT, T_END = 5e-3, 5.0
 FRAMES = 200  # for ParaView and the film
 MAGNIFIED = 100.0  # displacements in the pictures
 OUT = Path("results/raft")
 ROOF = RAFT[2] + sum(STOREYS)
-POINTS = {"foot": (CORE[0], 0.0, RAFT[2]), "roof": (CORE[0], 0.0, ROOF),
-          "field": (-0.5 * LAYER[0], -0.5 * LAYER[1], 0.0)}
-POINTS |= {name: (0.5 * x * RAFT[0], 0.5 * y * RAFT[1], RAFT[2]) for name, (x, y) in pictures.CORNERS.items()}
+POINTS = {
+    "foot": (CORE[0], 0.0, RAFT[2]),
+    "roof": (CORE[0], 0.0, ROOF),
+    "field": (-0.5 * LAYER[0], -0.5 * LAYER[1], 0.0),
+}
+POINTS |= {
+    name: (0.5 * x * RAFT[0], 0.5 * y * RAFT[1], RAFT[2])
+    for name, (x, y) in pictures.CORNERS.items()
+}
 
 
 def main(
-    quick: bool = False, size: str = "2e4", out: Path = OUT, progress: bool = True, steps: int | None = None
+    quick: bool = False,
+    size: str = "2e4",
+    out: Path = OUT,
+    progress: bool = True,
+    steps: int | None = None,
 ) -> dict[str, float]:
     """Run all three stages (``quick``: 3e3 unknowns, 150 steps of 10 ms) and draw; return the key numbers."""
     comm = MPI.COMM_WORLD
@@ -68,11 +91,19 @@ def main(
     problem, start = stages(2.0 if quick else SIZES[size], comm, SOLVERS[size])
     weight = float(comm.allreduce(start.r_n.sum()))
     solution = vc.simulate(
-        problem, dt=dt, steps=steps, state=start, out=out, progress=progress, solver=SOLVERS[size],
-        record=recorders(), fields=fem.XDMF(every=max(1, steps // (15 if quick else FRAMES))),
+        problem,
+        dt=dt,
+        steps=steps,
+        state=start,
+        out=out,
+        progress=progress,
+        solver=SOLVERS[size],
+        record=recorders(),
+        fields=fem.XDMF(every=max(1, steps // (15 if quick else FRAMES))),
     )
     numbers = key_numbers(solution.history, weight) | {
-        "worst certificate": solution.facts["worst_certificate"], "energy defect": solution.facts["energy_defect"],
+        "worst certificate": solution.facts["worst_certificate"],
+        "energy defect": solution.facts["energy_defect"],
     }
     if comm.rank == 0:
         print(solution.summary())
@@ -86,20 +117,28 @@ def main(
 def meshed(finer: float, comm: Any) -> tuple[Any, Any]:
     """Return mesh and groups. ``finer``: factor of all CELLS."""
     size, soil_size, far = (float(one) for one in finer * CELLS)
-    shape = RaftMesh(raft=RAFT, core=CORE, storeys=STOREYS, soil=LAYER, size=size, soil_size=soil_size, far=far)
+    shape = RaftMesh(
+        raft=RAFT, core=CORE, storeys=STOREYS, soil=LAYER, size=size, soil_size=soil_size, far=far
+    )
     return fem.build_mesh(shape, comm)
 
 
 def problems(mesh: Any, tags: Any) -> tuple[vc.ContactProblem, vc.ContactProblem]:
     """Return the gravity stage on a firm base, and the dynamic problem on a base that lets waves in and out."""
     cells = [(tags["soil"], SOIL), (tags["building"], CONCRETE)]
-    tied = [fem.Tied(tags[f"soil_{one}"], tags[f"soil_{two}"]) for one, two in (("left", "right"), ("back", "front"))]
+    tied = [
+        fem.Tied(tags[f"soil_{one}"], tags[f"soil_{two}"])
+        for one, two in (("left", "right"), ("back", "front"))
+    ]
     gravity = fem.assemble(mesh, cells, clamped=tags["soil_bottom"], tied=tied)
     base = fem.CompliantBase(tags["soil_bottom"], ROCK, motion=soil.upgoing(earthquake()))
     dynamic = fem.assemble(mesh, cells, dashpots=base, tied=tied, damping=DAMPING)
     static, problem = (
         vc.ContactProblem(
-            system, fem.contact_pair(system, tags["raft_bottom"], tags["soil_foot"], matching=fem.DualMortar()),
+            system,
+            fem.contact_pair(
+                system, tags["raft_bottom"], tags["soil_foot"], matching=fem.DualMortar()
+            ),
             friction=vc.Coulomb(MU),
         )
         for system in (vc.with_weight(gravity), vc.with_weight(dynamic))
@@ -133,6 +172,7 @@ def earthquake() -> list[vc.GroundMotion]:
 
 def key_numbers(history: Any, weight: float) -> dict[str, float]:
     """Return the peaks that people ask for."""
+
     def peak(*columns: str) -> float:
         return float(np.sqrt(sum(np.square(history[column]) for column in columns)).max())
 
@@ -147,8 +187,12 @@ def key_numbers(history: Any, weight: float) -> dict[str, float]:
         "largest open share of the raft": float(history["uplift_raft"].max()),
         "largest opening [mm]": 1e3 * float(history["opening_raft"].max()),
         "largest slip [mm]": 1e3 * float(np.nanmax(history["slip_raft"])),
-        **{f"rotation about {axis} [mrad]": 1e3 * float(np.abs(one).max()) for axis, one in turned.items()},
-        "roof over foot [mm]": 1e3 * float(np.hypot(*(one - one[0] for one in drift.values())).max()),
+        **{
+            f"rotation about {axis} [mrad]": 1e3 * float(np.abs(one).max())
+            for axis, one in turned.items()
+        },
+        "roof over foot [mm]": 1e3
+        * float(np.hypot(*(one - one[0] for one in drift.values())).max()),
         "acceleration of the field [m/s²]": peak("a_x_field", "a_y_field"),
         "acceleration of the roof [m/s²]": peak("a_x_roof", "a_y_roof"),
         "friction work [kJ]": 1e-3 * float(history["loss_friction"][-1]),
@@ -161,8 +205,15 @@ def draw(out: Path, weight: float, *, quick: bool, filmed: bool) -> None:
     history, times = run.history, pictures.instants(run.history)
     pictures.plot_motions(history, out / "motions.png", weight=weight, mu=MU)
     pictures.plot_moments(history, out / "moments.png", weight=weight, sides=RAFT[:2])
-    plot_faces(run, out / "faces.png", times=times, title="The raft from above: closed, half open, open widest")
-    plot_deformed(run, out / "deformed.png", times=times, magnified=MAGNIFIED, title="Building and soil")
+    plot_faces(
+        run,
+        out / "faces.png",
+        times=times,
+        title="The raft from above: closed, half open, open widest",
+    )
+    plot_deformed(
+        run, out / "deformed.png", times=times, magnified=MAGNIFIED, title="Building and soil"
+    )
     if filmed:
         around = times[-1] + (np.arange(2) if quick else np.linspace(-0.35, 0.35, 29))
         film(run, out / "raft.gif", times=around, magnified=MAGNIFIED, column="uplift_raft")

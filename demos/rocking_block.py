@@ -16,7 +16,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
+sys.path.insert(
+    0, str(Path(__file__).resolve().parents[1])
+)  # run from the source tree without installing
 
 import numpy as np
 from mpi4py import MPI
@@ -32,7 +34,9 @@ from vi_contact.cli import status_of
 # Parameters ----------------------------------------------------------------------------------------------------------
 SHAPE = HousnerBlock(width=0.4, height=2.0)  # [m]
 CONCRETE = vc.LinearElastic(E=3.0e10, nu=0.0, rho=2400.0)  # [Pa, -, kg/m³]
-BLOCK = rocking.RockingBlock(SHAPE, CONCRETE, damping=vc.Rayleigh(alpha=0.0, beta=3.0e-4), divisions=(2, 10))
+BLOCK = rocking.RockingBlock(
+    SHAPE, CONCRETE, damping=vc.Rayleigh(alpha=0.0, beta=3.0e-4), divisions=(2, 10)
+)
 RELEASE = 0.5  # angle of release over alpha = atan(b/h)
 DURATION = 5.0  # of free rocking [s]
 ONSET = (0.99, 1.01)  # peaks of the slow pulses over g b/h
@@ -46,7 +50,9 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
     """Run free rocking and ground pulses (``quick``: two impacts, steps of 4 ms); return the key numbers."""
     comm = MPI.COMM_WORLD
     model = rocking.build(BLOCK, comm)
-    dt = model.time_steps(dt=4e-3) if quick else model.time_steps()  # steps halved where a corner lands
+    dt = (
+        model.time_steps(dt=4e-3) if quick else model.time_steps()
+    )  # steps halved where a corner lands
     numbers = free_rocking(model, dt, 1.5 if quick else DURATION, out, progress)
     numbers |= pulses(model, dt, out, progress)
     if comm.rank == 0:
@@ -55,15 +61,27 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
 
 def run(
-    problem: vc.ContactProblem, model: rocking.RockingModel, state: vc.State, dt: vc.HalvedAtImpact, t_end: float,
-    out: Path, progress: bool,
+    problem: vc.ContactProblem,
+    model: rocking.RockingModel,
+    state: vc.State,
+    dt: vc.HalvedAtImpact,
+    t_end: float,
+    out: Path,
+    progress: bool,
 ) -> vc.Solution:
     """Make one run: impacts are inelastic impulses on the corners."""
     corners = {"left": (0.0, 0.0), "right": (SHAPE.width, 0.0), "top": (0.0, SHAPE.height)}
     return vc.simulate(
-        problem, scheme=vc.MoreauJean(theta=0.5, e=0.0), solver=vc.Condensed(), dt=dt, t_end=t_end,
-        state=state, record=(vc.Energy(), vc.Contact(), vc.Probe(corners), rocking.Rocking(model)),
-        fields=fem.XDMF(every=20), out=out, progress=progress,
+        problem,
+        scheme=vc.MoreauJean(theta=0.5, e=0.0),
+        solver=vc.Condensed(),
+        dt=dt,
+        t_end=t_end,
+        state=state,
+        record=(vc.Energy(), vc.Contact(), vc.Probe(corners), rocking.Rocking(model)),
+        fields=fem.XDMF(every=20),
+        out=out,
+        progress=progress,
     )
 
 
@@ -84,50 +102,83 @@ def free_rocking(
     all_impacts = all_impacts[all_impacts < history["t"][-1]]
     if MPI.COMM_WORLD.rank == 0:
         print(f"\nFree rocking from {RELEASE} alpha\n{solution.summary()}")
-        print("\n  impact   time [s]   Housner   rigid, small   amplitude/alpha before it   Housner   rigid, small")
-        before = SHAPE.amplitudes(theta0, count) / SHAPE.alpha, BLOCK.amplitudes(theta0, count) / SHAPE.alpha
+        print(
+            "\n  impact   time [s]   Housner   rigid, small   amplitude/alpha before it   Housner   rigid, small"
+        )
+        before = (
+            SHAPE.amplitudes(theta0, count) / SHAPE.alpha,
+            BLOCK.amplitudes(theta0, count) / SHAPE.alpha,
+        )
         for n in range(count):
-            print(f"  {n + 1:6d} {times[n]:10.4f} {housner[n]:9.4f} {rigid[n]:14.4f} {peaks[n] / SHAPE.alpha:27.4f} "
-                  f"{before[0][n]:9.4f} {before[1][n]:14.4f}")
+            print(
+                f"  {n + 1:6d} {times[n]:10.4f} {housner[n]:9.4f} {rigid[n]:14.4f} {peaks[n] / SHAPE.alpha:27.4f} "
+                f"{before[0][n]:9.4f} {before[1][n]:14.4f}"
+            )
         plot_rocking(
-            history, out / "free_rocking.png", angle=BLOCK.overturning_angle, exact=BLOCK.motion(theta0, history["t"]),
-            energy=potential * SHAPE.energy_ratio ** np.arange(len(all_impacts) + 1.0), impacts=all_impacts,
+            history,
+            out / "free_rocking.png",
+            angle=BLOCK.overturning_angle,
+            exact=BLOCK.motion(theta0, history["t"]),
+            energy=potential * SHAPE.energy_ratio ** np.arange(len(all_impacts) + 1.0),
+            impacts=all_impacts,
             title=f"Free rocking of a block {SHAPE.width:g} m x {SHAPE.height:g} m",
         )
         plot_energy(history, out / "energy.png")
         plot_certificate(history, out / "certificate.png")
     MPI.COMM_WORLD.Barrier()  # nobody leaves before the figures are there
     return {
-        "certificate": solution.facts["worst_certificate"], "energy_defect": solution.facts["energy_defect"],
+        "certificate": solution.facts["worst_certificate"],
+        "energy_defect": solution.facts["energy_defect"],
         "worst_time_error": float(np.max(np.abs(times[:count] / housner - 1.0))),
-        "restitution": rocking.restitution(BLOCK, history, float(times[0])), "first_impact": float(times[0]),
+        "restitution": rocking.restitution(BLOCK, history, float(times[0])),
+        "first_impact": float(times[0]),
     }
 
 
-def pulses(model: rocking.RockingModel, dt: vc.HalvedAtImpact, out: Path, progress: bool) -> dict[str, float]:
+def pulses(
+    model: rocking.RockingModel, dt: vc.HalvedAtImpact, out: Path, progress: bool
+) -> dict[str, float]:
     """Return the shake by slow pulses around g b/h and rectangular ones around the shortest that overturns."""
     unit = SHAPE.onset_acceleration
     shortest = SHAPE.overturning_time(STRENGTH * SHAPE.gravity * SHAPE.alpha)
     lifted, turned, numbers = {}, {}, {"onset": model.onset_acceleration}
     for share in ONSET:
         ramp = vc.Tabulated((0.0, 0.4, 0.8, 1.2), (0.0, share * unit, share * unit, 0.0))
-        solution = run(model.shaken(ramp), model, model.rest, dt, 1.5, out / f"onset_{share:g}", progress)
+        solution = run(
+            model.shaken(ramp), model, model.rest, dt, 1.5, out / f"onset_{share:g}", progress
+        )
         lifted[f"peak {share:g} g b/h"] = solution.history
         numbers[f"gap_{share:g}"] = float(np.max(solution.history["gap"]))
     for share in LENGTHS:
         pulse = vc.Rectangular(STRENGTH * unit, share * shortest)
-        solution = run(model.shaken(pulse), model, model.rest, dt, 1.5, out / f"overturning_{share:g}", progress)
+        solution = run(
+            model.shaken(pulse),
+            model,
+            model.rest,
+            dt,
+            1.5,
+            out / f"overturning_{share:g}",
+            progress,
+        )
         turned[f"{share:g} of {shortest:.4f} s"] = solution.history
-        numbers[f"last_angle_{share:g}"] = float(abs(solution.history["theta"][-1])) / BLOCK.overturning_angle
+        numbers[f"last_angle_{share:g}"] = (
+            float(abs(solution.history["theta"][-1])) / BLOCK.overturning_angle
+        )
     if MPI.COMM_WORLD.rank == 0:
-        print(f"\nGround pulses: rocking starts at {unit:.4f} m/s² (Housner), {numbers['onset']:.4f} m/s² (mesh);"
-              f"\n  a rectangle of {STRENGTH:g} times that overturns from {shortest:.4f} s on (Housner)")
+        print(
+            f"\nGround pulses: rocking starts at {unit:.4f} m/s² (Housner), {numbers['onset']:.4f} m/s² (mesh);"
+            f"\n  a rectangle of {STRENGTH:g} times that overturns from {shortest:.4f} s on (Housner)"
+        )
         for share in ONSET:
-            print(f"  slow pulse, {share:g} g b/h: largest gap {1e3 * numbers[f'gap_{share:g}']:.4f} mm")
+            print(
+                f"  slow pulse, {share:g} g b/h: largest gap {1e3 * numbers[f'gap_{share:g}']:.4f} mm"
+            )
         for share in LENGTHS:
             angle = numbers[f"last_angle_{share:g}"]
-            print(f"  rectangle of {share * shortest:.4f} s: rotation {angle:.2f} of the overturning angle at the end, "
-                  f"{'overturned' if angle > 1.0 else 'came back'}")
+            print(
+                f"  rectangle of {share * shortest:.4f} s: rotation {angle:.2f} of the overturning angle at the end, "
+                f"{'overturned' if angle > 1.0 else 'came back'}"
+            )
         plot_pulses(lifted, turned, out / "pulses.png", angle=BLOCK.overturning_angle, unit=unit)
     MPI.COMM_WORLD.Barrier()
     return numbers

@@ -19,7 +19,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
+sys.path.insert(
+    0, str(Path(__file__).resolve().parents[1])
+)  # run from the source tree without installing
 
 from mpi4py import MPI
 
@@ -34,7 +36,9 @@ from vi_contact.plots.histories import History
 # Parameters ----------------------------------------------------------------------------------------------------------
 SQUARE = Square(cells=20, pressure=0.1)  # h = dt = 0.05, as the source has it
 FRICTION = {
-    "no friction": vc.Frictionless(), "Tresca 0.05": vc.Tresca(0.05), "Coulomb 0.5": vc.Coulomb(0.5),
+    "no friction": vc.Frictionless(),
+    "Tresca 0.05": vc.Tresca(0.05),
+    "Coulomb 0.5": vc.Coulomb(0.5),
 }
 SCHEMES = {"default scheme": None, "midpoint": vc.Midpoint()}
 T_END = 6.0  # [s]
@@ -54,9 +58,14 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
         for name, friction in FRICTION.items():
             run = f"{name}, {scheme_name}"
             solution = vc.simulate(
-                model.problem(friction=friction), scheme=scheme, dt=dt, t_end=T_END,
+                model.problem(friction=friction),
+                scheme=scheme,
+                dt=dt,
+                t_end=T_END,
                 record=(vc.Energy(), vc.Contact(), vc.Probe(model.probes())),
-                fields=fem.XDMF(every=round(0.5 / dt)), out=folder(out, run), progress=progress,
+                fields=fem.XDMF(every=round(0.5 / dt)),
+                out=folder(out, run),
+                progress=progress,
             )
             history = solution.history
             energy = history["energy_kinetic"] + history["energy_strain"]
@@ -83,16 +92,28 @@ def draw(histories: Mapping[str, History], out: Path, times: Sequence[float]) ->
     runs = {name: folder(out, f"{name}, default scheme") for name in FRICTION}
     support = -0.5 * SQUARE.side
     plot_snapshots(
-        runs, times, out / "snapshots.png", support=lambda t: support,
+        runs,
+        times,
+        out / "snapshots.png",
+        support=lambda t: support,
         title="A square under pressure on a rigid support, with the tractions it feels there",
     )
-    plot_tractions(runs, TIMES[1:], out / "tractions.png", title="Contact tractions on the bottom of the square")
+    plot_tractions(
+        runs,
+        TIMES[1:],
+        out / "tractions.png",
+        title="Contact tractions on the bottom of the square",
+    )
     quantities = (
-        ("energy", "energy", "J"), ("contact_resultant", "contact force", "N"),
-        ("loss_friction", "work of friction", "J"), ("u_x_corner", "$u_x$ of the corner", "m"),
+        ("energy", "energy", "J"),
+        ("contact_resultant", "contact force", "N"),
+        ("loss_friction", "work of friction", "J"),
+        ("u_x_corner", "$u_x$ of the corner", "m"),
     )
     plot_runs(
-        {name: histories[f"{name}, default scheme"] for name in FRICTION}, quantities, out / "energies.png",
+        {name: histories[f"{name}, default scheme"] for name in FRICTION},
+        quantities,
+        out / "energies.png",
         title="The square with and without friction, default scheme",
     )
 
@@ -102,7 +123,9 @@ def table(numbers: dict[str, float], runs: list[str]) -> str:
     columns = [f"E({t:g})" for t in TABLE] + ["friction"]
     lines = [f"{'':<30}" + "".join(f"{name:>10}" for name in columns)]
     for run in runs:
-        lines.append(f"{run:<30}" + "".join(f"{numbers[f'{run}: {name}']:>10.5f}" for name in columns))
+        lines.append(
+            f"{run:<30}" + "".join(f"{numbers[f'{run}: {name}']:>10.5f}" for name in columns)
+        )
     return "\n".join(lines)
 
 

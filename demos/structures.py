@@ -15,7 +15,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
+sys.path.insert(
+    0, str(Path(__file__).resolve().parents[1])
+)  # run from the source tree without installing
 
 import numpy as np
 from mpi4py import MPI
@@ -54,8 +56,12 @@ def frame_on_a_stop(numbers: dict[str, float], shown: Shown) -> None:
     section = {name: posed.SECTION[name] for name in ("EA", "EI")}
     n, F = np.array(NORMAL), arm_flexibility(posed.HEIGHT, posed.ARM, **section)
     exact = stop_force(float(n @ F @ posed.END_LOAD), GAP, float(n @ F @ n))
-    numbers |= {"frame: force": float(state.r_n[0]), "frame: exact": exact, "frame: apart": apart,
-                "frame: residual": residual}
+    numbers |= {
+        "frame: force": float(state.r_n[0]),
+        "frame: exact": exact,
+        "frame: apart": apart,
+        "frame: residual": residual,
+    }
     space, moved = problem.system.space, problem.cartesian(state.u)
     u = np.where(space.free_index >= 0, moved[space.free_index], 0.0).reshape(-1, 2)
     shown.frame = (space.points, u, NORMAL, GAP)
@@ -68,17 +74,24 @@ def beam_on_the_ground(numbers: dict[str, float], shown: Shown, counts: tuple[in
         problem = posed.heavy_beam(count)
         state, apart, residual = solved(problem, both=count == counts[0])
         x = problem.system.space.points[:, 0]
-        w = np.append(problem.cartesian(state.u)[problem.system.space.free_index.reshape(-1, 2)[:-1, 1]], 0.0)
+        w = np.append(
+            problem.cartesian(state.u)[problem.system.space.free_index.reshape(-1, 2)[:-1, 1]], 0.0
+        )
         lying = x[:-1][state.r_n > 1e-6 * state.r_n.max()]
         errors.append(abs(w[0] / known.height - 1.0))
-        numbers |= {f"beam {count}: height error": errors[-1], f"beam {count}: off the ground": float(lying[0]),
-                    f"beam {count}: residual": residual}
+        numbers |= {
+            f"beam {count}: height error": errors[-1],
+            f"beam {count}: off the ground": float(lying[0]),
+            f"beam {count}: residual": residual,
+        }
         if count == counts[0]:
             numbers["beam: apart"], shown.beam = apart, (x, w, known)
     shown.errors["beam on the ground: height of its end"] = (counts, errors)
 
 
-def plates_on_stops(comm: Any, numbers: dict[str, float], shown: Shown, counts: tuple[int, ...]) -> None:
+def plates_on_stops(
+    comm: Any, numbers: dict[str, float], shown: Shown, counts: tuple[int, ...]
+) -> None:
     """Press a simply supported square and a clamped disk on a stop at the middle, and over a gap."""
     for name, disk in (("square", False), ("disk", True)):
         for share in (0.0, 0.5):
@@ -88,24 +101,38 @@ def plates_on_stops(comm: Any, numbers: dict[str, float], shown: Shown, counts: 
                 state, apart, residual = solved(problem)
                 errors.append(abs(comm.allreduce(float(state.r_n.sum())) / exact - 1.0))
                 key = f"{name} {share:g} {cells}"
-                numbers |= {f"{key}: force error": errors[-1], f"{key}: apart": apart, f"{key}: residual": residual}
+                numbers |= {
+                    f"{key}: force error": errors[-1],
+                    f"{key}: apart": apart,
+                    f"{key}: residual": residual,
+                }
             if share == 0.0:
                 shown.errors[f"{name} on a stop: force"] = (counts, errors)
 
 
-def disk_on_the_ground(comm: Any, numbers: dict[str, float], shown: Shown, counts: tuple[int, ...]) -> None:
+def disk_on_the_ground(
+    comm: Any, numbers: dict[str, float], shown: Shown, counts: tuple[int, ...]
+) -> None:
     """Press a clamped disk on flat ground: force and radius of what lies on it."""
     errors = []
     for cells in counts:
         problem, known = posed.disk_above_ground(comm, cells, SHARE)
         state, apart, residual = solved(problem)
         scale = posed.PRESSURE * (0.5 * posed.SIDE) ** 4 / posed.PLATE.D
-        errors.append(abs(comm.allreduce(float(state.r_n.sum())) / (posed.PRESSURE * known.force) - 1.0))
-        pushed = state.r_n > 1e-6 * comm.allreduce(float(np.max(state.r_n, initial=0.0)), op=MPI.MAX)
+        errors.append(
+            abs(comm.allreduce(float(state.r_n.sum())) / (posed.PRESSURE * known.force) - 1.0)
+        )
+        pushed = state.r_n > 1e-6 * comm.allreduce(
+            float(np.max(state.r_n, initial=0.0)), op=MPI.MAX
+        )
         r = np.hypot(*problem.surface.points[:, :2].T)
         key = f"ground {cells}"
-        numbers |= {f"{key}: force error": errors[-1], f"{key}: apart": apart, f"{key}: residual": residual,
-                    f"{key}: radius": comm.allreduce(float(np.max(r[pushed], initial=0.0)), op=MPI.MAX)}
+        numbers |= {
+            f"{key}: force error": errors[-1],
+            f"{key}: apart": apart,
+            f"{key}: residual": residual,
+            f"{key}: radius": comm.allreduce(float(np.max(r[pushed], initial=0.0)), op=MPI.MAX),
+        }
         numbers["ground: exact radius"] = known.b
         space, moved = problem.system.space, problem.cartesian(state.u)
         place = space.free_index.reshape(-1, 3)[:, 2]
@@ -119,23 +146,34 @@ def disk_on_the_ground(comm: Any, numbers: dict[str, float], shown: Shown, count
 
 def thrown(comm: Any, numbers: dict[str, float], shown: Shown, quick: bool) -> None:
     """Throw the tip of a cantilever and the middle of a plate at stops: energy never grows."""
-    cases = {"beam": posed.thrown_beam(20, BEAM_GAP, BEAM_SPEED),
-             "plate": posed.thrown_plate(comm, 8 if quick else 16, PLATE_GAP, PLATE_SPEED)}
+    cases = {
+        "beam": posed.thrown_beam(20, BEAM_GAP, BEAM_SPEED),
+        "plate": posed.thrown_plate(comm, 8 if quick else 16, PLATE_GAP, PLATE_SPEED),
+    }
     for name, (problem, touch) in cases.items():
         parts = 15 if quick else 100
         routes = vc.CrossChecked(vc.Condensed(), [vc.Volume()])
         solution = vc.simulate(
-            problem, scheme=vc.MoreauJean(), solver=routes, cross_check=routes, dt=touch / parts,
+            problem,
+            scheme=vc.MoreauJean(),
+            solver=routes,
+            cross_check=routes,
+            dt=touch / parts,
             steps=(3 if quick else 5) * parts,
-            record=(vc.Energy(), vc.Contact()), progress=False,
+            record=(vc.Energy(), vc.Contact()),
+            progress=False,
         )
         history = solution.history
         energy = history["energy_kinetic"] + history["energy_strain"]
         numbers |= {
-            f"thrown {name}: touches": float(history["t"][np.argmax(history["contact_active"] > 0)]),
-            f"thrown {name}: exact": touch, f"thrown {name}: step": touch / parts,
+            f"thrown {name}: touches": float(
+                history["t"][np.argmax(history["contact_active"] > 0)]
+            ),
+            f"thrown {name}: exact": touch,
+            f"thrown {name}: step": touch / parts,
             f"thrown {name}: rise": float(np.max(np.diff(energy)) / energy[0]),
-            f"thrown {name}: left": float(energy[-1] / energy[0]), f"thrown {name}: apart": routes.worst,
+            f"thrown {name}: left": float(energy[-1] / energy[0]),
+            f"thrown {name}: apart": routes.worst,
             f"thrown {name}: residual": solution.facts["worst_certificate"],
             f"thrown {name}: defect": solution.facts["energy_defect"],
         }
@@ -161,25 +199,43 @@ def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
 
 def table(numbers: dict[str, float], shown: Shown) -> str:
     """Return errors of all meshes, with their orders, and what else is known."""
-    lines = [f"frame on a stop: force {numbers['frame: force']:.6f} N, exact {numbers['frame: exact']:.6f} N", "",
-             "relative error on meshes that halve, and its order"]
+    lines = [
+        f"frame on a stop: force {numbers['frame: force']:.6f} N, exact {numbers['frame: exact']:.6f} N",
+        "",
+        "relative error on meshes that halve, and its order",
+    ]
     for name, (_, errors) in shown.errors.items():
         orders = " ".join(f"{order:.2f}" for order in np.log2(np.divide(errors[:-1], errors[1:])))
         lines.append(f"  {name:40} {' '.join(f'{error:.1e}' for error in errors)}   {orders}")
     off = {name: value for name, value in numbers.items() if name.endswith("off the ground")}
     radii = {name: value for name, value in numbers.items() if name.endswith(": radius")}
-    lines += ["", f"beam off the ground over {', '.join(f'{value:g}' for value in off.values())} m, exact "
-              f"{posed.HEAVY.length:g} m",
-              f"disk on the ground up to r = {', '.join(f'{value:.4f}' for value in radii.values())} m, exact "
-              f"{numbers['ground: exact radius'] * 0.5 * posed.SIDE:.4f} m", ""]
+    lines += [
+        "",
+        f"beam off the ground over {', '.join(f'{value:g}' for value in off.values())} m, exact "
+        f"{posed.HEAVY.length:g} m",
+        f"disk on the ground up to r = {', '.join(f'{value:.4f}' for value in radii.values())} m, exact "
+        f"{numbers['ground: exact radius'] * 0.5 * posed.SIDE:.4f} m",
+        "",
+    ]
     for name in ("beam", "plate"):
-        told = {key.split(": ")[1]: value for key, value in numbers.items() if key.startswith(f"thrown {name}")}
-        lines.append(f"thrown {name}: touches at {1e3 * told['touches']:.3f} ms, free motion {1e3 * told['exact']:.3f} "
-                     f"ms, step {1e3 * told['step']:.3f} ms; energy left {told['left']:.4f}, largest rise "
-                     f"{told['rise']:.0e}, ledger {told['defect']:.0e}")
-    worst = {word: max(value for name, value in numbers.items() if name.endswith(word))
-             for word in ("residual", "apart")}
-    lines += ["", f"worst residual {worst['residual']:.1e}; largest difference of the two routes {worst['apart']:.1e}"]
+        told = {
+            key.split(": ")[1]: value
+            for key, value in numbers.items()
+            if key.startswith(f"thrown {name}")
+        }
+        lines.append(
+            f"thrown {name}: touches at {1e3 * told['touches']:.3f} ms, free motion {1e3 * told['exact']:.3f} "
+            f"ms, step {1e3 * told['step']:.3f} ms; energy left {told['left']:.4f}, largest rise "
+            f"{told['rise']:.0e}, ledger {told['defect']:.0e}"
+        )
+    worst = {
+        word: max(value for name, value in numbers.items() if name.endswith(word))
+        for word in ("residual", "apart")
+    }
+    lines += [
+        "",
+        f"worst residual {worst['residual']:.1e}; largest difference of the two routes {worst['apart']:.1e}",
+    ]
     return "\n".join(lines)
 
 

@@ -18,7 +18,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
+sys.path.insert(
+    0, str(Path(__file__).resolve().parents[1])
+)  # run from the source tree without installing
 
 import numpy as np
 from mpi4py import MPI
@@ -33,12 +35,25 @@ from vi_contact.plots.histories import History
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 DISK = Disk(radius=0.5, size=0.04, push=Push(height=0.05, rise=1.0))  # h = 2 dt = 0.04
-FRICTION = {"no friction": vc.Frictionless(), "Coulomb 2": vc.Coulomb(2.0), "Tresca 2": vc.Tresca(2.0)}
+FRICTION = {
+    "no friction": vc.Frictionless(),
+    "Coulomb 2": vc.Coulomb(2.0),
+    "Tresca 2": vc.Tresca(2.0),
+}
 T_END = 4.0  # [s]
 TIMES = (0.5, 1.0, 1.2, 2.0, 4.0)  # of the snapshots [s]
 PUSHED = (0.3, 0.5, 0.7, 0.9, 1.1)  # of the tractions [s]
 OUT = Path("results/tennis_ball")
-COLUMNS = ("release", "velocity", "energy", "work", "friction", "change of energy", "angular momentum", "ledger defect")
+COLUMNS = (
+    "release",
+    "velocity",
+    "energy",
+    "work",
+    "friction",
+    "change of energy",
+    "angular momentum",
+    "ledger defect",
+)
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
@@ -49,12 +64,23 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
     histories, numbers = {}, {}
     for name, friction in FRICTION.items():
         solution = vc.simulate(
-            model.problem(friction=friction), dt=dt, t_end=T_END, out=folder(out, name), progress=progress,
-            record=(vc.Energy(), vc.Contact(), Momentum((0.0, DISK.radius)), vc.Probe(model.probes())),
+            model.problem(friction=friction),
+            dt=dt,
+            t_end=T_END,
+            out=folder(out, name),
+            progress=progress,
+            record=(
+                vc.Energy(),
+                vc.Contact(),
+                Momentum((0.0, DISK.radius)),
+                vc.Probe(model.probes()),
+            ),
             fields=fem.XDMF(every=round(0.1 / dt)),
         )
         histories[name] = history = derived(solution.history, model.mass)
-        numbers |= {f"{name}: {what}": value for what, value in results(history, solution.facts).items()}
+        numbers |= {
+            f"{name}: {what}": value for what, value in results(history, solution.facts).items()
+        }
         numbers[f"{name}: certificate"] = solution.facts["worst_certificate"]
     if comm.rank == 0:
         draw(histories, out, TIMES[::2] if quick else TIMES)
@@ -80,9 +106,14 @@ def results(history: History, facts: Mapping[str, float]) -> dict[str, float]:
     last = int(np.flatnonzero(history["contact_active"])[-1])
     energy = history["energy"]
     values = (
-        history["t"][last], history["velocity"][-1], energy[-1], history["work_input"][-1],
-        history["loss_friction"][-1], np.ptp(energy[last + 2 :]) / energy[-1],
-        np.abs(history["momentum_angular"]).max() / (DISK.radius * history["momentum_y"][-1]), facts["energy_defect"],
+        history["t"][last],
+        history["velocity"][-1],
+        energy[-1],
+        history["work_input"][-1],
+        history["loss_friction"][-1],
+        np.ptp(energy[last + 2 :]) / energy[-1],
+        np.abs(history["momentum_angular"]).max() / (DISK.radius * history["momentum_y"][-1]),
+        facts["energy_defect"],
     )
     return {name: float(value) for name, value in zip(COLUMNS, values, strict=True)}
 
@@ -91,15 +122,22 @@ def draw(histories: Mapping[str, History], out: Path, times: Sequence[float]) ->
     """Draw snapshots, tractions and histories."""
     runs = {name: folder(out, name) for name in FRICTION}
     plot_snapshots(
-        runs, times, out / "snapshots.png", support=DISK.push,
+        runs,
+        times,
+        out / "snapshots.png",
+        support=DISK.push,
         title="A plane pushes a disk up, with the tractions it feels",
     )
     plot_tractions(runs, PUSHED, out / "tractions.png", title="Contact tractions on the disk")
     quantities = (
-        ("energy", "energy", "J"), ("contact_resultant", "contact force", "N"),
-        ("velocity", "velocity of the centre", "m/s"), ("loss_friction", "work of friction", "J"),
+        ("energy", "energy", "J"),
+        ("contact_resultant", "contact force", "N"),
+        ("velocity", "velocity of the centre", "m/s"),
+        ("loss_friction", "work of friction", "J"),
     )
-    plot_runs(histories, quantities, out / "energies.png", title="The disk with and without friction")
+    plot_runs(
+        histories, quantities, out / "energies.png", title="The disk with and without friction"
+    )
 
 
 def table(numbers: Mapping[str, float]) -> str:
@@ -107,8 +145,11 @@ def table(numbers: Mapping[str, float]) -> str:
     lines = [f"{'':<14}" + "".join(f"{what:>18}" for what in COLUMNS)]
     for name in FRICTION:
         values = [numbers[f"{name}: {what}"] for what in COLUMNS]
-        lines.append(f"{name:<14}" + "".join(f"{v:>18.5g}" for v in values[:5])
-                     + "".join(f"{v:>18.1e}" for v in values[5:]))
+        lines.append(
+            f"{name:<14}"
+            + "".join(f"{v:>18.5g}" for v in values[:5])
+            + "".join(f"{v:>18.1e}" for v in values[5:])
+        )
     return "\n".join(lines)
 
 

@@ -16,15 +16,28 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
+sys.path.insert(
+    0, str(Path(__file__).resolve().parents[1])
+)  # run from the source tree without installing
 
 import numpy as np
 
 import vi_contact as vc
 from demos import beam
 from demos.beam.contract import beam_problem, rubbing_problem
-from demos.pictures.beam import plot_beam_energies, plot_regularisation, plot_rubbing, plot_shapes, plot_tips
-from demos.problems.published_beam import published_elements, published_mu, published_start, readings
+from demos.pictures.beam import (
+    plot_beam_energies,
+    plot_regularisation,
+    plot_rubbing,
+    plot_shapes,
+    plot_tips,
+)
+from demos.problems.published_beam import (
+    published_elements,
+    published_mu,
+    published_start,
+    readings,
+)
 from vi_contact.cli import status_of
 
 # Parameters ----------------------------------------------------------------------------------------------------------
@@ -34,7 +47,9 @@ SPANS = ((0.0, 0.6), (0.6, 1.5), (1.5, 2.0))  # of Figs. 8.4 to 8.9 [s]
 ELEMENTS, DT, T_END = 1000, 0.002, 2.0
 MU, FORCE = 0.3, 100.0  # [-], [N] of the comparison of friction laws
 EPS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)  # [m]
-ROD = beam.Rod(viscosity=0.002, gap=0.05, body_force=lambda t: 20.0 * (t < 1.5))  # pulled to the wall for 1.5 s
+ROD = beam.Rod(
+    viscosity=0.002, gap=0.05, body_force=lambda t: 20.0 * (t < 1.5)
+)  # pulled to the wall for 1.5 s
 OUT = Path("results/timoshenko_beam")
 
 
@@ -53,31 +68,57 @@ def published(count: int, dt: float, out: Path) -> dict[str, float]:
     """Run the source's beam under every reading of its normal force; Figs. 8.1 to 8.9 with READING."""
     steps, forces = round(T_END / dt), readings(dt)
     numbers, drawn = {}, {}
-    print(f"\nThe source's beam, m = {count}, dt = {dt:g} s, E(0) and what is left of it at t = {T_END:g} s [J]")
-    print("  a2 [s]  reading   E(0)     E(end)   lost to friction, viscosity   tip(1), tip(end) [m]   updates   ledger")
+    print(
+        f"\nThe source's beam, m = {count}, dt = {dt:g} s, E(0) and what is left of it at t = {T_END:g} s [J]"
+    )
+    print(
+        "  a2 [s]  reading   E(0)     E(end)   lost to friction, viscosity   tip(1), tip(end) [m]   updates   ledger"
+    )
     for viscosity in VISCOSITIES:
         for name, force in forces.items():
             stepper = beam.BeamStepper(
-                beam.TimoshenkoBeam(viscosity=viscosity), published_elements(count), dt, normal_force=force,
-                mu=published_mu, friction=beam.RegularisedFriction(0.002, absolute=1e-10),
+                beam.TimoshenkoBeam(viscosity=viscosity),
+                published_elements(count),
+                dt,
+                normal_force=force,
+                mu=published_mu,
+                friction=beam.RegularisedFriction(0.002, absolute=1e-10),
             )
-            run = beam.run_beam(stepper, published_start(), steps=steps, every=max(1, round(0.02 / dt)))
+            run = beam.run_beam(
+                stepper, published_start(), steps=steps, every=max(1, round(0.02 / dt))
+            )
             history, energy = run.history, run.energy
             defect = float(np.max(np.abs(history["energy_defect"])))
-            tip, lost = history["u_tip"], (history["loss_friction"][-1], history["loss_damping"][-1])
-            print(f"  {viscosity:6g}  {name:7s} {energy[0]:8.4f} {energy[-1]:8.4f} {lost[0]:14.4f} {lost[1]:13.4f} "
-                  f"{tip[steps // 2]:13.5f} {tip[-1]:9.5f} {run.mean_updates:11.3f} {defect:9.1e}")
+            tip, lost = (
+                history["u_tip"],
+                (history["loss_friction"][-1], history["loss_damping"][-1]),
+            )
+            print(
+                f"  {viscosity:6g}  {name:7s} {energy[0]:8.4f} {energy[-1]:8.4f} {lost[0]:14.4f} {lost[1]:13.4f} "
+                f"{tip[steps // 2]:13.5f} {tip[-1]:9.5f} {run.mean_updates:11.3f} {defect:9.1e}"
+            )
             key = f"a2 {viscosity:g} {name}"
-            numbers |= {f"{key}: energy": energy[-1], f"{key}: defect": defect,
-                        f"{key}: largest rise": float(np.max(np.diff(energy)))}
+            numbers |= {
+                f"{key}: energy": energy[-1],
+                f"{key}: defect": defect,
+                f"{key}: largest rise": float(np.max(np.diff(energy))),
+            }
             if name == READING:
                 drawn[viscosity] = run
                 run.save(out / f"history_a2_{viscosity:g}.csv")
     labels = {f"a2 = {viscosity:g} s": run for viscosity, run in drawn.items()}
-    plot_beam_energies(labels, out / "fig_8_1_energy.png", title=f"Fig. 8.1: energy, reading {READING}")
+    plot_beam_energies(
+        labels, out / "fig_8_1_energy.png", title=f"Fig. 8.1: energy, reading {READING}"
+    )
     for number, (label, run) in enumerate(labels.items(), start=2):
-        plot_tips({label: run}, out / f"fig_8_{number}_tip.png", title=f"Fig. 8.{number}: motion of the tip")
-    for number, (viscosity, span) in enumerate(((a, span) for a in drawn for span in SPANS), start=4):
+        plot_tips(
+            {label: run},
+            out / f"fig_8_{number}_tip.png",
+            title=f"Fig. 8.{number}: motion of the tip",
+        )
+    for number, (viscosity, span) in enumerate(
+        ((a, span) for a in drawn for span in SPANS), start=4
+    ):
         title = f"Fig. 8.{number}: t = {span[0]:g} to {span[1]:g} s, a2 = {viscosity:g} s"
         plot_shapes(drawn[viscosity], out / f"fig_8_{number}_shapes.png", span=span, title=title)
     return numbers
@@ -85,22 +126,34 @@ def published(count: int, dt: float, out: Path) -> dict[str, float]:
 
 def exact(count: int, dt: float, out: Path) -> dict[str, float]:
     """Run constant force and coefficient: the inequality, by Algorithm 10 and by the contract, and eps -> 0."""
-    body, elements, start = beam.TimoshenkoBeam(viscosity=VISCOSITIES[0]), beam.Elements(count), published_start()
+    body, elements, start = (
+        beam.TimoshenkoBeam(viscosity=VISCOSITIES[0]),
+        beam.Elements(count),
+        published_start(),
+    )
     steps = round(T_END / dt)
 
     def algorithm(friction: beam.TipFriction) -> beam.BeamRun:
-        stepper = beam.BeamStepper(body, elements, dt, lambda t: FORCE, lambda t, rate: MU, friction)
+        stepper = beam.BeamStepper(
+            body, elements, dt, lambda t: FORCE, lambda t, rate: MU, friction
+        )
         return beam.run_beam(stepper, start, steps=steps)
 
     law = algorithm(beam.ExactFriction()).history
-    problem = beam_problem(body, elements, normal_force=lambda t: FORCE, friction=vc.Coulomb(MU), start=start)
-    tips = np.array([state.u[-1] for state, _ in vc.march(problem, scheme=vc.Midpoint(), dt=dt, steps=steps)])
+    problem = beam_problem(
+        body, elements, normal_force=lambda t: FORCE, friction=vc.Coulomb(MU), start=start
+    )
+    tips = np.array(
+        [state.u[-1] for state, _ in vc.march(problem, scheme=vc.Midpoint(), dt=dt, steps=steps)]
+    )
     apart = float(np.max(np.abs(tips - law["u_tip"][1:])))
     runs = {eps: algorithm(beam.RegularisedFriction(eps)).history for eps in EPS}
     errors = np.array([np.max(np.abs(run["u_tip"] - law["u_tip"])) for run in runs.values()])
     stuck = int(np.sum(law["slip"][1:] == 0.0))
-    print(f"\nThe friction inequality, mu = {MU:g}, r_n = {FORCE:g} N: {stuck} of {steps} steps stick; "
-          f"two routes differ by {apart:.1e} m")
+    print(
+        f"\nThe friction inequality, mu = {MU:g}, r_n = {FORCE:g} N: {stuck} of {steps} steps stick; "
+        f"two routes differ by {apart:.1e} m"
+    )
     for eps, error in zip(EPS, errors, strict=True):
         print(f"  eps = {eps:g} m: the tip differs by {error:.2e} m")
     shown = {f"eps = {eps:g} m": (run["t"], run["u_tip"]) for eps, run in list(runs.items())[:3]}
@@ -112,17 +165,32 @@ def exact(count: int, dt: float, out: Path) -> dict[str, float]:
 def rubbing(count: int, dt: float, out: Path, progress: bool) -> dict[str, float]:
     """Run rod and beam as one contact problem, with impulses on velocities: their forces do not ring."""
     problem = rubbing_problem(
-        ROD, beam.TimoshenkoBeam(viscosity=VISCOSITIES[0]), beam.Elements(count), friction=vc.Coulomb(MU),
+        ROD,
+        beam.TimoshenkoBeam(viscosity=VISCOSITIES[0]),
+        beam.Elements(count),
+        friction=vc.Coulomb(MU),
         start=published_start(),
     )
     solution = vc.simulate(
-        problem, scheme=vc.MoreauJean(), dt=dt, t_end=3.0, out=out / "rod_and_beam", progress=progress,
+        problem,
+        scheme=vc.MoreauJean(),
+        dt=dt,
+        t_end=3.0,
+        out=out / "rod_and_beam",
+        progress=progress,
         record=(vc.Energy(), vc.Contact(), vc.Probe({"tip": (5.0, 0.0)})),
     )
     print(f"\nRod and beam\n{solution.summary()}")
-    plot_rubbing(solution.history, out / "rod_and_beam.png", mu=MU, gap=ROD.gap, title="The rod drives the friction")
+    plot_rubbing(
+        solution.history,
+        out / "rod_and_beam.png",
+        mu=MU,
+        gap=ROD.gap,
+        title="The rod drives the friction",
+    )
     return {
-        "rubbing certificate": solution.facts["worst_certificate"], "rubbing defect": solution.facts["energy_defect"],
+        "rubbing certificate": solution.facts["worst_certificate"],
+        "rubbing defect": solution.facts["energy_defect"],
         "friction loss": float(solution.history["loss_friction"][-1]),
     }
 

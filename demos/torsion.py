@@ -16,7 +16,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
+sys.path.insert(
+    0, str(Path(__file__).resolve().parents[1])
+)  # run from the source tree without installing
 
 import dolfinx
 import numpy as np
@@ -49,7 +51,9 @@ def section(comm: Any, cells: int, disk: bool) -> Any:
 
 def distance(x: Any, disk: bool) -> Any:
     """Return the distance to the boundary."""
-    return np.maximum(1.0 - (np.hypot(x[0], x[1]) if disk else np.maximum(np.abs(x[0]), np.abs(x[1]))), 0.0)
+    return np.maximum(
+        1.0 - (np.hypot(x[0], x[1]) if disk else np.maximum(np.abs(x[0]), np.abs(x[1]))), 0.0
+    )
 
 
 class Bar:
@@ -87,7 +91,9 @@ def relaxed(cells: int, w: float, sweeps: int = 4000) -> Any:
         before = u.copy()
         for colour in (0, 1):
             mean = np.zeros_like(u)
-            mean[1:-1, 1:-1] = 0.25 * (u[2:, 1:-1] + u[:-2, 1:-1] + u[1:-1, 2:] + u[1:-1, :-2] + 2.0 * w * h**2)
+            mean[1:-1, 1:-1] = 0.25 * (
+                u[2:, 1:-1] + u[:-2, 1:-1] + u[1:-1, 2:] + u[1:-1, :-2] + 2.0 * w * h**2
+            )
             here = inner & ((i + j) % 2 == colour)
             u[here] = np.clip(u + omega * (mean - u), -bound, bound)[here]
         if np.max(np.abs(u - before)) < 1e-13:
@@ -105,8 +111,14 @@ def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
             torque, result = bar.twist(w)
             torques.setdefault(name, []).append(torque)
             n = len(bar.u.x.array) - bar.u.function_space.dofmap.index_map.num_ghosts
-            points, plastic = bar.u.function_space.tabulate_dof_coordinates()[:n], result.lambda_upper.x.array[:n] > 0.0
-            numbers[f"{name} {w:g}: torque"], numbers[f"{name} {w:g}: plastic"] = torque, float(result.active[1])
+            points, plastic = (
+                bar.u.function_space.tabulate_dof_coordinates()[:n],
+                result.lambda_upper.x.array[:n] > 0.0,
+            )
+            numbers[f"{name} {w:g}: torque"], numbers[f"{name} {w:g}: plastic"] = (
+                torque,
+                float(result.active[1]),
+            )
             numbers[f"{name} {w:g}: certificate"] = result.certificate.worst
             if disk:
                 r = np.hypot(points[:, 0], points[:, 1])
@@ -125,12 +137,16 @@ def main(quick: bool = False, out: Path = OUT) -> dict[str, float]:
         out.mkdir(parents=True, exist_ok=True)
         w, (elastic, _) = np.linspace(0.0, max(TWISTS), 200), square_elastic()
         early = w[w < 1.0]
-        plot_torsion(fields, {
-            "disk, exact": (w, disk_torque(w) / DISK_LIMIT),
-            "disk, computed": (TWISTS, np.array(torques["disk"]) / DISK_LIMIT),
-            "square, computed": (TWISTS, np.array(torques["square"]) / SQUARE_LIMIT),
-            "square, elastic": (early, elastic * early / SQUARE_LIMIT),
-        }, out / "torsion.png")
+        plot_torsion(
+            fields,
+            {
+                "disk, exact": (w, disk_torque(w) / DISK_LIMIT),
+                "disk, computed": (TWISTS, np.array(torques["disk"]) / DISK_LIMIT),
+                "square, computed": (TWISTS, np.array(torques["square"]) / SQUARE_LIMIT),
+                "square, elastic": (early, elastic * early / SQUARE_LIMIT),
+            },
+            out / "torsion.png",
+        )
         print(table(numbers))
         print(f"\nThe figure is in {out}.")
     comm.Barrier()
@@ -146,14 +162,23 @@ def against_relaxation(points: Any, values: Any, cells: int, w: float) -> float:
 
 def table(numbers: dict[str, float]) -> str:
     """Return torques beside the known ones."""
-    lines = [f"{'twist':>6} {'disk: torque':>13} {'exact':>9} {'error of u':>11} {'plastic from':>13} {'exact':>7} "
-             f"{'square: torque':>15} {'elastic':>9} {'limit':>7}"]
+    lines = [
+        f"{'twist':>6} {'disk: torque':>13} {'exact':>9} {'error of u':>11} {'plastic from':>13} {'exact':>7} "
+        f"{'square: torque':>15} {'elastic':>9} {'limit':>7}"
+    ]
     for w in TWISTS:
-        torque, error, inner = (numbers[f"disk {w:g}: {name}"] for name in ("torque", "error", "plastic from"))
+        torque, error, inner = (
+            numbers[f"disk {w:g}: {name}"] for name in ("torque", "error", "plastic from")
+        )
         zone = f"{inner:.4f}" if inner < 2.0 else "none"
-        lines.append(f"{w:>6g} {torque:>13.5f} {float(disk_torque(w)):>9.5f} {error:>11.1e} {zone:>13} {1.0 / w:>7.4f} "
-                     f"{numbers[f'square {w:g}: torque']:>15.5f} {square_elastic()[0] * w:>9.5f} {SQUARE_LIMIT:>7.4f}")
-    lines += ["", f"square at {DRAWN:g}, difference from projected relaxation: {numbers['relaxation']:.1e} of k a"]
+        lines.append(
+            f"{w:>6g} {torque:>13.5f} {float(disk_torque(w)):>9.5f} {error:>11.1e} {zone:>13} {1.0 / w:>7.4f} "
+            f"{numbers[f'square {w:g}: torque']:>15.5f} {square_elastic()[0] * w:>9.5f} {SQUARE_LIMIT:>7.4f}"
+        )
+    lines += [
+        "",
+        f"square at {DRAWN:g}, difference from projected relaxation: {numbers['relaxation']:.1e} of k a",
+    ]
     return "\n".join(lines)
 
 

@@ -16,7 +16,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
+sys.path.insert(
+    0, str(Path(__file__).resolve().parents[1])
+)  # run from the source tree without installing
 
 import numpy as np
 from mpi4py import MPI
@@ -35,7 +37,9 @@ TOWER = vc.LinearElastic(E=1.5e9, nu=0.2, rho=500.0)  # a building seen as one b
 LAYER, HOUSE = (48.0, 16.0), (6.0, 18.0)  # width and height [m]
 MU = 0.6
 OUTCROP = vc.Ricker(amplitude=3.0, frequency=2.0)  # what a station on the rock would record [m/s²]
-DAMPING = vc.Rayleigh(alpha=0.0, beta=0.03 / (np.pi * 4.0))  # 3 % at 4 Hz; alpha would brake the rocking
+DAMPING = vc.Rayleigh(
+    alpha=0.0, beta=0.03 / (np.pi * 4.0)
+)  # 3 % at 4 Hz; alpha would brake the rocking
 DT, T_END = 2.5e-3, 3.0
 OUT = Path("results/tower_on_soil")
 
@@ -44,29 +48,49 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
     """Run all three stages (``quick``: cells of 2 m, 110 steps of 10 ms); return the key numbers."""
     comm = MPI.COMM_WORLD
     h, dt, t_end = (2.0, 1e-2, 1.1) if quick else (1.0, DT, T_END)
-    lower, upper = (BlockMesh(lengths=size, divisions=tuple(round(x / h) for x in size)) for size in (LAYER, HOUSE))
-    mesh, tags = fem.build_mesh(TwoBlocks(lower=lower, upper=upper, offset=(0.5 * (LAYER[0] - HOUSE[0]),)), comm)
+    lower, upper = (
+        BlockMesh(lengths=size, divisions=tuple(round(x / h) for x in size))
+        for size in (LAYER, HOUSE)
+    )
+    mesh, tags = fem.build_mesh(
+        TwoBlocks(lower=lower, upper=upper, offset=(0.5 * (LAYER[0] - HOUSE[0]),)), comm
+    )
     static, state, problem = stages(mesh, tags, dt)
     problem, start = fem.release(static, state, problem)
 
     middle, top = 0.5 * LAYER[0], LAYER[1]
-    points = {"base": (0.0, 0.0), "surface": (0.0, top), "foot": (middle, top), "roof": (middle, top + HOUSE[1])}
+    points = {
+        "base": (0.0, 0.0),
+        "surface": (0.0, top),
+        "foot": (middle, top),
+        "roof": (middle, top + HOUSE[1]),
+    }
     solution = vc.simulate(
-        problem, dt=dt, t_end=t_end, state=start, out=out, progress=progress,
+        problem,
+        dt=dt,
+        t_end=t_end,
+        state=start,
+        out=out,
+        progress=progress,
         record=(vc.Energy(), vc.Contact(), vc.Probe(points, velocity=True, acceleration=True)),
         fields=fem.XDMF(every=20),
     )
     history = solution.history
     peak = {name: float(np.abs(history[f"a_x_{name}"]).max()) for name in points}
     numbers = {
-        "outcrop": OUTCROP.amplitude, **peak, "uplift": float(history["contact_uplift"].max()),
-        "slip": float(np.nanmax(history["contact_max_slip"])), "worst": solution.facts["worst_certificate"],
+        "outcrop": OUTCROP.amplitude,
+        **peak,
+        "uplift": float(history["contact_uplift"].max()),
+        "slip": float(np.nanmax(history["contact_max_slip"])),
+        "worst": solution.facts["worst_certificate"],
     }
     if comm.rank == 0:
         print(f"{solution.summary()}\n\nLargest horizontal acceleration [m/s²]:")
         print(f"  outcrop {OUTCROP.amplitude:.2f} (upgoing wave {0.5 * OUTCROP.amplitude:.2f})")
         print("".join(f"  {name} {value:.2f}\n" for name, value in peak.items()))
-        print(f"Largest share of the foot that is open {numbers['uplift']:.2f}, slip {1e3 * numbers['slip']:.1f} mm")
+        print(
+            f"Largest share of the foot that is open {numbers['uplift']:.2f}, slip {1e3 * numbers['slip']:.1f} mm"
+        )
         draw(history, out / "motions.png")
         plot_energy(history, out / "energy.png")
         plot_certificate(history, out / "certificate.png")
@@ -74,7 +98,9 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
     return numbers
 
 
-def stages(mesh: Any, tags: Any, dt: float) -> tuple[vc.ContactProblem, vc.State, vc.ContactProblem]:
+def stages(
+    mesh: Any, tags: Any, dt: float
+) -> tuple[vc.ContactProblem, vc.State, vc.ContactProblem]:
     """Return (gravity stage, its state, dynamic problem before the release)."""
     cells = [(tags["lower"], SOIL), (tags["upper"], TOWER)]
     sides = [tags["lower_left"], tags["lower_right"]]
@@ -85,7 +111,10 @@ def stages(mesh: Any, tags: Any, dt: float) -> tuple[vc.ContactProblem, vc.State
     dynamic = fem.assemble(mesh, cells, dashpots=[base, *free_field], damping=DAMPING)
     static, problem = (
         vc.ContactProblem(
-            system, fem.contact_pair(system, tags["upper_bottom"], tags["lower_top"], matching=fem.DualMortar()),
+            system,
+            fem.contact_pair(
+                system, tags["upper_bottom"], tags["lower_top"], matching=fem.DualMortar()
+            ),
             friction=vc.Coulomb(MU),
         )
         for system in (vc.with_weight(gravity), vc.with_weight(dynamic))
@@ -100,13 +129,20 @@ def draw(history: Any, path: Path) -> None:
     t = history["t"]
     figure = Figure(figsize=(8.0, 7.0), layout="constrained")
     upper, middle, lower = figure.subplots(3, 1, sharex=True)
-    upper.plot(t, [OUTCROP.acceleration(s) for s in t], color="0.6", label="outcrop (twice the upgoing wave)")
+    upper.plot(
+        t,
+        [OUTCROP.acceleration(s) for s in t],
+        color="0.6",
+        label="outcrop (twice the upgoing wave)",
+    )
     for name, style in (("base", "-"), ("surface", "--")):
         upper.plot(t, history[f"a_x_{name}"], style, label=f"{name}, at the side")
     upper.set_ylabel("a_x [m/s²]")
     upper.legend()
     for name in ("foot", "roof"):
-        middle.plot(t, 1e3 * (history[f"u_x_{name}"] - history["u_x_surface"]), label=f"{name} less surface")
+        middle.plot(
+            t, 1e3 * (history[f"u_x_{name}"] - history["u_x_surface"]), label=f"{name} less surface"
+        )
     middle.set_ylabel("u_x [mm]")
     middle.legend()
     lower.plot(t, history["contact_uplift"], color="k")

@@ -18,7 +18,9 @@ from argparse import ArgumentParser
 from collections.abc import Sequence
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
+sys.path.insert(
+    0, str(Path(__file__).resolve().parents[1])
+)  # run from the source tree without installing
 
 from mpi4py import MPI
 
@@ -36,23 +38,34 @@ from vi_contact.solvers.volume.snes import ReducedNewton
 
 # Parameters ----------------------------------------------------------------------------------------------------------
 WALL = wall_model.Wall(height=9.0, width=6.0, thickness=0.20, divisions=(8, 12))  # [m]
-CASES = {"a": "Fig. 4: three possible contact points", "b": "Fig. 5: eleven possible contact points"}
+CASES = {
+    "a": "Fig. 4: three possible contact points",
+    "b": "Fig. 5: eleven possible contact points",
+}
 AMPLITUDE = 1.0  # of the ground acceleration [m/s²]
 STEPS = 400
 REFINED = 16  # the comparison of schemes divides the seed's dt by this
 FRAMES_EVERY = 10  # steps between ParaView frames
-INSTANTS = (10, 30)  # steps of case b at which the wall is drawn: away from the ground, and against it
+INSTANTS = (
+    10,
+    30,
+)  # steps of case b at which the wall is drawn: away from the ground, and against it
 OUT = Path("results/wall")
 BUILT_IN = {  # case -> settings of the case that ships with the package, which is case b
-    "a": ["contact.points=[[6.0, 3.0], [6.0, 5.25], [6.0, 7.5]]"], "b": [], "face": ["contact.points="],
-    "bilateral": ["contact.held=true"], "free": ["contact="],
+    "a": ["contact.points=[[6.0, 3.0], [6.0, 5.25], [6.0, 7.5]]"],
+    "b": [],
+    "face": ["contact.points="],
+    "bilateral": ["contact.held=true"],
+    "free": ["contact="],
 }
 
 
 def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[str, float]:
     """Run all cases (``quick``: 40 steps); return the key numbers, displacements in metres."""
     comm = MPI.COMM_WORLD
-    model = wall_model.build(WALL, comm, base_inertia="catalogue")  # as the reference numbers of the figures
+    model = wall_model.build(
+        WALL, comm, base_inertia="catalogue"
+    )  # as the reference numbers of the figures
     shaking = model.harmonic(AMPLITUDE)
     dt = model.time_step()
     steps = 40 if quick else STEPS
@@ -60,32 +73,56 @@ def main(quick: bool = False, out: Path = OUT, progress: bool = True) -> dict[st
 
     # the linear wall, to compare with
     linear = vc.simulate(
-        model.problem("free", excitation=shaking), scheme=vc.ZienkiewiczWoodTaylor(phi=0.5), solver=vc.Condensed(),
-        dt=dt, steps=steps, record=(vc.Probe(model.probes()),), progress=False,
+        model.problem("free", excitation=shaking),
+        scheme=vc.ZienkiewiczWoodTaylor(phi=0.5),
+        solver=vc.Condensed(),
+        dt=dt,
+        steps=steps,
+        record=(vc.Probe(model.probes()),),
+        progress=False,
     )
 
     for case, title in CASES.items():
         problem = model.problem(case, excitation=shaking, impact=vc.Inelastic())
-        routes = vc.CrossChecked(vc.Condensed(), [Volume(method=ReducedNewton())])  # two routes to every step
+        routes = vc.CrossChecked(
+            vc.Condensed(), [Volume(method=ReducedNewton())]
+        )  # two routes to every step
         solution = vc.simulate(
-            problem, scheme=vc.ZienkiewiczWoodTaylor(phi=0.5), solver=routes, dt=dt, steps=steps,
+            problem,
+            scheme=vc.ZienkiewiczWoodTaylor(phi=0.5),
+            solver=routes,
+            dt=dt,
+            steps=steps,
             record=(vc.Energy(), vc.Contact(), vc.Probe(model.probes())),
-            fields=fem.XDMF(every=FRAMES_EVERY), cross_check=routes, out=out / case, progress=progress,
+            fields=fem.XDMF(every=FRAMES_EVERY),
+            cross_check=routes,
+            out=out / case,
+            progress=progress,
         )
         top = solution.history["u_x_12"]
         numbers |= {
-            f"{case}_top_min": top.min(), f"{case}_top_max": top.max(), f"{case}_cross_check": routes.worst,
+            f"{case}_top_min": top.min(),
+            f"{case}_top_max": top.max(),
+            f"{case}_cross_check": routes.worst,
             f"{case}_certificate": solution.facts["worst_certificate"],
             f"{case}_energy_defect": solution.facts["energy_defect"],
         }
         contact = problem.surface.whole()
         if comm.rank == 0:
             print(f"\nCase {case}. {title}\n{solution.summary()}")
-            draw_histories(solution.history, contact, out / case, title=title, reference=linear.history,
-                           unilateral=[str(number) for number in wall_model.CASES[case]])
+            draw_histories(
+                solution.history,
+                contact,
+                out / case,
+                title=title,
+                reference=linear.history,
+                unilateral=[str(number) for number in wall_model.CASES[case]],
+            )
         comm.Barrier()  # nobody leaves before the figures are there
     if comm.rank == 0:
-        numbers["magnified"] = plot_frames(out / "b", WALL, [dt * k for k in INSTANTS], out / "frames.png")
+        numbers["magnified"] = plot_frames(
+            out / "b", WALL, [dt * k for k in INSTANTS], out / "frames.png"
+        )
         print(f"\nframes.png: displacements are drawn {numbers['magnified']:g} times larger")
     numbers["decomposition"] = draw_step(model, steps, out)
     for case in CASES:
@@ -100,7 +137,9 @@ def draw_step(model: wall_model.WallModel, steps: int, out: Path) -> float:
     loads and one with its reactions; return by how much their sum misses the answer of the step, relatively."""
     problem, most, pressed = model.problem("b", excitation=model.harmonic(AMPLITUDE)), -1.0, None
     scheme, dt = vc.ZienkiewiczWoodTaylor(phi=0.5), model.time_step()
-    for state, report in vc.march(problem, scheme=scheme, solver=vc.Condensed(), dt=dt, steps=steps):
+    for state, report in vc.march(
+        problem, scheme=scheme, solver=vc.Condensed(), dt=dt, steps=steps
+    ):
         force = float(problem.surface.everywhere(state.r_n).sum())
         if force > most:
             most, pressed = force, report
@@ -111,25 +150,44 @@ def draw_step(model: wall_model.WallModel, steps: int, out: Path) -> float:
     return MPI.COMM_WORLD.bcast(None if found is None else found.defect)
 
 
-def compare_schemes(model: wall_model.WallModel, case: str, steps: int, refined: int, figure: Path) -> None:
+def compare_schemes(
+    model: wall_model.WallModel, case: str, steps: int, refined: int, figure: Path
+) -> None:
     """Run the source's scheme and impact rule beside the default scheme, which needs no rule and does not ring."""
     runs = {}
     for name, impact, finer in (
         ("source's rule, its dt", vc.Inelastic(), 1),
         (f"source's rule, dt/{refined}", vc.Inelastic(), refined),
-        (f"default scheme, dt/{refined}", None, refined),  # no impact law, no scheme: trapezoidal, massless
+        (
+            f"default scheme, dt/{refined}",
+            None,
+            refined,
+        ),  # no impact law, no scheme: trapezoidal, massless
     ):
         problem = model.problem(case, excitation=model.harmonic(AMPLITUDE), impact=impact)
         runs[name] = vc.simulate(
-            problem, dt=model.time_step() / finer, steps=steps * finer, progress=False,
+            problem,
+            dt=model.time_step() / finer,
+            steps=steps * finer,
+            progress=False,
             record=(vc.Energy(), vc.Contact(), vc.Probe({"12": WALL.point(12)})),
         ).history
-        runs[name] = {**runs[name], "energy": runs[name]["energy_kinetic"] + runs[name]["energy_strain"]}
+        runs[name] = {
+            **runs[name],
+            "energy": runs[name]["energy_kinetic"] + runs[name]["energy_strain"],
+        }
     if MPI.COMM_WORLD.rank == 0:
         quantities = (
-            ("u_x_12", "u of the top", "m"), ("contact_resultant", "contact force", "N"), ("energy", "energy", "J"),
+            ("u_x_12", "u of the top", "m"),
+            ("contact_resultant", "contact force", "N"),
+            ("energy", "energy", "J"),
         )
-        plot_runs(runs, quantities, figure, title=f"Wall, case {case}: the source's rule and the default scheme")
+        plot_runs(
+            runs,
+            quantities,
+            figure,
+            title=f"Wall, case {case}: the source's rule and the default scheme",
+        )
     MPI.COMM_WORLD.Barrier()
 
 

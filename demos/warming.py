@@ -17,7 +17,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from the source tree without installing
+sys.path.insert(
+    0, str(Path(__file__).resolve().parents[1])
+)  # run from the source tree without installing
 
 import numpy as np
 from mpi4py import MPI
@@ -42,15 +44,25 @@ OUT = Path("results/warming")
 def slowly(comm: MPI.Comm) -> list[tuple[float, float, float, float]]:
     """Return (warming [K], pressure [Pa] by the condensed route, by the whole body, by the closed form)."""
     mesh, tags = fem.build_mesh(meshes.BlockMesh(lengths=(1.0, HEIGHT), divisions=(4, 12)), comm)
-    sides = [fem.Prescribed(tags["bottom"], components=(1,)), fem.Prescribed(tags["left"], components=(0,))]
+    sides = [
+        fem.Prescribed(tags["bottom"], components=(1,)),
+        fem.Prescribed(tags["left"], components=(0,)),
+    ]
     heat = fem.InitialStrain(ALPHA, history=lambda t: t)  # t counts the kelvins
     system = fem.assemble(mesh, CONCRETE, prescribed=sides, loads=heat)
     ceiling = core.HalfSpace(point=(0.0, HEIGHT + GAP), normal=(0.0, -1.0))
-    problem = core.ContactProblem(system, fem.contact_surface(system, tags["top"], obstacle=ceiling))
+    problem = core.ContactProblem(
+        system, fem.contact_surface(system, tags["top"], obstacle=ceiling)
+    )
     warmings, found = [0.25 * WARMER * k for k in range(1, 5)], []
     for solver in (vc.Condensed(), Volume()):
         states = vc.quasi_static(problem, warmings, solver=solver)
-        found.append([float(problem.surface.everywhere(one.r_n / problem.surface.weights).mean()) for one in states])
+        found.append(
+            [
+                float(problem.surface.everywhere(one.r_n / problem.surface.weights).mean())
+                for one in states
+            ]
+        )
     return list(zip(warmings, *found, map(pressure, warmings), strict=True))
 
 
@@ -60,7 +72,9 @@ def pressure(dT: float) -> float:
     return max(0.0, E / (1.0 - nu**2) * ((1.0 + nu) * ALPHA * dT - GAP / HEIGHT))
 
 
-def at_once(comm: MPI.Comm, cells: int) -> tuple[dict[str, tuple[float, float]], tuple[Any, Any, Any]]:
+def at_once(
+    comm: MPI.Comm, cells: int
+) -> tuple[dict[str, tuple[float, float]], tuple[Any, Any, Any]]:
     """Return (computed, exact) of a bar whose right end has the gap alpha dT L to a wall, and its histories: t over
     the crossing T = L/c, pushes of the support and of the wall over their exact size."""
     strain, speed = ALPHA * WARMER, float(np.sqrt(BAR.E / BAR.rho))
@@ -70,8 +84,15 @@ def at_once(comm: MPI.Comm, cells: int) -> tuple[dict[str, tuple[float, float]],
     wall = core.HalfSpace(point=(LENGTH * (1.0 + strain),), normal=(-1.0,))
     problem = core.ContactProblem(system, fem.contact_surface(system, tags["right"], obstacle=wall))
     record = (vc.Energy(), vc.Contact(), fem.Reactions("support", tags["left"], (0.0,)))
-    h = vc.simulate(problem, scheme=vc.Midpoint(), solver=vc.Condensed(), dt=0.5 * crossing / cells,
-                    t_end=2.9 * crossing, record=record, progress=False).history
+    h = vc.simulate(
+        problem,
+        scheme=vc.Midpoint(),
+        solver=vc.Condensed(),
+        dt=0.5 * crossing / cells,
+        t_end=2.9 * crossing,
+        record=record,
+        progress=False,
+    ).history
     t, contact, support = h["t"] / crossing, -h["contact_force_x"], h["reaction_x_support"]
 
     def mean(values: np.ndarray, begin: float) -> float:
@@ -83,7 +104,10 @@ def at_once(comm: MPI.Comm, cells: int) -> tuple[dict[str, tuple[float, float]],
         "and from T to 2T [N]": (mean(support, 1.0), -push),
         "push on the wall from T to 2T [N]": (mean(contact, 1.0), push),
         "its impulse [N s]": (impulse, push * crossing),
-        "strain energy at the start [J]": (float(h["energy_strain"][0]), 0.5 * BAR.E * strain**2 * LENGTH),
+        "strain energy at the start [J]": (
+            float(h["energy_strain"][0]),
+            0.5 * BAR.E * strain**2 * LENGTH,
+        ),
     }
     return numbers, (t, support / push, contact / push)
 
@@ -93,7 +117,9 @@ def torn(comm: MPI.Comm) -> dict[str, tuple[float, float]]:
     mesh, tags = fem.build_mesh(meshes.BlockMesh(lengths=(LENGTH,), divisions=(8,)), comm)
     h = LENGTH / 8.0
     half = 0.5 * LENGTH
-    layer = fem.Cells.where("layer", mesh, lambda x: (x[0] > half - 0.1 * h) & (x[0] < half + 1.1 * h))
+    layer = fem.Cells.where(
+        "layer", mesh, lambda x: (x[0] > half - 0.1 * h) & (x[0] < half + 1.1 * h)
+    )
     slip, ends = fem.InitialStrain(JUMP / h, cells=layer), {"free": [], "held": [tags["right"]]}
     found = {}
     for name, more in ends.items():
@@ -115,12 +141,17 @@ def main(quick: bool = False, out: Path = OUT) -> dict[str, tuple[float, float]]
     comm = MPI.COMM_WORLD
     pressures = slowly(comm)
     numbers = {f"pressure at {dT:g} K [Pa]": (one, exact) for dT, one, _, exact in pressures}
-    numbers |= {f"pressure at {dT:g} K, whole body [Pa]": (other, exact) for dT, _, other, exact in pressures}
+    numbers |= {
+        f"pressure at {dT:g} K, whole body [Pa]": (other, exact)
+        for dT, _, other, exact in pressures
+    }
     waves, histories = at_once(comm, 50 if quick else CELLS)
     numbers |= waves | torn(comm)
     if comm.rank == 0:
         out.mkdir(parents=True, exist_ok=True)
-        plot_warming([(dT, one) for dT, one, _, _ in pressures], pressure, histories, out / "warming.png")
+        plot_warming(
+            [(dT, one) for dT, one, _, _ in pressures], pressure, histories, out / "warming.png"
+        )
         print(f"{'':<36} {'computed':>16} {'closed form':>16}")
         for name, (computed, exact) in numbers.items():
             print(f"{name:<36} {computed:>16.8g} {exact:>16.8g}")

@@ -29,7 +29,9 @@ class Module:
     @property
     def folder(self) -> str:
         """The dotted path of the package that relative imports begin from."""
-        return self.path if file_of(self.path).name == "__init__.py" else self.path.rpartition(".")[0]
+        return (
+            self.path if file_of(self.path).name == "__init__.py" else self.path.rpartition(".")[0]
+        )
 
     @cached_property
     def lines(self) -> list[bytes]:
@@ -64,7 +66,13 @@ def module(path: str) -> Module:
 
 def targets(node: ast.stmt) -> list[str]:
     """Return the names that an assignment binds."""
-    given = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
+    given = (
+        node.targets
+        if isinstance(node, ast.Assign)
+        else [node.target]
+        if isinstance(node, ast.AnnAssign)
+        else []
+    )
     return [one.id for one in given if isinstance(one, ast.Name)]
 
 
@@ -79,7 +87,9 @@ def homes(where: Module) -> dict[str, str]:
     for node in where.tree.body:
         if isinstance(node, ast.ImportFrom) and node.level:
             above = where.folder.split(".") if where.folder else []
-            base = above[: len(above) - node.level + 1] + (node.module.split(".") if node.module else [])
+            base = above[: len(above) - node.level + 1] + (
+                node.module.split(".") if node.module else []
+            )
             found.update({one.asname or one.name: ".".join(base) for one in node.names})
     for part, names in contents(where).items():
         found.update(dict.fromkeys(names, f"{where.path}.{part}".lstrip(".")))
@@ -99,7 +109,11 @@ def contents(where: Module) -> dict[str, list[str]]:
     for node in ast.parse(stub.read_text(encoding="utf-8")).body if stub.is_file() else ():
         if isinstance(node, ast.ImportFrom) and node.module:
             names = [one.name for one in node.names]
-            part = public(module(f"{where.path}.{node.module}".lstrip("."))) if names == ["*"] else names
+            part = (
+                public(module(f"{where.path}.{node.module}".lstrip(".")))
+                if names == ["*"]
+                else names
+            )
             found.setdefault(node.module, []).extend(part)
     return found
 
@@ -111,7 +125,9 @@ def public(where: Module) -> list[str]:
     elif (listed := assigned(where, "__all__")) is not None:
         names = set(ast.literal_eval(listed))
     else:
-        made = [node for node in where.tree.body if isinstance(node, Def) and ast.get_docstring(node)]
+        made = [
+            node for node in where.tree.body if isinstance(node, Def) and ast.get_docstring(node)
+        ]
         names = {node.name for node in made if not node.name.startswith("_")}
     return sorted(names, key=lambda name: (name.lower(), name))
 
@@ -123,7 +139,9 @@ def definition(where: Module, name: str) -> tuple[Module, ast.stmt]:
             return where, node
     home = homes(where).get(name)
     if home is None:
-        raise SystemExit(f"docs/make_api.py does not find {name} in vi_contact.{where.path}: is it spelt as there?")
+        raise SystemExit(
+            f"docs/make_api.py does not find {name} in vi_contact.{where.path}: is it spelt as there?"
+        )
     return definition(module(home), name)
 
 
@@ -140,7 +158,10 @@ def parameters(where: Module, given: ast.arguments, skip: int) -> list[str]:
     found = [written(arg, default) for arg, default in zip(plain, defaults, strict=True)][skip:]
     if given.vararg or given.kwonlyargs:
         found.append(written(given.vararg, stars="*") if given.vararg else "*")
-    found += [written(arg, default) for arg, default in zip(given.kwonlyargs, given.kw_defaults, strict=True)]
+    found += [
+        written(arg, default)
+        for arg, default in zip(given.kwonlyargs, given.kw_defaults, strict=True)
+    ]
     return found + ([written(given.kwarg, stars="**")] if given.kwarg else [])
 
 
@@ -173,7 +194,11 @@ def fields(where: Module, node: ast.ClassDef) -> dict[str, str]:
             if isinstance(above, ast.ClassDef):
                 found.update(fields(there, above))
     for one in node.body:
-        if isinstance(one, ast.AnnAssign) and isinstance(one.target, ast.Name) and not one.target.id.startswith("_"):
+        if (
+            isinstance(one, ast.AnnAssign)
+            and isinstance(one.target, ast.Name)
+            and not one.target.id.startswith("_")
+        ):
             kind, given = where.annotation(one.annotation), default(where, one.value)
             if given == "" or kind.startswith("ClassVar"):
                 found.pop(one.target.id, None)
@@ -187,8 +212,14 @@ def constructor(where: Module, node: ast.ClassDef) -> str:
     for one in node.body:
         if isinstance(one, ast.FunctionDef) and one.name == "__init__":
             return f"{node.name}({', '.join(parameters(where, one.args, 1))})"
-    decorator = next((where.source(one) for one in node.decorator_list if "dataclass" in where.source(one)), "")
-    given = list(fields(where, node).values()) if decorator or "NamedTuple" in map(where.source, node.bases) else []
+    decorator = next(
+        (where.source(one) for one in node.decorator_list if "dataclass" in where.source(one)), ""
+    )
+    given = (
+        list(fields(where, node).values())
+        if decorator or "NamedTuple" in map(where.source, node.bases)
+        else []
+    )
     if given and "kw_only=True" in decorator:
         given.insert(0, "*")
     return f"{node.name}({', '.join(given)})" if given else node.name
@@ -197,7 +228,9 @@ def constructor(where: Module, node: ast.ClassDef) -> str:
 def methods(node: ast.ClassDef) -> Iterator[ast.FunctionDef]:
     """Yield the public methods and properties of a class; a call counts as one."""
     for one in node.body:
-        if isinstance(one, ast.FunctionDef) and (not one.name.startswith("_") or one.name == "__call__"):
+        if isinstance(one, ast.FunctionDef) and (
+            not one.name.startswith("_") or one.name == "__call__"
+        ):
             yield one
 
 

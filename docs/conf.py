@@ -19,11 +19,27 @@ from vi_contact import __version__
 
 project, author, version = "vi_contact", "The vi_contact developers", __version__
 copyright = f"{author}. This page describes version {version}."  # at the foot of every page
-extensions = ["myst_nb", "sphinx.ext.mathjax", "sphinx-mathjax-offline", "sphinx_copybutton", "sphinx_reredirects"]
+extensions = [
+    "myst_nb",
+    "sphinx.ext.mathjax",
+    "sphinx-mathjax-offline",
+    "sphinx_copybutton",
+    "sphinx_reredirects",
+]
 source_suffix = {".md": "myst-nb", ".myst": "myst-nb"}
 root_doc = "docs/index"
-include_patterns = ["docs/**", "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SUPPORT.md", "SECURITY.md"]
-exclude_patterns = [".*", *(path.name for path in ROOT.iterdir() if path.is_dir() and path.name != "docs")]
+include_patterns = [
+    "docs/**",
+    "README.md",
+    "CONTRIBUTING.md",
+    "CHANGELOG.md",
+    "SUPPORT.md",
+    "SECURITY.md",
+]
+exclude_patterns = [
+    ".*",
+    *(path.name for path in ROOT.iterdir() if path.is_dir() and path.name != "docs"),
+]
 add_module_names = False
 highlight_language = "none"
 
@@ -34,10 +50,15 @@ nb_execution_timeout = 300
 nb_execution_raise_on_error = True
 nb_merge_streams = True
 nb_output_stderr = "show"  # vi_contact warns by logging, which readers must see; what libraries warn of is for authors:
-os.environ["PYTHONWARNINGS"] = "ignore::DeprecationWarning,ignore::FutureWarning,ignore::UserWarning"
+os.environ["PYTHONWARNINGS"] = (
+    "ignore::DeprecationWarning,ignore::FutureWarning,ignore::UserWarning"
+)
 _sources = sorted(file for folder in (PACKAGE, ROOT / "demos") for file in folder.rglob("*.py"))
 nb_execution_cache_path = str(
-    ROOT / "build" / "notebooks" / sha256(b"".join(file.read_bytes() for file in _sources)).hexdigest()[:12]
+    ROOT
+    / "build"
+    / "notebooks"
+    / sha256(b"".join(file.read_bytes() for file in _sources)).hexdigest()[:12]
 )
 
 html_theme = "furo"
@@ -59,7 +80,13 @@ def link_names(app: Sphinx, document: nodes.document) -> None:
         found = _NAME.match(node.astext())
         if found and not isinstance(node.parent, nodes.reference | pending_xref | nodes.title):
             target = "vi_contact." + found[0].removeprefix("vc.")
-            link = pending_xref(refdomain="py", reftype="obj", reftarget=target, refdoc=app.env.docname, refwarn=False)
+            link = pending_xref(
+                refdomain="py",
+                reftype="obj",
+                reftarget=target,
+                refdoc=app.env.docname,
+                refwarn=False,
+            )
             node.replace_self(link)
             link += node
 

@@ -34,8 +34,21 @@ from api_source import (
 
 PAGE = ROOT / "docs" / "reference" / "api.md"
 ROOMS = (
-    "core", "laws", "fem", "solvers", "vi", "schemes", "run", "soil", "engineering", "engineering.checks",
-    "ground_motion", "bem", "meshes", "studies", "plots",
+    "core",
+    "laws",
+    "fem",
+    "solvers",
+    "vi",
+    "schemes",
+    "run",
+    "soil",
+    "engineering",
+    "engineering.checks",
+    "ground_motion",
+    "bem",
+    "meshes",
+    "studies",
+    "plots",
 )
 CONTRACT = (
     ("core.step", ("Scheme", "Solver", "PreparedSolver", "Recorder")),
@@ -85,7 +98,11 @@ def below(where: Module, node: ast.stmt) -> str:
     """Return the text that stands below an assignment and explains it, or nothing."""
     after = where.tree.body[where.tree.body.index(node) + 1 :]
     value = after[0].value if after and isinstance(after[0], ast.Expr) else None
-    return inspect.cleandoc(value.value) if isinstance(value, ast.Constant) and isinstance(value.value, str) else ""
+    return (
+        inspect.cleandoc(value.value)
+        if isinstance(value, ast.Constant) and isinstance(value.value, str)
+        else ""
+    )
 
 
 def first_paragraph(where: Module, node: Def) -> str:
@@ -108,14 +125,26 @@ def entry(where: Module, name: str) -> str:
     if not isinstance(node, Def):
         value = there.source(node.value)  # type: ignore[attr-defined]
         told = f"is `{value}`." if len(value) < 60 else ""
-        return " ".join(filter(None, [f"- **`{name}`**", told, re.sub(r"\s+", " ", below(there, node))]))
+        return " ".join(
+            filter(None, [f"- **`{name}`**", told, re.sub(r"\s+", " ", below(there, node))])
+        )
     call = constructor(there, node) if isinstance(node, ast.ClassDef) else function(there, node)
-    has = [one.name for one in methods(node)] if isinstance(node, ast.ClassDef) and name not in PROMISED else []
-    more = f" It has {', '.join(f'`.{one}`' for one in has if one != '__call__')}." if set(has) - {"__call__"} else ""
+    has = (
+        [one.name for one in methods(node)]
+        if isinstance(node, ast.ClassDef) and name not in PROMISED
+        else []
+    )
+    more = (
+        f" It has {', '.join(f'`.{one}`' for one in has if one != '__call__')}."
+        if set(has) - {"__call__"}
+        else ""
+    )
     return f"- **`{call}`** {first_paragraph(there, node)}{more}"
 
 
-def listed(classes: Iterable[tuple[str, Iterable[str]]]) -> Iterator[tuple[Module, ast.ClassDef, str]]:
+def listed(
+    classes: Iterable[tuple[str, Iterable[str]]],
+) -> Iterator[tuple[Module, ast.ClassDef, str]]:
     """Yield the module, the definition and the heading of every class of a list."""
     for path, names in classes:
         for name in names:
@@ -150,7 +179,11 @@ def short_names() -> Iterator[str]:
 def room(name: str) -> Iterator[str]:
     """Yield the names of one room."""
     where = module(name)
-    told = re.sub(r"(?ms)\n^>>> .*", lambda example: f"\n\n```pycon{example[0]}\n```", documentation(where.tree))
+    told = re.sub(
+        r"(?ms)\n^>>> .*",
+        lambda example: f"\n\n```pycon{example[0]}\n```",
+        documentation(where.tree),
+    )
     yield f"## `vi_contact.{name}`\n\n{told}\n"
     yield from (entry(where, one) for one in public(where))
     yield ""
@@ -164,8 +197,14 @@ def page() -> str:
 
 def stub(where: Module) -> str:
     """Return the stub of a package as it should be: its imports in order, and ``__all__`` of what they name."""
-    imports = [line for line in stub_of(where).read_text(encoding="utf-8").splitlines() if line.startswith("from ")]
-    return "\n".join([*STUB, *sorted(imports), "", f"__all__: list[str] = {sorted(public(where))}", ""])
+    imports = [
+        line
+        for line in stub_of(where).read_text(encoding="utf-8").splitlines()
+        if line.startswith("from ")
+    ]
+    return "\n".join(
+        [*STUB, *sorted(imports), "", f"__all__: list[str] = {sorted(public(where))}", ""]
+    )
 
 
 def files() -> Iterator[tuple[Path, str]]:
@@ -184,7 +223,10 @@ def main(arguments: list[str]) -> int:
             path.write_text(text, encoding="utf-8")
         elif not path.is_file() or path.read_text(encoding="utf-8") != text:
             name = path.relative_to(ROOT).as_posix()
-            print(f"{name} is not what the docstrings say: run python3 docs/make_api.py", file=sys.stderr)
+            print(
+                f"{name} is not what the docstrings say: run python3 docs/make_api.py",
+                file=sys.stderr,
+            )
             return 1
     return 0
 

@@ -84,7 +84,10 @@ def main() -> int:
     page = PAGE.read_text(encoding="utf-8")
     if "--check" in sys.argv[1:]:
         if written(page) != page:
-            print(f"{PAGE.name}: tables are not those of its entries: python3 docs/make_glossary.py", file=sys.stderr)
+            print(
+                f"{PAGE.name}: tables are not those of its entries: python3 docs/make_glossary.py",
+                file=sys.stderr,
+            )
             return 1
         return 0
     PAGE.write_text(written(page), encoding="utf-8")

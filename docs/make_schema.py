@@ -28,26 +28,48 @@ from vi_contact.studies.cases.vocabulary import words
 FILE = Path(__file__).resolve().parents[1] / "vi_contact" / "studies" / "cases" / "case.schema.json"
 DRAFT = "http://json-schema.org/draft-07/schema#"
 _PLAIN: Mapping[Any, Any] = {
-    float: {"type": ["number", "string"]}, int: {"type": ["integer", "string"]}, bool: {"type": "boolean"},
-    str: {"type": "string"}, HISTORY: {"type": "string"}, Expression: {"type": "string"},
-    FIELD: {"type": ["string", "array"]}, AT_START: {"type": "array"},
+    float: {"type": ["number", "string"]},
+    int: {"type": ["integer", "string"]},
+    bool: {"type": "boolean"},
+    str: {"type": "string"},
+    HISTORY: {"type": "string"},
+    Expression: {"type": "string"},
+    FIELD: {"type": ["string", "array"]},
+    AT_START: {"type": "array"},
 }
-_OWN_CLASS = {"type": "object", "properties": {"type": {"type": "string", "pattern": ":"}}, "required": ["type"]}
+_OWN_CLASS = {
+    "type": "object",
+    "properties": {"type": {"type": "string", "pattern": ":"}},
+    "required": ["type"],
+}
 _MATERIALS = {"type": "string", "description": "the NAME of [material.NAME]"}
 
 
 def text() -> str:
     """Return the schema (draft 7) of case files."""
     found = _Schema(words(Path()))
-    properties = {name: found.call(one) if isinstance(one, Callee) else found.of(one) for name, one in _TABLES.items()}
-    properties["stage"] = {"type": "array", "items": _stage(properties), "description": "stages, one after the other"}
+    properties = {
+        name: found.call(one) if isinstance(one, Callee) else found.of(one)
+        for name, one in _TABLES.items()
+    }
+    properties["stage"] = {
+        "type": "array",
+        "items": _stage(properties),
+        "description": "stages, one after the other",
+    }
     head = {
-        "$schema": DRAFT, "title": "A case file of vi_contact", "type": "object", "additionalProperties": False,
+        "$schema": DRAFT,
+        "title": "A case file of vi_contact",
+        "type": "object",
+        "additionalProperties": False,
         "required": ["mesh"],
     }
     definitions = dict(sorted(found.definitions.items()))
     inside = {"properties": {"format": {"const": 1}, **properties}, "definitions": definitions}
-    parts = [json.dumps(head)[1:-1], *(f"{json.dumps(key)}: {{\n{_lines(one)}\n}}" for key, one in inside.items())]
+    parts = [
+        json.dumps(head)[1:-1],
+        *(f"{json.dumps(key)}: {{\n{_lines(one)}\n}}" for key, one in inside.items()),
+    ]
     return "{" + ",\n".join(parts) + "}\n"
 
 
@@ -56,13 +78,19 @@ def _stage(tables: Mapping[str, Any]) -> dict[str, Any]:
     kind = {"anyOf": [{"const": "static"}, {"const": "dynamic"}]}
     keys = {"name": _PLAIN[str], "type": kind, "release": _PLAIN[bool]}
     parts = {key: tables[key] | {"required": []} for key in BY_KEY}
-    return {"type": "object", "additionalProperties": False, "required": ["name", "type"],
-            "properties": keys | parts | {key: tables[key] for key in WHOLE}}
+    return {
+        "type": "object",
+        "additionalProperties": False,
+        "required": ["name", "type"],
+        "properties": keys | parts | {key: tables[key] for key in WHOLE},
+    }
 
 
 def _lines(table: dict[str, Any]) -> str:
     """Return the members of a table, each on a line of its own."""
-    return ",\n".join(f"{json.dumps(key)}: {json.dumps(one, ensure_ascii=False)}" for key, one in table.items())
+    return ",\n".join(
+        f"{json.dumps(key)}: {json.dumps(one, ensure_ascii=False)}" for key, one in table.items()
+    )
 
 
 class _Schema:
@@ -73,7 +101,9 @@ class _Schema:
     def of(self, hint: Any) -> dict[str, Any]:
         """Return the schema of values for a parameter with this hint."""
         members = members_of(hint)
-        members = [one for one in members if one != FIELD or float not in members]  # a text, as that of a number
+        members = [
+            one for one in members if one != FIELD or float not in members
+        ]  # a text, as that of a number
         found = [one for member in members for one in self._one(member)] + self._tables(members)
         return {} if {} in found or not found else found[0] if len(found) == 1 else {"anyOf": found}
 
@@ -82,13 +112,20 @@ class _Schema:
         keys = {key: self._key(target, key) for key in target.hints}
         kind = {"type": {"const": word}} if word else {}
         return {
-            "type": "object", "additionalProperties": False, "required": sorted(target.required),
-            "properties": kind | keys, "description": (getdoc(target.function) or target.name).split("\n")[0],
+            "type": "object",
+            "additionalProperties": False,
+            "required": sorted(target.required),
+            "properties": kind | keys,
+            "description": (getdoc(target.function) or target.name).split("\n")[0],
         }
 
     def _key(self, target: Callee, key: str) -> dict[str, Any]:
         found, unit = self.of(target.hints[key]), unit_of(target.name, key)
-        return found if unit in (None, "1") or not found else found | {"description": f"in {unit}, or with its unit"}
+        return (
+            found
+            if unit in (None, "1") or not found
+            else found | {"description": f"in {unit}, or with its unit"}
+        )
 
     def _one(self, member: Any) -> list[dict[str, Any]]:
         if member in (Any, object):
@@ -98,17 +135,26 @@ class _Schema:
         if is_path(member) or member in self._words.groups or member in self._words.short:
             return [_PLAIN[str]]
         if is_list(member):
-            inside = [self.of(one) for one in dict.fromkeys(get_args(member)) if one is not Ellipsis]
-            return [{"type": "array", "items": inside[0] if len(inside) == 1 else {"anyOf": inside}}]
+            inside = [
+                self.of(one) for one in dict.fromkeys(get_args(member)) if one is not Ellipsis
+            ]
+            return [
+                {"type": "array", "items": inside[0] if len(inside) == 1 else {"anyOf": inside}}
+            ]
         if get_origin(member) in (Mapping, dict):
             return [{"type": "object", "additionalProperties": self.of(get_args(member)[1])}]
         return [_MATERIALS] if member is LinearElastic else []
 
     def _tables(self, members: Sequence[Any]) -> list[dict[str, Any]]:
         """Return the tables with a ``type`` that these types may be; the type of one may be left out."""
-        every = {(member, word): target for member in members
-                 for word, target in choices_of(member, self._words).items()}
-        default = next((self._words.default[one] for one in members if one in self._words.default), None)
+        every = {
+            (member, word): target
+            for member in members
+            for word, target in choices_of(member, self._words).items()
+        }
+        default = next(
+            (self._words.default[one] for one in members if one in self._words.default), None
+        )
         found: list[dict[str, Any]] = []
         for (member, word), target in every.items():
             name = f"{member.__name__}.{word}"
@@ -116,7 +162,11 @@ class _Schema:
                 self.definitions[name] = {}  # what is inside may name it
                 self.definitions[name] = self.call(target, word)
             one = {"$ref": f"#/definitions/{name}"}
-            found.append(one if len(every) == 1 or word == default else {"allOf": [one, {"required": ["type"]}]})
+            found.append(
+                one
+                if len(every) == 1 or word == default
+                else {"allOf": [one, {"required": ["type"]}]}
+            )
         return found + [_OWN_CLASS] * any(is_protocol(member) for member in members)
 
 

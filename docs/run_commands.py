@@ -35,10 +35,18 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 NOTE = ROOT / "docs" / "commands_run.txt"
 LIMIT = 900  # s
-ABOVE = ("README", "CONTRIBUTING", "CHANGELOG", "SUPPORT", "SECURITY")  # pages of the site that stand above docs/
+ABOVE = (
+    "README",
+    "CONTRIBUTING",
+    "CHANGELOG",
+    "SUPPORT",
+    "SECURITY",
+)  # pages of the site that stand above docs/
 NAME, BEGINNING = "the name of a command", "the beginning of a command"
-PROGRAM = (r"(?:[A-Z_]+=\S+ )*(?:(?:bash|vi-contact|python3|mpirun|srun|sbatch|git|pip|sudo|apt|apt-get|docker|podman|"
-           r"apptainer|export|cd|\.venv/\S+|venv/\S+|\. venv/\S+)(?= )|/usr/bin/python3 )")
+PROGRAM = (
+    r"(?:[A-Z_]+=\S+ )*(?:(?:bash|vi-contact|python3|mpirun|srun|sbatch|git|pip|sudo|apt|apt-get|docker|podman|"
+    r"apptainer|export|cd|\.venv/\S+|venv/\S+|\. venv/\S+)(?= )|/usr/bin/python3 )"
+)
 JOINED = re.compile(r"\s*\\\n\s*")  # lines that end with a backslash
 FENCE = re.compile(r"^```(\S*)[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
@@ -47,19 +55,16 @@ ELSEWHERE = {  # what fits the whole command: what runs it, or why nothing here 
     r"bash demos/run\.sh \w+": "docs/gallery/make.py runs every demo and compares what it prints with its page; DEMOS",
     r"(VI_CONTACT_RANKS=1 )?bash tests/run\.sh.*|bash tests/lint\.sh|bash \.ci/run": ".ci/run runs them",
     r"bash docs/build\.sh|bash install/\w+\.sh": ".ci/run builds the site and installs its tools",
-    r"python3 docs/make_api\.py":
-        "tests/house/test_documents.py::test_the_page_of_names_is_what_the_docstrings_say",
+    r"python3 docs/make_api\.py": "tests/house/test_documents.py::test_the_page_of_names_is_what_the_docstrings_say",
     r"python3 docs/make_schema\.py": "tests/studies/test_schema.py::test_the_schema_is_that_of_the_signatures",
-    r"python3 docs/make_glossary\.py":
-        "tests/house/test_glossary.py::test_entries_are_in_order_and_tables_are_those_of_the_entries",
+    r"python3 docs/make_glossary\.py": "tests/house/test_glossary.py::test_entries_are_in_order_and_tables_are_those_of_the_entries",
     r"python3 docs/gallery/make\.py( --index| --only NAME)?": "docs/build.sh runs it",
     r"python3 docs/notebooks/run\.py": "tests/house/test_notebooks.py::test_a_notebook_runs_in_jupyter",
-    r"PYTHONPATH=\. vi-contact run wall\.toml --allow mine .*":
-        "tests/house/test_extend.py::test_the_command_computes_the_same",
+    r"PYTHONPATH=\. vi-contact run wall\.toml --allow mine .*": "tests/house/test_extend.py::test_the_command_computes_the_same",
     r"git (diff|tag|archive) .*": "a step of a release",
     r"python3 docs/run_commands\.py.*": "this program",
     r"bash tests/fuzz\.sh .*": "as many runs of fuzz tests as asked for; "
-        "tests/house/test_fuzz_support.py::test_the_script_asks_for_a_seed",
+    "tests/house/test_fuzz_support.py::test_the_script_asks_for_a_seed",
     r"python3 -m venv build/griffe|build/griffe/bin/.*|pip install 'dolfinx-solver-real.*": "asks a package index",
     # these need what a test has not
     r"git clone ADDRESS .*|cd vi_contact": "the address is the reader's own; done by hand in fresh trees",
@@ -68,26 +73,24 @@ ELSEWHERE = {  # what fits the whole command: what runs it, or why nothing here 
     r"pip install (h5py|pyvista|\"vi-contact\[report\]\")|\.venv/site/bin/pip .*": "asks a package index",
     r"\.venv/site/bin/jupyter notebook .*": "stays open, with a browser",
     r"\.venv/report/bin/python .*|\.venv/site/bin/jupytext .*": "needs what install/report.sh or install/site.sh makes",
-    r"(srun|sbatch) .*|.*\$SLURM_\w+.*":
-        "needs Slurm; without it: tests/run/test_wall_time.py::test_the_batch_script_of_the_guide",
+    r"(srun|sbatch) .*|.*\$SLURM_\w+.*": "needs Slurm; without it: tests/run/test_wall_time.py::test_the_batch_script_of_the_guide",
     r"mpirun -n 64 .*|XDG_CACHE_HOME=\$HOME/forms .*": "needs a cluster",
     r"(docker|apptainer) .*": "needs a container program",
-    r"vi-contact report \S+ --out \S+\.html":
-        "needs what install/report.sh brings; "
-        "tests/plots/test_web_page.py::test_every_text_is_escaped_and_nothing_is_loaded",
+    r"vi-contact report \S+ --out \S+\.html": "needs what install/report.sh brings; "
+    "tests/plots/test_web_page.py::test_every_text_is_escaped_and_nothing_is_loaded",
     r"bash demos/run\.sh|python3 -m|pip install|mpirun -n|mpirun --mca \S+ \S+": BEGINNING,
     # too long or too large
     r"bash benchmarks/peers/run\.sh.*": "installs other programs; tests/benchmarks/test_peers.py::"
-        "test_our_rows_are_measured, tests/benchmarks/test_peers.py::"
-        "test_a_peer_that_is_not_there_becomes_rows_that_say_so",
+    "test_our_rows_are_measured, tests/benchmarks/test_peers.py::"
+    "test_a_peer_that_is_not_there_becomes_rows_that_say_so",
     r"python3 benchmarks/(peers/)?(?!wall_schemes)\w+\.py.*": "minutes to hours; BENCHMARKS",
     r"bash demos/run\.sh (-n 2 )?raft --size .*": "minutes and up to 30 GB; docs/gallery/make.py runs the small one",
-    r"vi-contact ida wall\.toml --motions records .*":
-        "hours; the page's small one: tests/studies/test_ida.py::test_the_example_gives_a_tidy_table",
+    r"vi-contact ida wall\.toml --motions records .*": "hours; the page's small one: tests/studies/test_ida.py::test_the_example_gives_a_tidy_table",
 }
 NAMES = (  # commands of ours that are named on a page and not given there
     r"vi-contact (run|new|report|film|ida|post|plot|post checks|run --check|run CASE --solver|report --refine|"
-    r"ida --fragility COLUMN:WAY=LIMIT|motion info|motion spectrum|(new|motion) \w+(\|\w+)+)")
+    r"ida --fragility COLUMN:WAY=LIMIT|motion info|motion spectrum|(new|motion) \w+(\|\w+)+)"
+)
 DEMOS = {  # the test that runs a demo in its short form, main(quick=True), on two ranks too where it is not serial
     "wall": "house/test_demos.py::test_the_wall_demo",
     "channel": "house/test_demos_channel.py::test_the_channel_demo",
@@ -135,8 +138,7 @@ SHORTER = {  # commands that run here and take longer than a test may: a test th
     r"python3 docs/notebooks/run\.py bouncing_bar": "house/test_notebooks.py::test_the_quick_ones_run_as_programs",
     r"python3 docs/theory/figures\.py step .*": "house/test_commands.py::test_a_figure_of_the_theory",
     r"python3 meshes .*|vi-contact run demos/cases/raft\.toml .*": "house/test_demo_raft.py::test_the_case_of_the_raft",
-    r"vi-contact ida wall\.toml --motions motion_1.at2 .*":
-        "studies/test_ida.py::test_the_example_gives_a_tidy_table",
+    r"vi-contact ida wall\.toml --motions motion_1.at2 .*": "studies/test_ida.py::test_the_example_gives_a_tidy_table",
     r"vi-contact report (\S+)": "plots/test_report.py::test_commands",
     r"vi-contact report (\S+) --refine": "studies/test_refinement.py::test_both_columns_and_their_difference",
     r"vi-contact run pounding/pounding\.toml.*": "studies/test_starters.py::test_two_frames_pound",
@@ -145,18 +147,31 @@ SHORTER = {  # commands that run here and take longer than a test may: a test th
     r"vi-contact run channel --check": "studies/test_description.py::test_the_page_shows_what_the_command_tells",
 }
 TEMPLATES = {
-    "post checks DIR": "post checks results/checks", "DIR": "results/run", "CASE": "wall", "FILE": "elcentro.at2",
+    "post checks DIR": "post checks results/checks",
+    "DIR": "results/run",
+    "CASE": "wall",
+    "FILE": "elcentro.at2",
     " [COLUMN…]": "",
 }
 RUN = "vi-contact run wall --steps 100 --quiet --out results/run"
-CHECKED = ["vi-contact new pier", "mv pier checked", "vi-contact run checked/pier.toml --quiet --out results/checks"]
-FILES: dict[str, dict[str, tuple[Any, ...]]] = {  # page -> name -> (language, number of the block, page if another)
+CHECKED = [
+    "vi-contact new pier",
+    "mv pier checked",
+    "vi-contact run checked/pier.toml --quiet --out results/checks",
+]
+FILES: dict[
+    str, dict[str, tuple[Any, ...]]
+] = {  # page -> name -> (language, number of the block, page if another)
     "README.md": {"first.py": ("python", 0)},
     "docs/start/install.md": {"script.py": ("python", 0, "README.md")},
     "docs/guide/checks.md": {"layer.toml": ("toml", 0)},
     "docs/guide/stages.md": {"house.toml": ("toml", 0)},
     "docs/guide/studies.md": {
-        "wall.toml": ("toml", 0), "make.py": ("python", 0), "dam.toml": ("toml", 1), "dam.geo": ("c++", 0)},
+        "wall.toml": ("toml", 0),
+        "make.py": ("python", 0),
+        "dam.toml": ("toml", 1),
+        "dam.geo": ("c++", 0),
+    },
     "docs/start/ten_minutes_wall.md": {"wall.toml": ("toml", 0), "wall.geo": ("c++", 0)},
     "docs/start/ten_minutes_form.md": {"form.py": ("python", 0)},
 }
@@ -165,14 +180,23 @@ BEFORE = {  # page -> what a reader has done there, or on another page, before i
     "docs/guide/studies.md": ["python3 make.py", *CHECKED],
     "docs/guide/checks.md": ["vi-contact run layer.toml --quiet --out results/checks"],
     "docs/guide/report.md": [
-        "vi-contact new wall", "mv wall own", "vi-contact run own/wall.toml --quiet --out results/run"],
-    "docs/guide/practice.md": [f"vi-contact {words}" for name in ("dam", "pier")
-                               for words in (f"new {name}", f"run {name}/{name}.toml --quiet")],
+        "vi-contact new wall",
+        "mv wall own",
+        "vi-contact run own/wall.toml --quiet --out results/run",
+    ],
+    "docs/guide/practice.md": [
+        f"vi-contact {words}"
+        for name in ("dam", "pier")
+        for words in (f"new {name}", f"run {name}/{name}.toml --quiet")
+    ],
     "docs/start/ten_minutes_wall.md": ["vi-contact run wall.toml --quiet --out results/higher"],
     "docs/guide/outputs.md": ["python3 outputs.py", *CHECKED],
 }
 COMPARED = (  # their text is what commands print
-    "docs/guide/check.md", "docs/guide/checks.md", "docs/start/ten_minutes_wall.md")
+    "docs/guide/check.md",
+    "docs/guide/checks.md",
+    "docs/start/ten_minutes_wall.md",
+)
 
 
 def pages() -> list[Path]:
@@ -234,9 +258,15 @@ def environment(bin_folder: Path, tree: Path) -> dict[str, str]:
     found = dict(one.split("=", 1) for one in said.stdout.decode().split("\0") if "=" in one)
     bin_folder.mkdir()
     for name, does in (("vi-contact", '-m vi_contact "$@"'), ("python3", '"$@"')):
-        (bin_folder / name).write_text(f'#!/bin/bash\nexec /usr/bin/python3 {does}\n', encoding="utf-8")
+        (bin_folder / name).write_text(
+            f"#!/bin/bash\nexec /usr/bin/python3 {does}\n", encoding="utf-8"
+        )
         (bin_folder / name).chmod(0o755)
-    return found | {"PATH": f"{bin_folder}:{found['PATH']}", "PYTHONPATH": str(tree), "PYTHONIOENCODING": "utf-8"}
+    return found | {
+        "PATH": f"{bin_folder}:{found['PATH']}",
+        "PYTHONPATH": str(tree),
+        "PYTHONIOENCODING": "utf-8",
+    }
 
 
 def furnish(folder: Path, page: Path, tree: Path) -> None:
@@ -246,23 +276,32 @@ def furnish(folder: Path, page: Path, tree: Path) -> None:
         if one.name not in ("results", "build"):  # of commands that write into the clone
             (folder / one.name).symlink_to(one)
     samples = "\n".join(f"{0.03 * (-1) ** (k // 5) * (1 - k / 100):.4f}" for k in range(100))
-    beside = [f"{tree}/demos/cases/{one}.at2" for one in ("E", "N", "UP")] if page.name == "raft.md" else []
+    beside = (
+        [f"{tree}/demos/cases/{one}.at2" for one in ("E", "N", "UP")]
+        if page.name == "raft.md"
+        else []
+    )
     for name in ("elcentro.at2", "h.at2", "v.at2", *beside):
-        (folder / name).write_text(f"A motion\nunits of g\nNPTS= 100, DT= .01000 SEC\n{samples}\n", encoding="utf-8")
+        (folder / name).write_text(
+            f"A motion\nunits of g\nNPTS= 100, DT= .01000 SEC\n{samples}\n", encoding="utf-8"
+        )
     for file, text in contents(page).items():
         (folder / file).write_text(text, encoding="utf-8")
     if page.name == "outputs.md":  # it continues the example of README.md
         (first,) = blocks((ROOT / "README.md").read_text(encoding="utf-8"), "python")
         text = page.read_text(encoding="utf-8")
         ready = first[: first.index("solution = ")] + blocks(text, "python")[0].replace(
-            'out="results/engineering"', 'out="results/run", fields=fem.XDMF(every=10)')
+            'out="results/engineering"', 'out="results/run", fields=fem.XDMF(every=10)'
+        )
         (folder / "outputs.py").write_text(ready, encoding="utf-8")
 
 
 def contents(page: Path) -> dict[str, str]:
     """Return file -> text of what a reader of the page has copied from blocks."""
     found = {}
-    for file, (language, number, *other) in FILES.get(page.relative_to(ROOT).as_posix(), {}).items():
+    for file, (language, number, *other) in FILES.get(
+        page.relative_to(ROOT).as_posix(), {}
+    ).items():
         there = ROOT / other[0] if other else page
         found[file] = blocks(there.read_text(encoding="utf-8"), language)[number]
     return found
@@ -275,7 +314,9 @@ def to_run(command: str) -> str:
     return command.replace("h.smc,v.smc", "h.at2,v.at2")
 
 
-def run(page: Path, folder: Path, tree: Path, env: dict[str, str]) -> tuple[dict[str, float | None], list[str]]:
+def run(
+    page: Path, folder: Path, tree: Path, env: dict[str, str]
+) -> tuple[dict[str, float | None], list[str]]:
     """Run the commands of a page: (seconds of each that succeeded, None for the others; what failed)."""
     name, wrong, printed = page.relative_to(ROOT).as_posix(), [], [""]
     told: dict[str, float | None] = {}
@@ -284,8 +325,11 @@ def run(page: Path, folder: Path, tree: Path, env: dict[str, str]) -> tuple[dict
         return told, wrong
     furnish(folder, page, tree)
     before = BEFORE.get(name, [])
-    if any("results/run" in to_run(one) for one in asked) and not any("results/run" in one for one in before) and (
-            name != "docs/guide/outputs.md"):
+    if (
+        any("results/run" in to_run(one) for one in asked)
+        and not any("results/run" in one for one in before)
+        and (name != "docs/guide/outputs.md")
+    ):
         before = [*before, RUN]
     for command in [*before, *asked]:
         start, given = time.monotonic(), to_run(command)
@@ -293,8 +337,14 @@ def run(page: Path, folder: Path, tree: Path, env: dict[str, str]) -> tuple[dict
             given = given.replace(".mp4", ".gif")  # as the page says
         try:
             done = subprocess.run(
-                ["bash", "-c", given], cwd=folder, env=env, stdin=subprocess.DEVNULL, check=False,
-                capture_output=True, encoding="utf-8", timeout=LIMIT,
+                ["bash", "-c", given],
+                cwd=folder,
+                env=env,
+                stdin=subprocess.DEVNULL,
+                check=False,
+                capture_output=True,
+                encoding="utf-8",
+                timeout=LIMIT,
             )
             status, said = done.returncode, done.stderr or done.stdout
             printed += done.stdout.splitlines()
@@ -315,19 +365,41 @@ def missing(page: Path, printed: Sequence[str]) -> list[str]:
     said = [line for block in blocks(text, "text") for line in block.splitlines() if line.strip()]
     if page.relative_to(ROOT).as_posix() not in COMPARED:
         said = []
-    if any(line.startswith("| `Trapezoidal` |") for line in printed):  # benchmarks/wall_schemes.py has run
-        said += re.findall(r"^\| `[^|]*\| -[\d.]+ to [^|]*\| -[\d.]+ to .* %.*\|$", text, re.MULTILINE)
+    if any(
+        line.startswith("| `Trapezoidal` |") for line in printed
+    ):  # benchmarks/wall_schemes.py has run
+        said += re.findall(
+            r"^\| `[^|]*\| -[\d.]+ to [^|]*\| -[\d.]+ to .* %.*\|$", text, re.MULTILINE
+        )
     sys.path.insert(0, str(ROOT / "docs" / "gallery"))
     from make import agree  # type: ignore[import-not-found]
 
-    return [line for line in said if "wall time per step" not in line and not any(agree(line, one) for one in printed)]
+    return [
+        line
+        for line in said
+        if "wall time per step" not in line and not any(agree(line, one) for one in printed)
+    ]
 
 
 def run_snippets(env: dict[str, str]) -> list[str]:
     """Run what tests/house/test_snippets.py runs of Python, in its whole length; return what failed."""
-    command = ["/usr/bin/python3", "-m", "pytest", "-q", "tests/house/test_snippets.py", "-k", "a_snippet_runs"]
-    done = subprocess.run(command, cwd=ROOT, env=env | {"VI_CONTACT_WHOLE": "1"}, capture_output=True, encoding="utf-8",
-                          check=False)
+    command = [
+        "/usr/bin/python3",
+        "-m",
+        "pytest",
+        "-q",
+        "tests/house/test_snippets.py",
+        "-k",
+        "a_snippet_runs",
+    ]
+    done = subprocess.run(
+        command,
+        cwd=ROOT,
+        env=env | {"VI_CONTACT_WHOLE": "1"},
+        capture_output=True,
+        encoding="utf-8",
+        check=False,
+    )
     print(f"snippets in their whole length: {done.stdout.strip().splitlines()[-1]}", flush=True)
     return [done.stdout[-3000:]] if done.returncode else []
 
@@ -347,36 +419,50 @@ def keep(told: dict[str, float | None]) -> None:
         every.pop(command, None)
         if seconds is not None:
             every[command] = f"{seconds:.0f}", key(command)
-    lines = ["# seconds, key and command, of all that docs/run_commands.py has run on a busy machine"]
+    lines = [
+        "# seconds, key and command, of all that docs/run_commands.py has run on a busy machine"
+    ]
     lines += [f"{every[one][0]:>4} {every[one][1]} {one}" for one in sorted(now & set(every))]
     NOTE.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def main() -> int:
     """Do what the command line says."""
-    options = argparse.ArgumentParser(prog="run_commands.py", description=(__doc__ or "").splitlines()[0])
+    options = argparse.ArgumentParser(
+        prog="run_commands.py", description=(__doc__ or "").splitlines()[0]
+    )
     options.add_argument("--only", nargs="+", metavar="PAGE", help="these pages alone")
     options.add_argument("--list", action="store_true", help="what runs each command; runs none")
     given = options.parse_args()
-    chosen = [page for page in pages() if not given.only or page.relative_to(ROOT).as_posix() in given.only]
+    chosen = [
+        page
+        for page in pages()
+        if not given.only or page.relative_to(ROOT).as_posix() in given.only
+    ]
     if given.list:
         for page in chosen:
             for command in commands(page):
                 test = shorter(command)
-                print(f"{page.relative_to(ROOT)}: {command}\n    {elsewhere(command) or 'run here'}"
-                      + (f"\n    tests/{test}" if test else ""))
+                print(
+                    f"{page.relative_to(ROOT)}: {command}\n    {elsewhere(command) or 'run here'}"
+                    + (f"\n    tests/{test}" if test else "")
+                )
         return 0
     wrong: list[str] = []
     with tempfile.TemporaryDirectory() as scratch:
         tree = Path(scratch) / "tree"
         tree.mkdir()
-        files = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, encoding="utf-8", check=True).stdout
+        files = subprocess.run(
+            ["git", "ls-files"], cwd=ROOT, capture_output=True, encoding="utf-8", check=True
+        ).stdout
         for name in files.splitlines():
             (tree / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(ROOT / name, tree / name)
         env = environment(Path(scratch) / "bin", tree)
         for page in chosen:
-            folder = Path(scratch) / "pages" / "_".join(page.relative_to(ROOT).with_suffix("").parts)
+            folder = (
+                Path(scratch) / "pages" / "_".join(page.relative_to(ROOT).with_suffix("").parts)
+            )
             told, failed = run(page, folder, tree, env)
             wrong += failed
             keep(told)

@@ -9,7 +9,18 @@ import ast
 import re
 from collections.abc import Iterator
 
-from api_source import Def, Module, constructor, definition, documentation, function, homes, methods, module, public
+from api_source import (
+    Def,
+    Module,
+    constructor,
+    definition,
+    documentation,
+    function,
+    homes,
+    methods,
+    module,
+    public,
+)
 from make_api import ROOMS, ROOT, below, whole
 
 FOLDER = ROOT / "docs" / "reference" / "names"
@@ -17,7 +28,9 @@ FOLDER = ROOT / "docs" / "reference" / "names"
 
 def directive(kind: str, signature: str, text: str, *options: str) -> str:
     """Return a directive of Sphinx's Python domain, in MyST's words, with more colons than what it holds."""
-    colons = ":" * (3 + max((len(found) - 2 for found in re.findall(r"^:{3,}", text, re.MULTILINE)), default=0))
+    colons = ":" * (
+        3 + max((len(found) - 2 for found in re.findall(r"^:{3,}", text, re.MULTILINE)), default=0)
+    )
     return "\n".join([f"{colons}{{py:{kind}}} {signature}", *options, "", text, colons, ""])
 
 
@@ -32,9 +45,13 @@ def members(where: Module, node: ast.ClassDef) -> Iterator[str]:
     """Yield the entries of the methods and properties of a class."""
     for one in methods(node):
         call = function(where, one, 1)
-        name, colon, result = call.partition(": ") if "(" not in call.split(":")[0] else (call, "", "")
+        name, colon, result = (
+            call.partition(": ") if "(" not in call.split(":")[0] else (call, "", "")
+        )
         text, silent = described(whole(one)), [":no-index-entry:"] * (one.name == "__call__")
-        kind, written, options = ("property", name, [f":type: {result}"]) if colon else ("method", call, silent)
+        kind, written, options = (
+            ("property", name, [f":type: {result}"]) if colon else ("method", call, silent)
+        )
         yield directive(kind, written, text, *options)
 
 
@@ -48,7 +65,9 @@ def entry(name: str, where: Module, short: bool) -> str:
         return directive("data", name, " ".join(filter(None, told)), *options)
     text = described(whole(node)) + (f"\n\nIt is `vc.{name}` too.\n" if short else "\n")
     if isinstance(node, ast.ClassDef):
-        return directive("class", constructor(there, node), "\n".join([text, *members(there, node)]), *options)
+        return directive(
+            "class", constructor(there, node), "\n".join([text, *members(there, node)]), *options
+        )
     return directive("function", function(there, node), text, *options)
 
 
@@ -64,11 +83,15 @@ def room_page(name: str) -> str:
 
 def overview() -> str:
     """Return the page that lists the rooms."""
-    told = {name: documentation(module(name).tree).split("\n\n")[0].replace("\n", " ") for name in ROOMS}
+    told = {
+        name: documentation(module(name).tree).split("\n\n")[0].replace("\n", " ") for name in ROOMS
+    }
     rows = (f"| [vi_contact.{name}]({name}.myst) | {text} |" for name, text in told.items())
     head = "# Every name, room by room\n"
-    more = ("These pages are for users who write Python and look up a name: its arguments, units, errors and sources. "
-            "They are made from the docstrings. {ref}`The index <genindex>` has all names.\n")
+    more = (
+        "These pages are for users who write Python and look up a name: its arguments, units, errors and sources. "
+        "They are made from the docstrings. {ref}`The index <genindex>` has all names.\n"
+    )
     table = ["| room | what it holds |", "|---|---|", *rows, ""]
     below = ["```{toctree}", ":hidden:", "", *(f"{room} <{room}>" for room in ROOMS), "```"]
     return "\n".join([head, more, *table, *below])

@@ -27,16 +27,24 @@ def parser() -> argparse.ArgumentParser:
     commands = top.add_subparsers(dest="shape", required=True, metavar=f"{{{','.join(SHAPES)}}}")
     for shape, mesh in SHAPES.items():
         first = (mesh.__doc__ or "").splitlines()[0].rstrip(".")
-        one = commands.add_parser(shape, help=first, description=mesh.__doc__, argument_default=argparse.SUPPRESS)
+        one = commands.add_parser(
+            shape, help=first, description=mesh.__doc__, argument_default=argparse.SUPPRESS
+        )
         for field in fields(mesh):
             option = f"--{field.name.replace('_', '-')}"
             kind = field.type.__name__ if isinstance(field.type, type) else str(field.type)
             if kind == "bool":
                 one.add_argument(option, action="store_true")
             elif kind.startswith(("float", "tuple")):
-                one.add_argument(option, type=int if "int" in kind else float, required=field.default is MISSING,
-                                 nargs="+" if kind.startswith("tuple") else None)
-        one.add_argument("-o", "--output", default=f"{shape}.msh", help=f"file to write (default: {shape}.msh)")
+                one.add_argument(
+                    option,
+                    type=int if "int" in kind else float,
+                    required=field.default is MISSING,
+                    nargs="+" if kind.startswith("tuple") else None,
+                )
+        one.add_argument(
+            "-o", "--output", default=f"{shape}.msh", help=f"file to write (default: {shape}.msh)"
+        )
     return top
 
 
@@ -45,7 +53,10 @@ def main(words: Sequence[str]) -> None:
     given = vars(parser().parse_args(words))
     mesh, output = SHAPES[given.pop("shape")], given.pop("output")
     try:
-        write(mesh(**{name: tuple(x) if isinstance(x, list) else x for name, x in given.items()}), output)
+        write(
+            mesh(**{name: tuple(x) if isinstance(x, list) else x for name, x in given.items()}),
+            output,
+        )
     except InputError as error:
         sys.exit(str(error))
 

@@ -51,8 +51,10 @@ class BallMesh:
     def __post_init__(self) -> None:
         attributes(self, positive=("radius", "size", "foot", "growth"))
         if not (self.size <= self.foot < self.radius and self.size <= self._largest <= self.radius):
-            raise InputError(f"ball of radius {self.radius} m, cell size {self.size} m, foot {self.foot} m, coarsest"
-                             f" cell {self._largest} m: they must be size <= foot < radius, size <= coarsest <= radius")
+            raise InputError(
+                f"ball of radius {self.radius} m, cell size {self.size} m, foot {self.foot} m, coarsest"
+                f" cell {self._largest} m: they must be size <= foot < radius, size <= coarsest <= radius"
+            )
         cells = (self.foot / self.size) ** 3 + (self.radius / self._largest) ** 3
         counted("ball", f"a cell size of {self.size} m", cells, "cells", most=MOST_CELLS)
 
@@ -82,8 +84,12 @@ class BallMesh:
 def _add_ball(model: Any, radius: float, eighth: bool) -> int:
     """Add the part of the ball, its parametric poles on the x axis: away from the foot, where cells are finest."""
     turn = 0.5 * math.pi
-    ball: int = model.occ.addSphere(0.0, 0.0, 0.0, radius, -1, 0.0, turn, turn if eighth else 2.0 * turn)
-    model.occ.rotate([(3, ball)], 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0 * math.pi / 3.0)  # x to y to z to x
+    ball: int = model.occ.addSphere(
+        0.0, 0.0, 0.0, radius, -1, 0.0, turn, turn if eighth else 2.0 * turn
+    )
+    model.occ.rotate(
+        [(3, ball)], 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0 * math.pi / 3.0
+    )  # x to y to z to x
     if eighth:
         model.occ.rotate([(3, ball)], 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, turn)
     model.occ.translate([(3, ball)], 0.0, radius, 0.0)
@@ -98,7 +104,9 @@ def _name_sides(model: Any, volume: int, radius: float) -> int:
     for _, surface in model.getEntities(2):
         centre = np.array(model.occ.getCenterOfMass(2, surface)) - (0.0, radius, 0.0)
         flat = np.abs(centre) < 1e-6 * radius
-        flat[1] &= model.getType(2, surface) == "Plane"  # the sphere of the quarter is centred there as well
+        flat[1] &= (
+            model.getType(2, surface) == "Plane"
+        )  # the sphere of the quarter is centred there as well
         names = [name for name, here in zip(("side_x", "cut", "side_z"), flat, strict=True) if here]
         groups.setdefault(names[0] if names else "surface", []).append(surface)
     for name, surfaces in groups.items():

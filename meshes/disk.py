@@ -36,11 +36,21 @@ class DiskMesh:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.radius) and 0.0 < self.size <= 0.5 * self.radius):
-            raise InputError(f"disk of radius {self.radius} m with cells of {self.size} m: give a positive radius and"
-                             " cells of at most half of it")
-        counted("disk", f"a cell size of {self.size} m", (self.radius / self.size) ** 2, "cells", most=MOST_CELLS)
+            raise InputError(
+                f"disk of radius {self.radius} m with cells of {self.size} m: give a positive radius and"
+                " cells of at most half of it"
+            )
+        counted(
+            "disk",
+            f"a cell size of {self.size} m",
+            (self.radius / self.size) ** 2,
+            "cells",
+            most=MOST_CELLS,
+        )
         if not self.size / self.radius <= self.foot < 0.5 * math.pi:
-            raise InputError(f"foot of a disk is {self.foot} rad: give an angle from one cell to less than pi/2")
+            raise InputError(
+                f"foot of a disk is {self.foot} rad: give an angle from one cell to less than pi/2"
+            )
 
     def build(self, gmsh: Any) -> None:
         """Add the disk to Gmsh's current model."""
@@ -80,7 +90,9 @@ def _mirror_nodes(model: Any) -> npt.NDArray[np.int_]:
     return image
 
 
-def _mirrored(model: Any, dimension: int, entity: int, kind: int, image: npt.NDArray[np.int_]) -> int:
+def _mirrored(
+    model: Any, dimension: int, entity: int, kind: int, image: npt.NDArray[np.int_]
+) -> int:
     """Add an entity with the mirror images of the cells of another, turned round so that they stay positive."""
     _, nodes = model.mesh.getElementsByType(kind, entity)
     cells = image[np.asarray(nodes, dtype=int).reshape(-1, dimension + 1)][:, ::-1]

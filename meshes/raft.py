@@ -48,16 +48,32 @@ class RaftMesh:
             array("RaftMesh", name, getattr(self, name), (count,), unit="metres")
         attributes(self, positive=("wall", "slab", "size", "soil_size", "far"))
         (lx, ly, thick), (x, y, cx, cy), (wide, deep, depth) = self.raft, self.core, self.soil
-        inside = 2.0 * self.wall < min(cx, cy) and abs(x) + 0.5 * cx <= 0.5 * lx and abs(y) + 0.5 * cy <= 0.5 * ly
+        inside = (
+            2.0 * self.wall < min(cx, cy)
+            and abs(x) + 0.5 * cx <= 0.5 * lx
+            and abs(y) + 0.5 * cy <= 0.5 * ly
+        )
         if not (thick > 0.0 and inside and min(self.storeys, default=0.0) > self.slab):
-            raise InputError(f"a core {cx} x {cy} m at ({x}, {y}), walls {self.wall}, storeys {self.storeys}, slabs "
-                             f"{self.slab} m on a raft {lx} x {ly} x {thick} m: it needs room inside, storeys higher "
-                             "than their slabs, and the raft under all of it")
-        if not (depth > 0.0 and lx + 4.0 * self.soil_size < wide and ly + 4.0 * self.soil_size < deep):
-            raise InputError(f"soil {wide} x {deep} x {depth} m: give depth, and two cells of {self.soil_size} m more "
-                             f"than a raft {lx} x {ly} m on every side")
+            raise InputError(
+                f"a core {cx} x {cy} m at ({x}, {y}), walls {self.wall}, storeys {self.storeys}, slabs "
+                f"{self.slab} m on a raft {lx} x {ly} x {thick} m: it needs room inside, storeys higher "
+                "than their slabs, and the raft under all of it"
+            )
+        if not (
+            depth > 0.0 and lx + 4.0 * self.soil_size < wide and ly + 4.0 * self.soil_size < deep
+        ):
+            raise InputError(
+                f"soil {wide} x {deep} x {depth} m: give depth, and two cells of {self.soil_size} m more "
+                f"than a raft {lx} x {ly} m on every side"
+            )
         cells = 6.0 * lx * ly * (thick / self.size**3 + min(depth, lx) / self.soil_size**3)
-        counted("RaftMesh", f"cells of {self.size} and {self.soil_size} m", cells, "cells", most=MOST_CELLS)
+        counted(
+            "RaftMesh",
+            f"cells of {self.size} and {self.soil_size} m",
+            cells,
+            "cells",
+            most=MOST_CELLS,
+        )
 
     def build(self, gmsh: Any) -> None:
         """Add both bodies to Gmsh's current model."""
@@ -65,24 +81,41 @@ class RaftMesh:
         building, (soil, foot) = self._building(model.occ), self._soil(model.occ)
         model.occ.synchronize()
         faces = self._faces(model, building, soil, foot)
-        groups = [(3, "building", [building]), (3, "soil", [soil]), *((2, *face) for face in faces.items())]
+        groups = [
+            (3, "building", [building]),
+            (3, "soil", [soil]),
+            *((2, *face) for face in faces.items()),
+        ]
         for dim, name, entities in groups:
             model.setPhysicalName(dim, model.addPhysicalGroup(dim, entities), name)
-        for size, entity in ((self.far, (3, soil)), (self.size, (3, building)), (self.soil_size, (2, foot))):
+        for size, entity in (
+            (self.far, (3, soil)),
+            (self.size, (3, building)),
+            (self.soil_size, (2, foot)),
+        ):
             model.mesh.setSize(model.getBoundary([entity], combined=False, recursive=True), size)
         for first, second, axis in (("left", "right", 0), ("back", "front", 1)):
             shift = np.eye(4)
             shift[axis, 3] = self.soil[axis]
-            model.mesh.setPeriodic(2, faces[f"soil_{second}"], faces[f"soil_{first}"], shift.ravel().tolist())
+            model.mesh.setPeriodic(
+                2, faces[f"soil_{second}"], faces[f"soil_{first}"], shift.ravel().tolist()
+            )
         model.mesh.generate(3)
 
     def _building(self, occ: Any) -> int:
         """Add raft, core and slabs as one body; return its tag."""
-        (lx, ly, z), (x, y, cx, cy), wall, height = self.raft, self.core, self.wall, sum(self.storeys)
+        (lx, ly, z), (x, y, cx, cy), wall, height = (
+            self.raft,
+            self.core,
+            self.wall,
+            sum(self.storeys),
+        )
         raft = occ.addBox(-0.5 * lx, -0.5 * ly, 0.0, lx, ly, z)
         outer = occ.addBox(x - 0.5 * cx, y - 0.5 * cy, z, cx, cy, height)
         inside = 2.0 * wall
-        hole = occ.addBox(x - 0.5 * cx + wall, y - 0.5 * cy + wall, z, cx - inside, cy - inside, height)
+        hole = occ.addBox(
+            x - 0.5 * cx + wall, y - 0.5 * cy + wall, z, cx - inside, cy - inside, height
+        )
         walls, _ = occ.cut([(3, outer)], [(3, hole)])
         tops = (z + top - self.slab for top in accumulate(self.storeys))
         slabs = [(3, occ.addBox(-0.5 * lx, -0.5 * ly, top, lx, ly, self.slab)) for top in tops]
@@ -102,15 +135,26 @@ class RaftMesh:
         wide, deep, depth = self.soil
         places = {
             building: {"raft_bottom": (2, 0.0), "roof": (2, self.raft[2] + sum(self.storeys))},
-            soil: {"soil_left": (0, -0.5 * wide), "soil_right": (0, 0.5 * wide), "soil_back": (1, -0.5 * deep),
-                   "soil_front": (1, 0.5 * deep), "soil_bottom": (2, -depth), "soil_surface": (2, 0.0)},
+            soil: {
+                "soil_left": (0, -0.5 * wide),
+                "soil_right": (0, 0.5 * wide),
+                "soil_back": (1, -0.5 * deep),
+                "soil_front": (1, 0.5 * deep),
+                "soil_bottom": (2, -depth),
+                "soil_surface": (2, 0.0),
+            },
         }
         found: dict[str, list[int]] = {"soil_foot": [foot]}
         for body, sides in places.items():
-            faces = [face for _, face in model.getBoundary([(3, body)], oriented=False) if face != foot]
+            faces = [
+                face for _, face in model.getBoundary([(3, body)], oriented=False) if face != foot
+            ]
             for name, (axis, place) in sides.items():
-                found[name] = [face for face in faces
-                               if abs(model.occ.getCenterOfMass(2, face)[axis] - place) < 1e-6 * wide]
+                found[name] = [
+                    face
+                    for face in faces
+                    if abs(model.occ.getCenterOfMass(2, face)[axis] - place) < 1e-6 * wide
+                ]
         return found
 
 

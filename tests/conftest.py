@@ -30,12 +30,22 @@ from typing import Any, TextIO
 import pytest
 
 # What programs print is compared with texts: it must not depend on the terminal or the language of who runs the tests.
-os.environ |= {"COLUMNS": "100", "PYTHON_COLORS": "0", "LANGUAGE": "C"}  # Gmsh sets a locale that obeys LANGUAGE
+os.environ |= {
+    "COLUMNS": "100",
+    "PYTHON_COLORS": "0",
+    "LANGUAGE": "C",
+}  # Gmsh sets a locale that obeys LANGUAGE
 
 RANK = int(os.environ.get("OMPI_COMM_WORLD_RANK", os.environ.get("PMI_RANK", "0")))
 SIZE = int(os.environ.get("OMPI_COMM_WORLD_SIZE", os.environ.get("PMI_SIZE", "1")))
 LEFT_OUT = ("serial", "slow", "two_ranks") if SIZE > 2 else ("serial",) if SIZE > 1 else ()
-ABOVE = ("validation", "models", "soil", "studies", "house")  # what they are made of runs on three ranks, they on two
+ABOVE = (
+    "validation",
+    "models",
+    "soil",
+    "studies",
+    "house",
+)  # what they are made of runs on three ranks, they on two
 TEST_SECONDS = 600  # a test that takes longer on an idle machine is taken to be stuck
 WATCH_SECONDS = 30  # how long one watch over the tests stands: a new one for each would wait for a thread to end
 MEETING_SECONDS = 30  # patience of a rank that has failed: the others are probably waiting for it in a collective call
@@ -58,7 +68,9 @@ def _patience(seconds: float) -> float:
     return seconds * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
 
 
-def _meet(config: pytest.Config, mine: str, *, where: str, seconds: float, dull: bool = False) -> list[str]:
+def _meet(
+    config: pytest.Config, mine: str, *, where: str, seconds: float, dull: bool = False
+) -> list[str]:
     """Return the texts of all ranks, in rank order; none where `mine` is `dull` on all of them: nearly always, so that
     a meeting takes one small reduction. Aborts the run if some rank does not come within `seconds`."""
     comm, some = _comm(), array("i", [0])
@@ -66,7 +78,9 @@ def _meet(config: pytest.Config, mine: str, *, where: str, seconds: float, dull:
     deadline, pause = time.monotonic() + seconds, 1e-5
     while not request.Test():
         if time.monotonic() > deadline:
-            _abort(config, f"{where}: the other ranks did not arrive within {seconds:.0f} s\n{mine}")
+            _abort(
+                config, f"{where}: the other ranks did not arrive within {seconds:.0f} s\n{mine}"
+            )
         time.sleep(pause)
         pause = min(1.5 * pause, 1e-3)
     return list(comm.allgather(mine)) if some[0] else []
@@ -80,13 +94,19 @@ def _abort(config: pytest.Config, message: str) -> None:
 
 @pytest.hookimpl(trylast=True)
 def pytest_configure(config: pytest.Config) -> None:
-    config.stash[_stderr] = os.fdopen(os.dup(2), "w")  # the real one: pytest captures fd 2 during tests
+    config.stash[_stderr] = os.fdopen(
+        os.dup(2), "w"
+    )  # the real one: pytest captures fd 2 during tests
     if RANK:  # rank 0 speaks for all
         config.pluginmanager.unregister(name="terminalreporter")
     if _second_half(config) and config.args == ["tests"]:
-        ignored = [Path(one).resolve() for one in config.getoption("ignore") or ()]  # pytest obeys a name all the same
+        ignored = [
+            Path(one).resolve() for one in config.getoption("ignore") or ()
+        ]  # pytest obeys a name all the same
         folders = {path.parent for path in Path("tests").resolve().rglob("test_*.py")}
-        named = [str(one) for one in folders if not any(one.is_relative_to(other) for other in ignored)]
+        named = [
+            str(one) for one in folders if not any(one.is_relative_to(other) for other in ignored)
+        ]
         config.args[:] = sorted(named, reverse=True)
 
 
@@ -103,7 +123,9 @@ def pytest_ignore_collect(collection_path: Path) -> bool | None:
     if SIZE > 2 and collection_path.parent.name in ABOVE:
         return True
     text = collection_path.read_text()
-    return True if any(f"\npytestmark = pytest.mark.{marker}" in text for marker in LEFT_OUT) else None
+    return (
+        True if any(f"\npytestmark = pytest.mark.{marker}" in text for marker in LEFT_OUT) else None
+    )
 
 
 def _left_out(item: pytest.Item) -> bool:
@@ -152,7 +174,9 @@ def _paired(items: list[pytest.Item]) -> set[pytest.Item]:
         pairs = {item: set(itertools.combinations(_parametrised(item, lists), 2)) for item in ones}
         kept -= set(ones)
         while any(pairs.values()):
-            best = max(ones, key=lambda item: len(pairs[item]))  # the first of the best: alike in every process
+            best = max(
+                ones, key=lambda item: len(pairs[item])
+            )  # the first of the best: alike in every process
             new = set(pairs[best])
             kept.add(best)
             for rest in pairs.values():
@@ -164,21 +188,32 @@ def _parametrised(item: pytest.Item, lists: list[Any]) -> list[tuple[int, int]]:
     """(number of the list, which of its values the test has)."""
     params = item.callspec.params  # type: ignore[attr-defined]
     names = [re.split(r"\s*,\s*", one.strip()) if isinstance(one, str) else one for one in lists]
-    return [(number, hash(tuple(id(params[name]) for name in some))) for number, some in enumerate(names)]
+    return [
+        (number, hash(tuple(id(params[name]) for name in some)))
+        for number, some in enumerate(names)
+    ]
 
 
 def _parameters(item: pytest.Item) -> set[tuple[str, int]]:
-    return {(name, id(value)) for name, value in item.callspec.params.items()} if hasattr(item, "callspec") else set()
+    return (
+        {(name, id(value)) for name, value in item.callspec.params.items()}
+        if hasattr(item, "callspec")
+        else set()
+    )
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     if hasattr(config, "workerinput"):  # alike in every process, wherever it began
         items.sort(key=lambda item: str(item.path))
-    kept = _paired(items) if SIZE == 1 else _covering([item for item in items if not _left_out(item)])
+    kept = (
+        _paired(items) if SIZE == 1 else _covering([item for item in items if not _left_out(item)])
+    )
     if left_out := [item for item in items if item not in kept]:
         items[:] = [item for item in items if item in kept]
         config.hook.pytest_deselected(items=left_out)
-    if SIZE == 1:  # files of validation and those with many slow tests are long: not last on one core
+    if (
+        SIZE == 1
+    ):  # files of validation and those with many slow tests are long: not last on one core
         slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
         items.sort(key=lambda item: -slow[item.path] - 10 * ("validation" in item.path.parts))
 
@@ -237,19 +272,26 @@ def _do_not_print_options(ffcx: Any) -> None:
 
 def _known_file(folder: str, kind: tuple[Any, list[str]]) -> SimpleNamespace:
     """What FFCx asks of importlib.machinery.FileFinder, without a list of the folder."""
+
     def find_spec(name: str) -> Any:
         loader, ends = kind
         paths = (os.path.join(folder, name + end) for end in ends)
         path = next((path for path in paths if os.path.exists(path)), None)
-        return path and importlib.util.spec_from_file_location(name, path, loader=loader(name, path))
+        return path and importlib.util.spec_from_file_location(
+            name, path, loader=loader(name, path)
+        )
 
     return SimpleNamespace(find_spec=find_spec, invalidate_caches=lambda: None)
 
 
 @pytest.hookimpl(hookwrapper=True)
-def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> Generator[None, Any, None]:
+def pytest_runtest_protocol(
+    item: pytest.Item, nextitem: pytest.Item | None
+) -> Generator[None, Any, None]:
     _watch(item.config)
-    if SIZE > 1:  # what all ranks own is freed by all at one place: one that frees alone lets the others wait
+    if (
+        SIZE > 1
+    ):  # what all ranks own is freed by all at one place: one that frees alone lets the others wait
         gc.disable()
     yield
     if SIZE > 1 and (nextitem is None or nextitem.path != item.path):
@@ -279,10 +321,14 @@ def _agree(config: pytest.Config, report: pytest.TestReport) -> None:
     failed = report.outcome == "failed"
     mine = report.outcome + ("\n" + report.longreprtext if failed else "")
     patience = _patience(MEETING_SECONDS if failed else TEST_SECONDS)
-    texts = _meet(config, mine, where=f"{report.nodeid} ({report.when})", seconds=patience, dull=report.passed)
+    texts = _meet(
+        config, mine, where=f"{report.nodeid} ({report.when})", seconds=patience, dull=report.passed
+    )
     outcomes = [text.split("\n", 1)[0] for text in texts]
     if len(set(outcomes)) > 1 and not failed:
-        told = [f"[rank {rank}] {text}" for rank, text in enumerate(texts) if outcomes[rank] == "failed"]
+        told = [
+            f"[rank {rank}] {text}" for rank, text in enumerate(texts) if outcomes[rank] == "failed"
+        ]
         report.outcome = "failed"
         report.longrepr = "\n".join([f"outcomes by rank: {', '.join(outcomes)}", *told])
 
@@ -303,7 +349,9 @@ def _seconds_by_file(stats: dict[str, list[Any]]) -> list[tuple[float, str]]:
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
     """Tell the slowest files, and leave the counts where tests/run.sh sums them."""
-    if hasattr(terminalreporter.config, "workerinput"):  # the process that started the workers tells it of all
+    if hasattr(
+        terminalreporter.config, "workerinput"
+    ):  # the process that started the workers tells it of all
         return
     stats = terminalreporter.stats
     times = [f"{total:8.1f} s  {file}" for total, file in _seconds_by_file(stats)]

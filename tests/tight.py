@@ -52,7 +52,11 @@ def shares(explanation: str) -> Iterator[float]:
         if isinstance(node, ast.Compare):
             sides = [node.left, *node.comparators]
             for left, sign, right in zip(sides, node.ops, sides[1:], strict=False):
-                yield share(left, right) if isinstance(sign, (ast.Lt, ast.LtE)) else share(right, left)
+                yield (
+                    share(left, right)
+                    if isinstance(sign, (ast.Lt, ast.LtE))
+                    else share(right, left)
+                )
 
 
 def share(value: ast.expr, bound: ast.expr) -> float:

@@ -33,7 +33,9 @@ COLUMNS = {
     "bar": (*TIMES, "energy_end", "energy_largest", "force_error_first", "force_error", "displacement_error",
             "penetration", "stops", "lines"),
 }  # fmt: skip
-LONG = 5.0  # a row that takes longer [s] is run once; others three times, of which the shortest counts
+LONG = (
+    5.0  # a row that takes longer [s] is run once; others three times, of which the shortest counts
+)
 LIMIT = 600  # processor time of a row [s]
 
 
@@ -56,16 +58,25 @@ def words_of(name: str) -> dict[str, Any]:
         for one in tree.body
         if isinstance(one, ast.Assign) and isinstance(one.targets[0], ast.Name)
     ]
-    return {"MISSING": {}, "BY_HAND": {}} | {key: ast.literal_eval(value) for key, value in pairs if key in WORDS}
+    return {"MISSING": {}, "BY_HAND": {}} | {
+        key: ast.literal_eval(value) for key, value in pairs if key in WORDS
+    }
 
 
 def rows_of(name: str) -> list[dict[str, Any]]:
     """Run all rows of a peer."""
     words, rows = words_of(name), []
-    said = subprocess.run([sys.executable, str(path_of(name)), "version"], capture_output=True, text=True, check=False)
+    said = subprocess.run(
+        [sys.executable, str(path_of(name)), "version"], capture_output=True, text=True, check=False
+    )
     if said.returncode:
         return [
-            {"peer": words["TITLE"], "name": name, "problem": problem, "failed": reason(said.stderr)}
+            {
+                "peer": words["TITLE"],
+                "name": name,
+                "problem": problem,
+                "failed": reason(said.stderr),
+            }
             for problem in PROBLEMS
         ]
     version = said.stdout.strip().splitlines()[-1]
@@ -75,15 +86,25 @@ def rows_of(name: str) -> list[dict[str, Any]]:
             rows.append(start | {"failed": words["MISSING"][problem]})
             continue
         for way, how in words["WAYS"][problem].items():
-            for n in SIZES if problem == "signorini" else (THROWN["n"] if problem == "thrown" else 0,):
-                row = start | {"way": way, "how": how, "n": n, "stops": words["STOPS"][problem][way]}
+            for n in (
+                SIZES if problem == "signorini" else (THROWN["n"] if problem == "thrown" else 0,)
+            ):
+                row = start | {
+                    "way": way,
+                    "how": how,
+                    "n": n,
+                    "stops": words["STOPS"][problem][way],
+                }
                 row["lines"] = lines_of(path_of(name), problem)
                 if problem in words["BY_HAND"]:
                     row["by_hand"] = words["BY_HAND"][problem]
                 rows.append(row | one(name, problem, n, way))
                 print(
                     json.dumps(
-                        {key: rows[-1].get(key) for key in ("name", "problem", "way", "n", *COLUMNS[problem], "failed")}
+                        {
+                            key: rows[-1].get(key)
+                            for key in ("name", "problem", "way", "n", *COLUMNS[problem], "failed")
+                        }
                     ),
                     file=sys.stderr,
                     flush=True,
@@ -143,13 +164,19 @@ def limited() -> None:
 def reason(text: str) -> str:
     """Return the last line that says something, without the places of this machine."""
     lines = [line.strip() for line in text.splitlines() if line.strip()]
-    return lines[-1].replace(str(HERE), "benchmarks/peers")[:200] if lines else "ended without a word"
+    return (
+        lines[-1].replace(str(HERE), "benchmarks/peers")[:200] if lines else "ended without a word"
+    )
 
 
 def machine() -> dict[str, Any]:
     """Return what a reader must know of the machine."""
     model = next(
-        (line.split(":")[1].strip() for line in Path("/proc/cpuinfo").read_text().splitlines() if "model name" in line),
+        (
+            line.split(":")[1].strip()
+            for line in Path("/proc/cpuinfo").read_text().splitlines()
+            if "model name" in line
+        ),
         "unknown",
     )
     release = next(
@@ -182,10 +209,15 @@ def table(rows: list[dict[str, Any]], problem: str) -> str:
         if row["problem"] != problem:
             continue
         if "failed" in row:
-            lines.append(f"| {row['peer']} | {row.get('way', '')} | {row['failed']} |" + " |" * (len(columns) - 1))
+            lines.append(
+                f"| {row['peer']} | {row.get('way', '')} | {row['failed']} |"
+                + " |" * (len(columns) - 1)
+            )
         else:
             lines.append(
-                f"| {row['peer']} | {row['way']} | " + " | ".join(shown(key, row[key]) for key in columns) + " |"
+                f"| {row['peer']} | {row['way']} | "
+                + " | ".join(shown(key, row[key]) for key in columns)
+                + " |"
             )
     return "\n".join(lines)
 
@@ -241,7 +273,13 @@ def shown(key: str, value: Any) -> str:
         return f"{value:.4f}" if abs(value) < 1e3 else f"{value:.1e}"
     if key in ("solve", "process"):
         return f"{value:.2f}"
-    return "0" if abs(value) < 1e-15 else f"{value:.1e}" if value < 1e-2 or value >= 1e3 else f"{value:.3f}"
+    return (
+        "0"
+        if abs(value) < 1e-15
+        else f"{value:.1e}"
+        if value < 1e-2 or value >= 1e3
+        else f"{value:.3f}"
+    )
 
 
 def main() -> None:
@@ -250,24 +288,34 @@ def main() -> None:
     parser.add_argument("names", nargs="*")
     parser.add_argument("--join", nargs="*", help="join these files of rows; nothing is run")
     parser.add_argument("--json", help="file for machine, date, versions and rows")
-    parser.add_argument("--page", help="page whose tables become those of results.json, without runs")
+    parser.add_argument(
+        "--page", help="page whose tables become those of results.json, without runs"
+    )
     given = parser.parse_args()
     if given.page:
         stored = json.loads((HERE / "results.json").read_text(encoding="utf-8"))
         page = Path(given.page)
-        page.write_text(renewed(page.read_text(encoding="utf-8"), parts_of(stored)), encoding="utf-8")
+        page.write_text(
+            renewed(page.read_text(encoding="utf-8"), parts_of(stored)), encoding="utf-8"
+        )
         return
     about = machine()
     if given.join is None:
         rows = [row for name in given.names for row in rows_of(name)]
     else:
-        rows = [row for file in given.join for row in json.loads(Path(file).read_text(encoding="utf-8"))["rows"]]
+        rows = [
+            row
+            for file in given.join
+            for row in json.loads(Path(file).read_text(encoding="utf-8"))["rows"]
+        ]
     print(summary(about, rows))
     for problem in PROBLEMS:
         print(f"\n{problem}\n\n{table(rows, problem)}")
     if given.json:
         text = ",\n".join(json.dumps(row) for row in rows)
-        Path(given.json).write_text(f'{{"about": {json.dumps(about)},\n"rows": [\n{text}\n]}}\n', encoding="utf-8")
+        Path(given.json).write_text(
+            f'{{"about": {json.dumps(about)},\n"rows": [\n{text}\n]}}\n', encoding="utf-8"
+        )
 
 
 if __name__ == "__main__":

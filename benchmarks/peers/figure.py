@@ -28,14 +28,22 @@ def draw(rows: list[dict[str, Any]], out: Path) -> None:
     rows = [row for row in rows if "failed" not in row]
     peers = list(dict.fromkeys(row["peer"] for row in rows))
     look = {peer: (f"C{k}", MARKS[k]) for k, peer in enumerate(peers)}
-    figure, (energy, near, static, bounce) = plt.subplots(4, 1, figsize=(6.0, 14.0), layout="constrained")
+    figure, (energy, near, static, bounce) = plt.subplots(
+        4, 1, figsize=(6.0, 14.0), layout="constrained"
+    )
     end = BAR["dt"] * BAR["steps"]
     for row in (row for row in rows if row["problem"] == "bar"):
         told = row["energies"]
         times = end * np.arange(1, len(told) + 1) / len(told)
         best = row["way"] == "best"
         for axes in (energy, near):
-            axes.plot(times, told, "-" if best else "--", color=look[row["peer"]][0], lw=1.6 if best else 1.1)
+            axes.plot(
+                times,
+                told,
+                "-" if best else "--",
+                color=look[row["peer"]][0],
+                lw=1.6 if best else 1.1,
+            )
     energy.set_yscale("log")
     near.set_ylim(0.3, 1.2)
     for axes, title in ((energy, "Bar, ten bounces"), (near, "The same, enlarged")):
@@ -49,17 +57,27 @@ def draw(rows: list[dict[str, Any]], out: Path) -> None:
         for row in (row for row in rows if row["problem"] == problem and row["n"] in (0, 64)):
             colour, mark = look[row["peer"]]
             fill = colour if row["way"] == "best" else "none"
-            axes.loglog(row["process"], max(row[key], ROUND_OFF), mark, color=colour, mfc=fill, ms=8)
-        axes.set(xlabel="processor time of the whole process [s]", ylabel="relative error of the contact force [-]")
+            axes.loglog(
+                row["process"], max(row[key], ROUND_OFF), mark, color=colour, mfc=fill, ms=8
+            )
+        axes.set(
+            xlabel="processor time of the whole process [s]",
+            ylabel="relative error of the contact force [-]",
+        )
         axes.set_title(f"{title}: filled: best, hollow: other way", fontsize=10)
         axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
         axes.xaxis.set_minor_formatter(mpl.ticker.NullFormatter())
         axes.grid(alpha=0.3)
     handles = [plt.Line2D([], [], color=colour, marker=mark) for colour, mark in look.values()]
-    energy.legend(handles, peers, loc="lower center", bbox_to_anchor=(0.45, 1.08), ncol=4, fontsize=9)
+    energy.legend(
+        handles, peers, loc="lower center", bbox_to_anchor=(0.45, 1.08), ncol=4, fontsize=9
+    )
     figure.savefig(out, dpi=110)
 
 
 if __name__ == "__main__":
     stored = json.loads((HERE / "results.json").read_text(encoding="utf-8"))
-    draw(stored["rows"], Path(sys.argv[1]) if len(sys.argv) > 1 else HERE.parents[1] / "docs/figures/peers.png")
+    draw(
+        stored["rows"],
+        Path(sys.argv[1]) if len(sys.argv) > 1 else HERE.parents[1] / "docs/figures/peers.png",
+    )

@@ -28,11 +28,22 @@ WAYS = {
     },
 }
 STOPS = {
-    "signorini": {"best": "1e-8 (residual, correction)", "default": "5e-3 (residual), 1e-2 (correction), built in"},
-    "thrown": {"best": "1e-8 (residual, correction)", "default": "5e-3 (residual), 1e-2 (correction), built in"},
-    "bar": {"best": "1e-8 (residual, correction)", "default": "5e-3 (residual), 1e-2 (correction), built in"},
+    "signorini": {
+        "best": "1e-8 (residual, correction)",
+        "default": "5e-3 (residual), 1e-2 (correction), built in",
+    },
+    "thrown": {
+        "best": "1e-8 (residual, correction)",
+        "default": "5e-3 (residual), 1e-2 (correction), built in",
+    },
+    "bar": {
+        "best": "1e-8 (residual, correction)",
+        "default": "5e-3 (residual), 1e-2 (correction), built in",
+    },
 }
-BY_HAND = {"signorini": "nodal contact forces: the residual of the printed displacements, which have seven digits"}
+BY_HAND = {
+    "signorini": "nodal contact forces: the residual of the printed displacements, which have seven digits"
+}
 
 
 def version() -> str:
@@ -46,7 +57,10 @@ def signorini(n: int, way: str) -> dict[str, Any]:
     deck += [f"{node},1,1" for node in both(mesh, mesh.left)]
     deck += ["*STEP,INC=1000", "*STATIC", "1.,1.", *controls(way), "*CLOAD"]
     force = 0.5 * traction_load(mesh)
-    deck += [f"{node},2,{force[2 * ((node - 1) % len(mesh.points)) + 1]:.16g}" for node in both(mesh, mesh.top)]
+    deck += [
+        f"{node},2,{force[2 * ((node - 1) % len(mesh.points)) + 1]:.16g}"
+        for node in both(mesh, mesh.top)
+    ]
     told = run([*deck, "*NODE PRINT,NSET=FRONT", "U", "*END STEP"])
     return {"u": told["displacements"][0][:, 1:3]}
 
@@ -54,7 +68,12 @@ def signorini(n: int, way: str) -> dict[str, Any]:
 def thrown(way: str) -> dict[str, Any]:
     mesh = Square(THROWN["n"])
     deck = square_deck(mesh, THROWN, way, 10.0 * THROWN["E"] * THROWN["n"])
-    deck += ["*INITIAL CONDITIONS,TYPE=VELOCITY", f"BODY,2,{-THROWN['speed']}", *dynamic(way, THROWN), "*END STEP"]
+    deck += [
+        "*INITIAL CONDITIONS,TYPE=VELOCITY",
+        f"BODY,2,{-THROWN['speed']}",
+        *dynamic(way, THROWN),
+        "*END STEP",
+    ]
     told = run(deck, THROWN["steps"])
     return histories(told, THROWN) | {
         "gap": THROWN["gap"] + np.array(told["displacements"])[:, mesh.bottom, 2].min(axis=1)
@@ -71,9 +90,9 @@ def bar(way: str) -> dict[str, Any]:
     ]
     deck += ["*NSET,NSET=FRONT,GENERATE", f"1,{4 * n + 1},4", "*ELEMENT,TYPE=C3D8,ELSET=SOLID"]
     deck += [",".join(map(str, [k + 1, *range(4 * k + 1, 4 * k + 9)])) for k in range(n)]
-    deck += ground(BAR | {"gap": BAR["height"], "nu": 0.0}, ["1,S1"], 4 * n + 5, n + 1, way, BAR["E"] / h) + [
-        "BODY,1,1"
-    ]
+    deck += ground(
+        BAR | {"gap": BAR["height"], "nu": 0.0}, ["1,S1"], 4 * n + 5, n + 1, way, BAR["E"] / h
+    ) + ["BODY,1,1"]
     weight = ["*DLOAD", f"SOLID,GRAV,{BAR['gravity']},0.,-1.,0."]
     told = run([*deck, *dynamic(way, BAR), *weight, "*END STEP"], BAR["steps"])
     found, u = histories(told, BAR), np.array(told["displacements"])[..., 2]
@@ -95,17 +114,30 @@ def square_deck(mesh: Square, data: dict[str, Any], way: str, stiff: float) -> l
     """Return the model of the square, a layer of wedges of depth 1 m."""
     count = len(mesh.points)
     deck = ["*NODE,NSET=BODY"]
-    deck += [f"{k + 1 + z * count},{x:.16g},{y:.16g},{z}" for z in (0, 1) for k, (x, y) in enumerate(mesh.points)]
+    deck += [
+        f"{k + 1 + z * count},{x:.16g},{y:.16g},{z}"
+        for z in (0, 1)
+        for k, (x, y) in enumerate(mesh.points)
+    ]
     deck += ["*NSET,NSET=FRONT,GENERATE", f"1,{count}", "*ELEMENT,TYPE=C3D6,ELSET=SOLID"]
-    deck += [",".join(map(str, [k + 1, *(nodes + 1), *(nodes + 1 + count)])) for k, nodes in enumerate(mesh.triangles)]
+    deck += [
+        ",".join(map(str, [k + 1, *(nodes + 1), *(nodes + 1 + count)]))
+        for k, nodes in enumerate(mesh.triangles)
+    ]
     faces = [f"{2 * k + 1},S3" for k in range(mesh.n)]
     return deck + ground(data, faces, 2 * count + 1, len(mesh.triangles) + 1, way, stiff)
 
 
-def ground(data: dict[str, Any], faces: list[str], node: int, element: int, way: str, stiff: float) -> list[str]:
+def ground(
+    data: dict[str, Any], faces: list[str], node: int, element: int, way: str, stiff: float
+) -> list[str]:
     """Return material, the fixed brick below the body, the contact pair and what holds both."""
     deck = ["*NODE,NSET=GROUND"]
-    corners = [(x, y, z) for z in (-0.5, 1.5) for x, y in ((-0.5, -1.0), (1.5, -1.0), (1.5, 0.0), (-0.5, 0.0))]
+    corners = [
+        (x, y, z)
+        for z in (-0.5, 1.5)
+        for x, y in ((-0.5, -1.0), (1.5, -1.0), (1.5, 0.0), (-0.5, 0.0))
+    ]
     deck += [f"{node + k},{x},{y - data['gap']},{z}" for k, (x, y, z) in enumerate(corners)]
     deck += [
         "*ELEMENT,TYPE=C3D8,ELSET=BRICK",
@@ -114,18 +146,31 @@ def ground(data: dict[str, Any], faces: list[str], node: int, element: int, way:
     ]
     deck += ["*ELASTIC", f"{data['E']},{data['nu']}", "*DENSITY", f"{data['rho']}"]
     deck += [f"*SOLID SECTION,ELSET={name},MATERIAL=STUFF" for name in ("SOLID", "BRICK")]
-    deck += ["*SURFACE,NAME=FOOT", *faces, "*SURFACE,NAME=TOP", f"{element},S5", "*SURFACE INTERACTION,NAME=TOUCH"]
+    deck += [
+        "*SURFACE,NAME=FOOT",
+        *faces,
+        "*SURFACE,NAME=TOP",
+        f"{element},S5",
+        "*SURFACE INTERACTION,NAME=TOUCH",
+    ]
     if way == "best":
         deck += ["*SURFACE BEHAVIOR,PRESSURE-OVERCLOSURE=LINEAR", f"{stiff:.16g},1.e-3"]
     else:
         deck += ["*SURFACE BEHAVIOR,PRESSURE-OVERCLOSURE=HARD"]
-    deck += [f"*CONTACT PAIR,INTERACTION=TOUCH,TYPE={'NODE' if way == 'best' else 'SURFACE'} TO SURFACE", "FOOT,TOP"]
+    deck += [
+        f"*CONTACT PAIR,INTERACTION=TOUCH,TYPE={'NODE' if way == 'best' else 'SURFACE'} TO SURFACE",
+        "FOOT,TOP",
+    ]
     return [*deck, "*BOUNDARY", "GROUND,1,3", "BODY,3,3"]
 
 
 def controls(way: str) -> list[str]:
     """Return the common tolerance, or nothing for the default."""
-    return ["*CONTROLS,PARAMETERS=FIELD", f"{problems.TOLERANCE},{problems.TOLERANCE}"] if way == "best" else []
+    return (
+        ["*CONTROLS,PARAMETERS=FIELD", f"{problems.TOLERANCE},{problems.TOLERANCE}"]
+        if way == "best"
+        else []
+    )
 
 
 def dynamic(way: str, data: dict[str, Any]) -> list[str]:
@@ -138,8 +183,19 @@ def dynamic(way: str, data: dict[str, Any]) -> list[str]:
         end, points = end + 0.5 * dt, ",TIME POINTS=EACH"
         deck = ["*TIME POINTS,NAME=EACH,GENERATE", f"{dt:.16g},{end:.16g},{dt:.16g}", *deck]
         deck += ["*DYNAMIC", f"{dt:.16g},{end:.16g},{1e-6 * dt:.8g},{dt:.16g}"]
-    printed = [f"*NODE PRINT,NSET=FRONT{points}", "U", f"*NODE PRINT,NSET=GROUND,TOTALS=ONLY{points}", "RF"]
-    return [*deck, *controls(way), *printed, f"*EL PRINT,ELSET=SOLID,TOTALS=ONLY{points}", "ELSE,ELKE"]
+    printed = [
+        f"*NODE PRINT,NSET=FRONT{points}",
+        "U",
+        f"*NODE PRINT,NSET=GROUND,TOTALS=ONLY{points}",
+        "RF",
+    ]
+    return [
+        *deck,
+        *controls(way),
+        *printed,
+        f"*EL PRINT,ELSET=SOLID,TOTALS=ONLY{points}",
+        "ELSE,ELKE",
+    ]
 
 
 def run(deck: list[str], steps: int = 1) -> dict[str, list[Any]]:
@@ -151,7 +207,11 @@ def run(deck: list[str], steps: int = 1) -> dict[str, list[Any]]:
     with open("deck.dat", encoding="ascii") as file:
         for line in file:
             if "time" in line:
-                key = next(word for word in ("displacements", "force", "internal", "kinetic") if word in line)
+                key = next(
+                    word
+                    for word in ("displacements", "force", "internal", "kinetic")
+                    if word in line
+                )
                 told.setdefault(key, []).append([])
             elif line.strip():
                 told[key][-1].append([float(word) for word in line.split()])

@@ -45,7 +45,10 @@ def version() -> str:
 
     gf.util_trace_level(0)
     return subprocess.run(
-        ["dpkg-query", "-W", "-f", "${Version}", "python3-getfem"], capture_output=True, text=True, check=True
+        ["dpkg-query", "-W", "-f", "${Version}", "python3-getfem"],
+        capture_output=True,
+        text=True,
+        check=True,
     ).stdout
 
 
@@ -93,7 +96,10 @@ def signorini(n: int, way: str) -> dict[str, Any]:
     version = [2] if way == "best" else []
     model.add_nodal_contact_with_rigid_obstacle_brick(mim, "u", "push", "r", FOOT, "y", *version)
     model.solve(*(["max_res", TOLERANCE] if way == "best" else []))
-    return {"u": model.variable("u")[order].reshape(-1, 2), "r": -unit * model.variable("push")[pushes(space)]}
+    return {
+        "u": model.variable("u")[order].reshape(-1, 2),
+        "r": -unit * model.variable("push")[pushes(space)],
+    }
 
 
 def inertia(model: Any, mim: Any, space: Any, mesh: Any, rho: float, low: Any) -> Any:
@@ -101,7 +107,9 @@ def inertia(model: Any, mim: Any, space: Any, mesh: Any, rho: float, low: Any) -
     body = np.setdiff1d(np.arange(mesh.nbcvs()), np.concatenate(low))
     model.add_Newmark_scheme("u", 0.25, 0.5)
     total = gf.Spmat("empty", space.nbdof(), space.nbdof())
-    for number, (elements, factor) in enumerate(((low[1], 2.0 if len(low[0]) else 1.0), (body, 1.0))):
+    for number, (elements, factor) in enumerate(
+        ((low[1], 2.0 if len(low[0]) else 1.0), (body, 1.0))
+    ):
         mesh.set_region(BODY + number, np.stack([elements, np.full(len(elements), -1)]))
         model.add_initialized_data(f"rho{number}", factor * rho)
         model.add_mass_brick(mim, "Dot2_u", f"rho{number}", BODY + number)
@@ -120,7 +128,9 @@ def thrown(way: str) -> dict[str, Any]:
     model.add_variable("push", n + 1)
     model.add_initialized_data("r", THROWN["E"] / unit)
     version = [2] if way == "best" else []
-    model.add_nodal_contact_with_rigid_obstacle_brick(mim, "u", "push", "r", FOOT, f"y+{gap}", *version)
+    model.add_nodal_contact_with_rigid_obstacle_brick(
+        mim, "u", "push", "r", FOOT, f"y+{gap}", *version
+    )
     model.set_variable("Previous_Dot_u", np.tile([0.0, -THROWN["speed"]], space.nbdof() // 2))
     foot = space.basic_dof_on_region(FOOT)[1::2]
     plain = gf.MeshFem(mesh, 1)
@@ -138,7 +148,11 @@ def thrown(way: str) -> dict[str, Any]:
 
 
 def bar(way: str) -> dict[str, Any]:
-    elements, weight, unit = BAR["elements"], BAR["rho"] * BAR["gravity"], BAR["E"] if way == "best" else 1.0
+    elements, weight, unit = (
+        BAR["elements"],
+        BAR["rho"] * BAR["gravity"],
+        BAR["E"] if way == "best" else 1.0,
+    )
     gf.util_trace_level(0)
     mesh = gf.Mesh("cartesian", np.linspace(0.0, BAR["length"], elements + 1))
     space, mim = gf.MeshFem(mesh, 1), gf.MeshIm(mesh, gf.Integ("IM_GAUSS1D(3)"))
@@ -163,7 +177,11 @@ def bar(way: str) -> dict[str, Any]:
     one.set_classical_fem(0)
     K = gf.asm_laplacian(mim, space, one, np.full(one.nbdof(), BAR["E"] / unit))
     rows = run(model, M, K, way, BAR["dt"], BAR["steps"])
-    up = BAR["height"] + np.array([np.trapz(u[order], dx=BAR["length"] / elements) for u in rows["u"]]) / BAR["length"]
+    up = (
+        BAR["height"]
+        + np.array([np.trapz(u[order], dx=BAR["length"] / elements) for u in rows["u"]])
+        / BAR["length"]
+    )
     return {
         "t": rows["t"],
         "force": unit * rows["force"],
@@ -181,7 +199,9 @@ def run(model: Any, M: Any, K: Any, way: str, dt: float, steps: int) -> dict[str
     for k in range(steps):
         model.solve(*options)
         u, v = model.variable("u"), model.variable("Dot_u")
-        rows.append((dt * (k + 1), -model.variable("push").sum(), 0.5 * (v @ M.mult(v) + u @ K.mult(u))))
+        rows.append(
+            (dt * (k + 1), -model.variable("push").sum(), 0.5 * (v @ M.mult(v) + u @ K.mult(u)))
+        )
         moved.append(u)
         model.shift_variables_for_time_integration()
     t, force, energy = np.array(rows).T

@@ -6,7 +6,9 @@ from typing import Any
 import KratosMultiphysics as KM
 import numpy as np
 import problems
-from KratosMultiphysics.StructuralMechanicsApplication.structural_mechanics_analysis import StructuralMechanicsAnalysis
+from KratosMultiphysics.StructuralMechanicsApplication.structural_mechanics_analysis import (
+    StructuralMechanicsAnalysis,
+)
 from problems import BAR, SIGNORINI, THROWN, Square, traction_load
 
 TITLE = "Kratos"
@@ -56,7 +58,9 @@ def version() -> str:
 class Run(StructuralMechanicsAnalysis):
     """Run an analysis whose model is made by nodes, cells and foot; keep what its nodes tell at every step."""
 
-    def __init__(self, way: str, body: tuple[Any, Any], foot: list[int], data: dict[str, Any], **given: Any) -> None:
+    def __init__(
+        self, way: str, body: tuple[Any, Any], foot: list[int], data: dict[str, Any], **given: Any
+    ) -> None:
         """Write the files of the model and read them."""
         self.points, self.foot, self.given, self.data = np.asarray(body[0]), foot, given, data
         self.told: list[tuple[Any, Any, float]] = []
@@ -157,7 +161,9 @@ def settings(way: str, data: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def model_files(points: Any, cells: Any, foot: list[int], data: dict[str, Any], given: dict[str, Any]) -> None:
+def model_files(
+    points: Any, cells: Any, foot: list[int], data: dict[str, Any], given: dict[str, Any]
+) -> None:
     """Write model.mdpa and materials.json: the body, and below it a strip of cells as wide as the foot's."""
     h = points[foot[1], 0] - points[foot[0], 0]
     edge = np.arange(-1, len(foot) + 1) * h
@@ -172,12 +178,19 @@ def model_files(points: Any, cells: Any, foot: list[int], data: dict[str, Any], 
         "End Properties",
     ]
     lines += ["Begin Nodes"]
-    lines += [f"{k + 1} {x:.16g} {y:.16g} 0.0" for k, (x, y) in enumerate([*map(tuple, points), *ground])]
+    lines += [
+        f"{k + 1} {x:.16g} {y:.16g} 0.0" for k, (x, y) in enumerate([*map(tuple, points), *ground])
+    ]
     kind = np.asarray(cells).shape[1]
     lines += ["End Nodes", f"Begin Elements SmallDisplacementElement2D{kind}N"]
-    lines += [f"{k + 1} 1 " + " ".join(str(node + 1) for node in nodes) for k, nodes in enumerate(cells)]
+    lines += [
+        f"{k + 1} 1 " + " ".join(str(node + 1) for node in nodes) for k, nodes in enumerate(cells)
+    ]
     lines += ["End Elements", "Begin Elements SmallDisplacementElement2D4N"]
-    quads = [(first + k, first + k + 1, first + across + k + 1, first + across + k) for k in range(across - 1)]
+    quads = [
+        (first + k, first + k + 1, first + across + k + 1, first + across + k)
+        for k in range(across - 1)
+    ]
     lines += [f"{count + k + 1} 1 " + " ".join(map(str, nodes)) for k, nodes in enumerate(quads)]
     lines += ["End Elements", "Begin Conditions LineCondition2D2N"]
     lower = [(foot[k] + 1, foot[k + 1] + 1) for k in range(len(foot) - 1)]
@@ -188,12 +201,18 @@ def model_files(points: Any, cells: Any, foot: list[int], data: dict[str, Any], 
     numbers = range(len(lower + upper) + 1, len(lower + upper + loads) + 1)
     if loads:
         lines += ["Begin Conditions PointLoadCondition2D1N"]
-        lines += [f"{number} 0 {node + 1}" for number, node in zip(numbers, loads, strict=True)] + ["End Conditions"]
+        lines += [f"{number} 0 {node + 1}" for number, node in zip(numbers, loads, strict=True)] + [
+            "End Conditions"
+        ]
     parts = {
         "Body": (range(1, first), range(1, count + 1), ()),
         "Ground": (range(first, first + 2 * across), range(count + 1, count + across), ()),
         "Foot": ([node + 1 for node in foot], (), range(1, len(lower) + 1)),
-        "Top": (range(first + across, first + 2 * across), (), range(len(lower) + 1, len(lower + upper) + 1)),
+        "Top": (
+            range(first + across, first + 2 * across),
+            (),
+            range(len(lower) + 1, len(lower + upper) + 1),
+        ),
     }
     if loads:
         parts["Load"] = ([node + 1 for node in loads], (), numbers)
@@ -210,9 +229,20 @@ def model_files(points: Any, cells: Any, foot: list[int], data: dict[str, Any], 
         "POISSON_RATIO": data.get("nu", 0.0),
         "THICKNESS": 1.0,
     }
-    material = {"constitutive_law": {"name": "LinearElasticPlaneStrain2DLaw"}, "Variables": variables, "Tables": {}}
+    material = {
+        "constitutive_law": {"name": "LinearElasticPlaneStrain2DLaw"},
+        "Variables": variables,
+        "Tables": {},
+    }
     with open("materials.json", "w", encoding="ascii") as file:
-        json.dump({"properties": [{"model_part_name": "Structure", "properties_id": 1, "Material": material}]}, file)
+        json.dump(
+            {
+                "properties": [
+                    {"model_part_name": "Structure", "properties_id": 1, "Material": material}
+                ]
+            },
+            file,
+        )
 
 
 def signorini(n: int, way: str) -> dict[str, Any]:
@@ -220,7 +250,14 @@ def signorini(n: int, way: str) -> dict[str, Any]:
     mesh = Square(n)
     force = traction_load(mesh)
     loads = {int(k): float(force[2 * k + 1]) for k in mesh.top}
-    run = Run(way, (mesh.points, mesh.triangles), mesh.bottom.tolist(), SIGNORINI, held=mesh.left.tolist(), loads=loads)
+    run = Run(
+        way,
+        (mesh.points, mesh.triangles),
+        mesh.bottom.tolist(),
+        SIGNORINI,
+        held=mesh.left.tolist(),
+        loads=loads,
+    )
     run.Run()
     return {"u": run.told[-1][0]}
 
@@ -252,7 +289,9 @@ def bar(way: str) -> dict[str, Any]:
     left, right = v[:, :-1], v[:, 1:]
     energy = BAR["rho"] * h / 6.0 * (left**2 + left * right + right**2).sum(axis=1)
     energy += 0.5 * BAR["E"] / h * (np.diff(u, axis=1) ** 2).sum(axis=1)
-    energy += BAR["rho"] * BAR["gravity"] * h * (BAR["height"] + 0.5 * (u[:, :-1] + u[:, 1:])).sum(axis=1)
+    energy += (
+        BAR["rho"] * BAR["gravity"] * h * (BAR["height"] + 0.5 * (u[:, :-1] + u[:, 1:])).sum(axis=1)
+    )
     return {
         "t": BAR["dt"] * np.arange(1, len(u) + 1),
         "force": [abs(one[-1]) / h for one in run.told],

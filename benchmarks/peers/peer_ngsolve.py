@@ -53,7 +53,10 @@ def signorini(n: int, way: str) -> dict[str, Any]:
     square = Square(n)
     mesh = plane(square, block=way == "default")
     space = ng.VectorH1(
-        mesh, order=1, dirichletx="left", dirichlet="block_bottom|block_top" if way == "default" else ""
+        mesh,
+        order=1,
+        dirichletx="left",
+        dirichlet="block_bottom|block_top" if way == "default" else "",
     )
     u = ng.GridFunction(space)
     u.components[1].Set(
@@ -68,11 +71,17 @@ def signorini(n: int, way: str) -> dict[str, Any]:
     contact = ng.BilinearForm(space, symmetric=True)
     if way == "best":
         below = ng.Variation(
-            0.5e8 * SIGNORINI["E"] * n * ng.IfPos(-d[1], d[1] ** 2, 0.0) * ng.ds("bottom", intrules={ng.SEGM: NODES})
+            0.5e8
+            * SIGNORINI["E"]
+            * n
+            * ng.IfPos(-d[1], d[1] ** 2, 0.0)
+            * ng.ds("bottom", intrules={ng.SEGM: NODES})
         )
         form += below
         contact += below
-        code, _ = NewtonMinimization(form, u, maxerr=1e-8 * 15.0, inverse="sparsecholesky", printing=False)
+        code, _ = NewtonMinimization(
+            form, u, maxerr=1e-8 * 15.0, inverse="sparsecholesky", printing=False
+        )
     else:
         pair = ng.ContactBoundary(mesh.Boundaries("bottom"), mesh.Boundaries("block_top"))
         gap = (ng.y + d[1]) - (ng.y.Other() + d.Other()[1])
@@ -86,11 +95,17 @@ def signorini(n: int, way: str) -> dict[str, Any]:
     contact.Apply(u.vec, force)
     count = mesh.nv
     numbers = np.arange((n + 1) ** 2)
-    return {"u": u.vec.FV().NumPy().reshape(2, count).T[numbers], "r": -force.FV().NumPy()[count:][: n + 1]}
+    return {
+        "u": u.vec.FV().NumPy().reshape(2, count).T[numbers],
+        "r": -force.FV().NumPy()[count:][: n + 1],
+    }
 
 
 def thrown(way: str) -> dict[str, Any]:
-    square, stiff = Square(THROWN["n"]), (10.0 if way == "best" else 1000.0) * THROWN["E"] * THROWN["n"]
+    square, stiff = (
+        Square(THROWN["n"]),
+        (10.0 if way == "best" else 1000.0) * THROWN["E"] * THROWN["n"],
+    )
     mesh = plane(square)
     space = ng.VectorH1(mesh, order=1)
     speed = ng.GridFunction(space)
@@ -107,13 +122,18 @@ def thrown(way: str) -> dict[str, Any]:
         stiff,
         speed,
         THROWN,
-        lambda d: gaps.append(THROWN["gap"] + float(d.vec.FV().NumPy()[mesh.nv :][square.bottom].min())),
+        lambda d: gaps.append(
+            THROWN["gap"] + float(d.vec.FV().NumPy()[mesh.nv :][square.bottom].min())
+        ),
     )
     return found | {"gap": gaps}
 
 
 def bar(way: str) -> dict[str, Any]:
-    n, stiff = BAR["elements"], (1.0 if way == "best" else 1000.0) * BAR["E"] * BAR["elements"] / BAR["length"]
+    n, stiff = (
+        BAR["elements"],
+        (1.0 if way == "best" else 1000.0) * BAR["E"] * BAR["elements"] / BAR["length"],
+    )
     mesh = interval(n, BAR["length"])
     space = ng.H1(mesh, order=1)
     u, w = space.TnT()
@@ -174,7 +194,14 @@ def march(
         a, b = (ng.IfPos(g, 0.0, g) for g in (gap(now), gap(u)))
         both = ng.IfPos(gap(now), 0.0, ng.IfPos(gap(u), 0.0, 1.0))
         moved = ng.IfPos(ng.Norm(gap(u) - gap(now)) - 1e-300, gap(u) - gap(now), 1.0)
-        push = 0.5 * stiff * (a + b) * ng.IfPos(both - 0.5, 1.0, (b - a) / moved) * virtual[0] * virtual[1]
+        push = (
+            0.5
+            * stiff
+            * (a + b)
+            * ng.IfPos(both - 0.5, 1.0, (b - a) / moved)
+            * virtual[0]
+            * virtual[1]
+        )
         form = ng.BilinearForm(space)
         form += data["rho"] * 2.0 / dt * ((u - now) / dt - speed) * w * ng.dx + push
         form += strained(u, w, data, 0.5) + strained(now, w, data, 0.5)
@@ -207,7 +234,9 @@ def march(
             speed.vec.data = product
             now.vec.data = new.vec
         else:
-            rule.Step(now, speed, acceleration, newton_args={"maxerr": problems.TOLERANCE * root(data)})
+            rule.Step(
+                now, speed, acceleration, newton_args={"maxerr": problems.TOLERANCE * root(data)}
+            )
             force.Apply(now.vec, pushed)
         forces.append(-float(np.sum(pushed.FV().NumPy())))
         product.data = inertia.mat * speed.vec
@@ -251,13 +280,21 @@ def plane(square: Square, block: bool = False) -> Any:
     """Return the square's mesh, with a block of one cell's height under it if asked."""
     build, n = Builder(dim=2), square.n
     points = [build.Add(MeshPoint(Pnt(x, y, 0.0))) for x, y in square.points.tolist()]
-    sides = {"bottom": square.bottom, "top": square.top[::-1], "left": square.left[::-1], "right": square.left + n}
+    sides = {
+        "bottom": square.bottom,
+        "top": square.top[::-1],
+        "left": square.left[::-1],
+        "right": square.left + n,
+    }
     build.Add(FaceDescriptor(surfnr=1, domin=1, bc=1))
     build.SetMaterial(1, "body")
     for nodes in square.triangles.tolist():
         build.Add(Element2D(1, [points[node] for node in nodes]))
     if block:
-        corners = [build.Add(MeshPoint(Pnt(x, y, 0.0))) for x, y in ((0, -1 / n), (1, -1 / n), (1, 0), (0, 0))]
+        corners = [
+            build.Add(MeshPoint(Pnt(x, y, 0.0)))
+            for x, y in ((0, -1 / n), (1, -1 / n), (1, 0), (0, 0))
+        ]
         build.Add(FaceDescriptor(surfnr=2, domin=2, bc=2))
         build.SetMaterial(2, "block")
         for nodes in ((0, 1, 2), (0, 2, 3)):

@@ -86,7 +86,9 @@ def thrown(way: str) -> dict[str, Any]:
     count = len(mesh.points)
     for node in range(count):
         ops.setNodeVel(node + 1, 2, -THROWN["speed"], "-commit")
-    ops.uniaxialMaterial("ElasticPPGap", 2, (10.0 if way == "best" else 1000.0) * THROWN["E"], -1e30, -THROWN["gap"])
+    ops.uniaxialMaterial(
+        "ElasticPPGap", 2, (10.0 if way == "best" else 1000.0) * THROWN["E"], -1e30, -THROWN["gap"]
+    )
     springs(mesh, ground)
     u, v, force = march(way, (1, count), (1, 2), (ground, ground + THROWN["n"]), 2, THROWN)
     mass = np.repeat(
@@ -115,7 +117,9 @@ def bar(way: str) -> dict[str, Any]:
         ops.load(k + 1, float(-mass[k] * BAR["gravity"]))
     for k in range(n):
         ops.element("Truss", k + 1, k + 1, k + 2, 1.0, 1, "-rho", BAR["rho"])
-    ops.uniaxialMaterial("ElasticPPGap", 2, (1.0 if way == "best" else 1000.0) * BAR["E"] / h, -1e30, -BAR["height"])
+    ops.uniaxialMaterial(
+        "ElasticPPGap", 2, (1.0 if way == "best" else 1000.0) * BAR["E"] / h, -1e30, -BAR["height"]
+    )
     ops.node(n + 2, 0.0)
     ops.fix(n + 2, 1)
     ops.element("zeroLength", n + 1, n + 2, 1, "-mat", 2, "-dir", 1)
@@ -150,7 +154,9 @@ def plane(mesh: Square, E: float, nu: float, rho: float = 0.0) -> int:
 def springs(mesh: Square, ground: int) -> None:
     """Join the ground's nodes with springs of material 2."""
     for k, node in enumerate(mesh.bottom.tolist()):
-        ops.element("zeroLength", len(mesh.triangles) + 1 + k, ground + k, node + 1, "-mat", 2, "-dir", 2)
+        ops.element(
+            "zeroLength", len(mesh.triangles) + 1 + k, ground + k, node + 1, "-mat", 2, "-dir", 2
+        )
 
 
 def solver(system: str, *integrator: Any) -> None:
@@ -170,16 +176,39 @@ def done(code: int) -> None:
 
 
 def march(
-    way: str, nodes: tuple[int, int], dofs: tuple[int, ...], ground: tuple[int, int], normal: int, data: dict[str, Any]
+    way: str,
+    nodes: tuple[int, int],
+    dofs: tuple[int, ...],
+    ground: tuple[int, int],
+    normal: int,
+    data: dict[str, Any],
 ) -> Any:
     """Run all steps; return displacements and velocities of the nodes and the forces of the ground, one row a step."""
     with TemporaryDirectory() as folder:
         for what in ("disp", "vel"):
             ops.recorder(
-                "Node", "-file", f"{folder}/{what}", "-precision", 16, "-nodeRange", *nodes, "-dof", *dofs, what
+                "Node",
+                "-file",
+                f"{folder}/{what}",
+                "-precision",
+                16,
+                "-nodeRange",
+                *nodes,
+                "-dof",
+                *dofs,
+                what,
             )
         ops.recorder(
-            "Node", "-file", f"{folder}/reaction", "-precision", 16, "-nodeRange", *ground, "-dof", normal, "reaction"
+            "Node",
+            "-file",
+            f"{folder}/reaction",
+            "-precision",
+            16,
+            "-nodeRange",
+            *ground,
+            "-dof",
+            normal,
+            "reaction",
         )
         solver("UmfPack", *(("TRBDF2",) if way == "best" else ("Newmark", 0.5, 0.25)))
         ops.analysis("Transient")

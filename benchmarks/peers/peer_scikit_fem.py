@@ -81,7 +81,9 @@ def thrown(way: str) -> dict[str, Any]:
     ours, _, basis = square(THROWN["n"])
     K = linear_elasticity(*lame_parameters(THROWN["E"], THROWN["nu"])).assemble(basis)
     M = skfem.BilinearForm(lambda u, v, w: THROWN["rho"] * dot(u, v)).assemble(basis)
-    ground, above = (basis.nodal_dofs[1, nodes] for nodes in (ours.bottom, ours.bottom + THROWN["n"] + 1))
+    ground, above = (
+        basis.nodal_dofs[1, nodes] for nodes in (ours.bottom, ours.bottom + THROWN["n"] + 1)
+    )
     v = np.zeros(basis.N)
     v[basis.nodal_dofs[1]] = -THROWN["speed"]
     if way == "best":
@@ -109,14 +111,18 @@ def without_mass(M: Any, ground: Any, above: Any) -> Any:
     """Return the mass matrix with the mass of the ground's unknowns moved to those above them."""
     moved, mine = M.tolil(), np.asarray(M.sum(axis=1)).ravel()
     moved[ground], moved[:, ground] = 0.0, 0.0
-    lost = mine - np.asarray(moved.sum(axis=1)).ravel()  # of the ground, and of what it shared with its neighbours
+    lost = (
+        mine - np.asarray(moved.sum(axis=1)).ravel()
+    )  # of the ground, and of what it shared with its neighbours
     shared = np.setdiff1d(np.flatnonzero(lost), ground)
     moved[shared, shared] += lost[shared]
     moved[above, above] += lost[ground]
     return moved.tocsr()
 
 
-def run(M: Any, K: Any, f: Any, v: Any, a: Any, ground: Any, gap: float, dt: float, steps: int) -> dict[str, Any]:
+def run(
+    M: Any, K: Any, f: Any, v: Any, a: Any, ground: Any, gap: float, dt: float, steps: int
+) -> dict[str, Any]:
     """Step on from u = 0 by the trapezoidal rule with contact at the end of the step."""
     u, rows, closed = 0.0 * v, [], np.full(len(ground), False)
     factor = splu((4.0 / dt**2 * M + K).tocsc())
@@ -128,7 +134,9 @@ def run(M: Any, K: Any, f: Any, v: Any, a: Any, ground: Any, gap: float, dt: flo
         free = factor.solve(f + M @ (4.0 / dt**2 * u + 4.0 / dt * v + a))
         for _ in range(50):
             r = np.zeros(len(ground))
-            r[closed] = np.linalg.solve(flexible[np.ix_(closed, closed)], -gap - free[ground][closed])
+            r[closed] = np.linalg.solve(
+                flexible[np.ix_(closed, closed)], -gap - free[ground][closed]
+            )
             height = gap + free[ground] + flexible @ r
             wanted = np.where(closed, r > 0.0, height < 0.0)
             if np.array_equal(wanted, closed):

@@ -66,7 +66,15 @@ def thrown(way: str) -> dict[str, Any]:
     K, M = problems.stiffness(mesh, THROWN["E"], THROWN["nu"]), problems.mass(mesh, THROWN["rho"])
     v = np.tile([0.0, -THROWN["speed"]], len(mesh.points))
     return run(
-        M.toarray(), K.toarray(), v, None, 2 * mesh.bottom + 1, THROWN["gap"], way, THROWN["dt"], THROWN["steps"]
+        M.toarray(),
+        K.toarray(),
+        v,
+        None,
+        2 * mesh.bottom + 1,
+        THROWN["gap"],
+        way,
+        THROWN["dt"],
+        THROWN["steps"],
     )
 
 
@@ -81,7 +89,9 @@ def bar(way: str) -> dict[str, Any]:
     return found | {"foot": found["gap"], "energy": found["energy"] - found.pop("work") + start}
 
 
-def run(M: Any, K: Any, v: Any, pull: Any, points: Any, gap: float, way: str, dt: float, steps: int) -> dict[str, Any]:
+def run(
+    M: Any, K: Any, v: Any, pull: Any, points: Any, gap: float, way: str, dt: float, steps: int
+) -> dict[str, Any]:
     """Step on from u = 0, and return the histories."""
     body = kernel.LagrangianLinearTIDS(np.zeros(len(v)), v, M, K, np.zeros_like(K))
     if pull is not None:
@@ -108,7 +118,15 @@ def run(M: Any, K: Any, v: Any, pull: Any, points: Any, gap: float, way: str, dt
         u, w = np.array(body.q()), np.array(body.velocity())
         impulse = sum(one.lambda_(1)[0] for one in contacts)
         work = 0.0 if pull is None else pull @ u
-        rows.append((stepper.nextTime(), impulse / dt, gap + u[points].min(), 0.5 * (w @ M @ w + u @ K @ u), work))
+        rows.append(
+            (
+                stepper.nextTime(),
+                impulse / dt,
+                gap + u[points].min(),
+                0.5 * (w @ M @ w + u @ K @ u),
+                work,
+            )
+        )
         stepper.nextStep()
     t, force, gaps, energy, work = np.array(rows).T
     return {"t": t, "force": force, "gap": gaps, "energy": energy, "work": work, "u": u}

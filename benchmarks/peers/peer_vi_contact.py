@@ -43,7 +43,9 @@ def signorini(n: int, way: str) -> dict[str, Any]:
     foot = fem.Facets.where("foot", mesh, lambda x: np.isclose(x[1], 0.0))
     top = fem.Facets.where("top", mesh, lambda x: np.isclose(x[1], 1.0))
     left = fem.Facets.where("left", mesh, lambda x: np.isclose(x[0], 0.0))
-    pull = fem.Traction(top, lambda x, t: np.stack([0.0 * x[:, 0], problems.traction(x[:, 0])], axis=1))
+    pull = fem.Traction(
+        top, lambda x, t: np.stack([0.0 * x[:, 0], problems.traction(x[:, 0])], axis=1)
+    )
     system = fem.assemble(
         mesh,
         vc.LinearElastic(E=SIGNORINI["E"], nu=SIGNORINI["nu"], rho=1.0),
@@ -55,7 +57,10 @@ def signorini(n: int, way: str) -> dict[str, Any]:
     state = vc.static_equilibrium(problem, solver=vc.Condensed() if way == "best" else None)
     u = fem.as_function(problem, state, "u")
     order = np.lexsort(np.rint(n * u.function_space.tabulate_dof_coordinates()[:, :2]).T)
-    return {"u": u.x.array.reshape(-1, 2)[order], "r": state.r_n[np.argsort(problem.surface.points[:, 0])]}
+    return {
+        "u": u.x.array.reshape(-1, 2)[order],
+        "r": state.r_n[np.argsort(problem.surface.points[:, 0])],
+    }
 
 
 def thrown(way: str) -> dict[str, Any]:
@@ -77,14 +82,20 @@ def bar(way: str) -> dict[str, Any]:
     mesh = dolfinx.mesh.create_interval(MPI.COMM_WORLD, BAR["elements"], [0.0, BAR["length"]])
     foot = fem.Facets.where("foot", mesh, lambda x: np.isclose(x[0], 0.0))
     pull = -BAR["rho"] * BAR["gravity"]
-    system = fem.assemble(mesh, vc.LinearElastic(E=BAR["E"], nu=0.0, rho=BAR["rho"]), loads=fem.BodyForce((pull,)))
+    system = fem.assemble(
+        mesh, vc.LinearElastic(E=BAR["E"], nu=0.0, rho=BAR["rho"]), loads=fem.BodyForce((pull,))
+    )
     ground = vc.HalfSpace(point=(-BAR["height"],), normal=(1.0,))
     problem = vc.ContactProblem(system, fem.contact_surface(system, foot, obstacle=ground))
     found = run(problem, way, BAR["dt"], BAR["steps"])
     u = system.space.expand(found.pop("state").u, 0.0)
     along = u[np.argsort(system.space.points[:, 0]), 0]
     start = BAR["rho"] * BAR["gravity"] * BAR["length"] * BAR["height"]
-    return found | {"u": along, "foot": found.pop("gap"), "energy": found["energy"] - found.pop("work") + start}
+    return found | {
+        "u": along,
+        "foot": found.pop("gap"),
+        "energy": found["energy"] - found.pop("work") + start,
+    }
 
 
 def run(problem: Any, way: str, dt: float, steps: int) -> dict[str, Any]:

@@ -82,7 +82,16 @@ def traction(x: Any) -> Any:
 
 
 # The thrown square, above rigid frictionless ground.
-THROWN = {"E": 1.0e7, "nu": 0.3, "rho": 1000.0, "gap": 0.01, "speed": 1.0, "n": 16, "dt": 2.5e-4, "steps": 400}
+THROWN = {
+    "E": 1.0e7,
+    "nu": 0.3,
+    "rho": 1000.0,
+    "gap": 0.01,
+    "speed": 1.0,
+    "n": 16,
+    "dt": 2.5e-4,
+    "steps": 400,
+}
 
 # The bouncing bar of Doyen, Ern and Piperno (2011), upright, foot at x = 0, released above the ground under gravity.
 # Period 16/3 s with two bounces in it; one step is one crossing of an element (Courant number 1).
@@ -93,7 +102,9 @@ BAR = {"length": 10.0, "E": 900.0, "rho": 1.0, "gravity": 10.0, "height": 5.0, "
 def stiffness(mesh: Square, E: float, nu: float) -> Any:
     """Return the stiffness of plane strain (2N, 2N), unknown 2 i + c for component c of node i."""
     lame, shear = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), E / (2.0 * (1.0 + nu))
-    law = np.array([[lame + 2.0 * shear, lame, 0.0], [lame, lame + 2.0 * shear, 0.0], [0.0, 0.0, shear]])
+    law = np.array(
+        [[lame + 2.0 * shear, lame, 0.0], [lame, lame + 2.0 * shear, 0.0], [0.0, 0.0, shear]]
+    )
     corners = mesh.points[mesh.triangles]
     across = np.roll(corners, -1, axis=1) - np.roll(corners, -2, axis=1)  # opposite edges
     one, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
@@ -118,7 +129,9 @@ def _assemble(mesh: Square, local: Any) -> Any:
     numbers = (2 * mesh.triangles[..., None] + np.arange(2)).reshape(-1, 6)
     rows, columns = np.repeat(numbers, 6, axis=1), np.tile(numbers, 6)
     size = 2 * len(mesh.points)
-    return sparse.csr_matrix((local.reshape(-1), (rows.ravel(), columns.ravel())), shape=(size, size))
+    return sparse.csr_matrix(
+        (local.reshape(-1), (rows.ravel(), columns.ravel())), shape=(size, size)
+    )
 
 
 def traction_load(mesh: Square) -> Any:
@@ -245,7 +258,9 @@ def _bar(answer: dict[str, Any], n: int) -> dict[str, float]:
     """Compare with the exact solution; force errors count wrong forces in flight too."""
     exact = bar_reference()
     t, force = (np.asarray(answer[key], dtype=float) for key in ("t", "force"))
-    truth = np.asarray(exact.force(t - 0.5 * BAR["dt"]))  # a step's force is compared with that of its middle
+    truth = np.asarray(
+        exact.force(t - 0.5 * BAR["dt"])
+    )  # a step's force is compared with that of its middle
     first = t < exact.period / 2.0
     x = np.linspace(0.0, BAR["length"], BAR["elements"] + 1)
     away = np.asarray(answer["u"], dtype=float) - np.asarray(exact.displacement(x, float(t[-1])))
@@ -301,24 +316,42 @@ def lines_of(path: Path, *wanted_names: str) -> int:
             parts.update({(one.asname or one.name).split(".")[0]: node for one in node.names})
         elif isinstance(node, (ast.Assign, ast.AnnAssign)):
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-            parts.update({name.id: node for one in targets for name in ast.walk(one) if isinstance(name, ast.Name)})
+            parts.update(
+                {
+                    name.id: node
+                    for one in targets
+                    for name in ast.walk(one)
+                    if isinstance(name, ast.Name)
+                }
+            )
     wanted, todo, taken = set(), list(wanted_names), set()
     while todo:
         name = todo.pop()
         if name in parts and name not in wanted:
             wanted.add(name)
             todo += [one.id for one in ast.walk(parts[name]) if isinstance(one, ast.Name)]
-            taken.update(one.attr for one in ast.walk(parts[name]) if isinstance(one, ast.Attribute))
+            taken.update(
+                one.attr for one in ast.walk(parts[name]) if isinstance(one, ast.Attribute)
+            )
     lines: set[int] = set()
     for name in wanted:
         lines.update(range(parts[name].lineno, (parts[name].end_lineno or 0) + 1))
         for node in ast.walk(parts[name]):
             said = getattr(node, "body", None)
-            if isinstance(node, (ast.FunctionDef, ast.ClassDef)) and ast.get_docstring(node) and isinstance(said, list):
+            if (
+                isinstance(node, (ast.FunctionDef, ast.ClassDef))
+                and ast.get_docstring(node)
+                and isinstance(said, list)
+            ):
                 lines.difference_update(range(said[0].lineno, (said[0].end_lineno or 0) + 1))
     text = source.splitlines()
-    own = sum(bool(text[number - 1].strip()) and not text[number - 1].strip().startswith("#") for number in lines)
+    own = sum(
+        bool(text[number - 1].strip()) and not text[number - 1].strip().startswith("#")
+        for number in lines
+    )
     borrowed = {"stiffness", "mass", "traction_load"} & taken if "problems" in wanted else set()
     if not borrowed or path == Path(__file__).resolve():
         return own
-    return own + lines_of(Path(__file__).resolve(), *(borrowed | {"_assemble"})) - 1  # np is imported once
+    return (
+        own + lines_of(Path(__file__).resolve(), *(borrowed | {"_assemble"})) - 1
+    )  # np is imported once

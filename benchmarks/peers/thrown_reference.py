@@ -26,7 +26,9 @@ from problems import HERE, THROWN, Square, complementarity, mass, stiffness
 def speed() -> float:
     """Return c_P [m/s] of plane strain."""
     nu = THROWN["nu"]
-    return float(np.sqrt(THROWN["E"] * (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu)) / THROWN["rho"]))
+    return float(
+        np.sqrt(THROWN["E"] * (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu)) / THROWN["rho"])
+    )
 
 
 def run(n: int) -> dict[str, float]:
@@ -92,7 +94,9 @@ def main(sizes: tuple[int, ...] = (64, 128, 256)) -> None:
         "runs": runs,
     }
     if "--dry" not in sys.argv:
-        (HERE / "thrown_reference.json").write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
+        (HERE / "thrown_reference.json").write_text(
+            json.dumps(stored, indent=1) + "\n", encoding="utf-8"
+        )
 
 
 if __name__ == "__main__":

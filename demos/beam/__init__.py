@@ -13,6 +13,16 @@ from .tip import ExactFriction, RegularisedFriction, Slip, TipFriction
 from .values import Rod, Start, TimoshenkoBeam
 
 __all__ = [
-    "BeamRun", "BeamStepper", "Elements", "ExactFriction", "RegularisedFriction", "Rod", "Slip", "Snapshot", "Start",
-    "TimoshenkoBeam", "TipFriction", "run_beam",
+    "BeamRun",
+    "BeamStepper",
+    "Elements",
+    "ExactFriction",
+    "RegularisedFriction",
+    "Rod",
+    "Slip",
+    "Snapshot",
+    "Start",
+    "TimoshenkoBeam",
+    "TipFriction",
+    "run_beam",
 ]

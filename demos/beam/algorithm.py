@@ -36,8 +36,19 @@ from .tip import ExactFriction, TipFriction
 from .values import Start, TimoshenkoBeam
 
 COLUMNS = (
-    "t", "u_tip", "v_tip", "friction_force", "slip", "normal_force", "mu", "newton", "energy_kinetic", "energy_strain",
-    "work_input", "loss_damping", "loss_friction",
+    "t",
+    "u_tip",
+    "v_tip",
+    "friction_force",
+    "slip",
+    "normal_force",
+    "mu",
+    "newton",
+    "energy_kinetic",
+    "energy_strain",
+    "work_input",
+    "loss_damping",
+    "loss_friction",
 )
 
 
@@ -75,7 +86,9 @@ class BeamRun:
     def save(self, path: str | Path) -> Path:
         """Write the history as CSV, a line per time."""
         file = checks.path("BeamRun.save", "the path", path)
-        return write_csv(file, list(self.history), np.column_stack(list(self.history.values())).tolist())
+        return write_csv(
+            file, list(self.history), np.column_stack(list(self.history.values())).tolist()
+        )
 
 
 @dataclass(frozen=True)
@@ -96,10 +109,18 @@ class BeamStepper:
         instance(owner, "beam", self.beam, TimoshenkoBeam, "give a TimoshenkoBeam")
         instance(owner, "elements", self.elements, Elements, "give Elements(count)")
         number(owner, "the time step dt", self.dt, positive=True, unit="s")
-        function(owner, "normal_force", self.normal_force, "give a function of t that returns |r_N| in N")
+        function(
+            owner, "normal_force", self.normal_force, "give a function of t that returns |r_N| in N"
+        )
         function(owner, "mu", self.mu, "give a function of (t, slip rate)")
-        provides(owner, "friction", self.friction, ("solve",), "give ExactFriction() or RegularisedFriction(eps)",
-                 lacks=("limit",))
+        provides(
+            owner,
+            "friction",
+            self.friction,
+            ("solve",),
+            "give ExactFriction() or RegularisedFriction(eps)",
+            lacks=("limit",),
+        )
         optional(function, owner, "load", self.load, "give a function of t in N/m, or None")
 
     def given(self, t: float, rate: float) -> tuple[float, float, float]:
@@ -107,7 +128,11 @@ class BeamStepper:
         owner, at = "BeamStepper", f"({t:.6g} s)"
         N = number(owner, f"normal_force{at}", self.normal_force(t), not_negative=True, unit="N")
         mu = number(owner, f"mu({t:.6g} s, {rate:.6g} m/s)", self.mu(t, rate), not_negative=True)
-        return N, mu, 0.0 if self.load is None else number(owner, f"load{at}", self.load(t), unit="N/m")
+        return (
+            N,
+            mu,
+            0.0 if self.load is None else number(owner, f"load{at}", self.load(t), unit="N/m"),
+        )
 
 
 def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) -> BeamRun:
@@ -118,7 +143,9 @@ def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) 
     instance("run_beam", "stepper", stepper, BeamStepper, "give BeamStepper(...)")
     instance("run_beam", "start", start, Start, "give Start(...)")
     steps, every = whole("run_beam", "steps", steps, least=1), whole("run_beam", "every", every)
-    kept = (len(COLUMNS) + 1) * steps + (4 * stepper.elements.count * (steps // every) if every else 0)
+    kept = (len(COLUMNS) + 1) * steps + (
+        4 * stepper.elements.count * (steps // every) if every else 0
+    )
     counted("run_beam", f"a run of {steps} steps", kept, "numbers to keep")
     x = stepper.elements.nodes(stepper.beam.length)
     y0 = np.concatenate([start.at("theta", x), start.at("u", x)])
@@ -139,7 +166,9 @@ def run_beam(stepper: BeamStepper, start: Start, *, steps: int, every: int = 0) 
     return BeamRun(np.insert(x, 0, 0.0), history, tuple(snapshots))
 
 
-def _states(stepper: BeamStepper, y: Array, w: Array) -> Iterator[tuple[tuple[float, ...], Array, Array]]:
+def _states(
+    stepper: BeamStepper, y: Array, w: Array
+) -> Iterator[tuple[tuple[float, ...], Array, Array]]:
     """Yield (values by COLUMNS, works and losses of the step alone; y, w) at the start and after every step."""
     dt, viscosity = stepper.dt, stepper.beam.viscosity
     M, S, uniform = beam_matrices(stepper.beam, stepper.elements)
@@ -167,7 +196,26 @@ def _states(stepper: BeamStepper, y: Array, w: Array) -> Iterator[tuple[tuple[fl
         kinetic, strain = energies()
         work, viscous = f * float(uniform @ moved), viscosity / dt * float(moved @ (S @ moved))
         if not np.isfinite(kinetic + strain + work):
-            raise StepFailure(f"{at}: the beam's motion or its energy is no finite number; check the loads and the "
-                              "state at the start")
-        yield ((k + 1) * dt, y[-1], w[-1], slip.force, slip.s, N, mu, slip.updates, kinetic, strain, work, viscous,
-               slip.force * slip.s), y, w
+            raise StepFailure(
+                f"{at}: the beam's motion or its energy is no finite number; check the loads and the "
+                "state at the start"
+            )
+        yield (
+            (
+                (k + 1) * dt,
+                y[-1],
+                w[-1],
+                slip.force,
+                slip.s,
+                N,
+                mu,
+                slip.updates,
+                kinetic,
+                strain,
+                work,
+                viscous,
+                slip.force * slip.s,
+            ),
+            y,
+            w,
+        )

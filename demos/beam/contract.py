@@ -50,8 +50,13 @@ def rod_problem(rod: Rod, elements: Elements, start: Start | None = None) -> Con
 
 
 def beam_problem(
-    beam: TimoshenkoBeam, elements: Elements, *, normal_force: History, friction: FrictionLaw,
-    start: Start | None = None, load: History | None = None,
+    beam: TimoshenkoBeam,
+    elements: Elements,
+    *,
+    normal_force: History,
+    friction: FrictionLaw,
+    start: Start | None = None,
+    load: History | None = None,
 ) -> ContactProblem:
     """Set up the beam pressed on the wall with normal_force(t) >= 0 [N], the load of a mass rho A l held by the wall.
 
@@ -59,7 +64,12 @@ def beam_problem(
     Algorithm 10 at t. ``load``: uniform, across [N/m].
     """
     _check("beam_problem", elements, (start,), load, beam=beam, friction=friction)
-    function("beam_problem", "normal_force", normal_force, "give a function of t that returns |r_N| >= 0 in N")
+    function(
+        "beam_problem",
+        "normal_force",
+        normal_force,
+        "give a function of t that returns |r_N| >= 0 in N",
+    )
     x = elements.nodes(beam.length)
     mass = sp.csr_matrix([[beam.rho * beam.area * beam.length]])
     push, rest = ((np.ones(1), _given("normal_force", normal_force, "N")),), np.zeros(1)
@@ -68,17 +78,29 @@ def beam_problem(
 
 
 def rubbing_problem(
-    rod: Rod, beam: TimoshenkoBeam, elements: Elements, *, friction: FrictionLaw, rod_start: Start | None = None,
-    start: Start | None = None, load: History | None = None,
+    rod: Rod,
+    beam: TimoshenkoBeam,
+    elements: Elements,
+    *,
+    friction: FrictionLaw,
+    rod_start: Start | None = None,
+    start: Start | None = None,
+    load: History | None = None,
 ) -> ContactProblem:
     """Set up rod and beam of one length: the beam rubs with the rod's contact force. InputError for two lengths."""
-    _check("rubbing_problem", elements, (start, rod_start), load, rod=rod, beam=beam, friction=friction)
+    _check(
+        "rubbing_problem", elements, (start, rod_start), load, rod=rod, beam=beam, friction=friction
+    )
     if rod.length != beam.length:
-        raise InputError(f"the rod is {rod.length:g} m long and the beam {beam.length:g} m: they are one body, give "
-                         "one length")
+        raise InputError(
+            f"the rod is {rod.length:g} m long and the beam {beam.length:g} m: they are one body, give "
+            "one length"
+        )
     x = elements.nodes(beam.length)
     bar = _Part.of_rod(rod, elements, rod_start or Start())
-    return _problem(x, bar, _Part.of_beam(beam, elements, start or Start(), load), rod.gap, friction)
+    return _problem(
+        x, bar, _Part.of_beam(beam, elements, start or Start(), load), rod.gap, friction
+    )
 
 
 @dataclass(frozen=True)
@@ -97,12 +119,20 @@ class StepForces:
         step = math.floor(t / self.dt + 1e-6)
         if not 0 <= step < len(self.forces):
             end = len(self.forces) * self.dt
-            raise InputError(f"the rod's forces are known for 0 <= t < {end:g} s, not at {t:g} s: let it run as long")
+            raise InputError(
+                f"the rod's forces are known for 0 <= t < {end:g} s, not at {t:g} s: let it run as long"
+            )
         return self.forces[step]
 
 
 def rod_forces(
-    rod: Rod, elements: Elements, *, dt: float, steps: int, start: Start | None = None, scheme: Scheme | None = None
+    rod: Rod,
+    elements: Elements,
+    *,
+    dt: float,
+    steps: int,
+    start: Start | None = None,
+    scheme: Scheme | None = None,
 ) -> StepForces:
     """Return |r_N| of every step of the rod [N], for Algorithm 10. ``scheme``: Midpoint(), the source's, when None.
 
@@ -135,12 +165,29 @@ class _Part:
         M, K, uniform = rod_matrices(rod, elements.count)
         tip = np.zeros_like(x)
         tip[-1] = 1.0
-        given = ((uniform, "body_force", rod.body_force, "N/m"), (tip, "end_force", rod.end_force, "N"))
-        loads = tuple((vector, _given(name, history, unit)) for vector, name, history, unit in given if history)
-        return cls(M, K, rod.viscosity, loads, start.at("u", x), start.at("v", x), rod.rho * rod.area * uniform)
+        given = (
+            (uniform, "body_force", rod.body_force, "N/m"),
+            (tip, "end_force", rod.end_force, "N"),
+        )
+        loads = tuple(
+            (vector, _given(name, history, unit))
+            for vector, name, history, unit in given
+            if history
+        )
+        return cls(
+            M,
+            K,
+            rod.viscosity,
+            loads,
+            start.at("u", x),
+            start.at("v", x),
+            rod.rho * rod.area * uniform,
+        )
 
     @classmethod
-    def of_beam(cls, beam: TimoshenkoBeam, elements: Elements, start: Start, load: History | None) -> "_Part":
+    def of_beam(
+        cls, beam: TimoshenkoBeam, elements: Elements, start: Start, load: History | None
+    ) -> "_Part":
         x, (M, S, uniform) = elements.nodes(beam.length), beam_matrices(beam, elements)
         y = np.concatenate([start.at("theta", x), start.at("u", x)])
         w = np.concatenate([start.at("omega", x), start.at("v", x)])
@@ -151,11 +198,17 @@ class _Part:
 def _given(name: str, history: History, unit: str) -> History:
     """The function; InputError, naming the time, where it returns no finite number, or a negative normal force."""
     pressing = name == "normal_force"
-    return lambda t: number("beam", f"{name}({t:.6g} s)", history(t), not_negative=pressing, unit=unit)
+    return lambda t: number(
+        "beam", f"{name}({t:.6g} s)", history(t), not_negative=pressing, unit=unit
+    )
 
 
 def _check(
-    owner: str, elements: Elements, starts: tuple[Start | None, ...], load: History | None = None, **given: Any
+    owner: str,
+    elements: Elements,
+    starts: tuple[Start | None, ...],
+    load: History | None = None,
+    **given: Any,
 ) -> None:
     """InputError for what is no element count, start, load, rod, beam or friction law."""
     instance(owner, "elements", elements, Elements, "give Elements(count)")
@@ -166,10 +219,18 @@ def _check(
         if name in given:
             instance(owner, name, given[name], kind, f"give a {kind.__name__}")
     if "friction" in given:
-        provides(owner, "friction", given["friction"], ("limit", "slope", "at"), "give a law, for example Coulomb(mu)")
+        provides(
+            owner,
+            "friction",
+            given["friction"],
+            ("limit", "slope", "at"),
+            "give a law, for example Coulomb(mu)",
+        )
 
 
-def _problem(x: Array, along: _Part, across: _Part | None, gap: float, friction: FrictionLaw) -> ContactProblem:
+def _problem(
+    x: Array, along: _Part, across: _Part | None, gap: float, friction: FrictionLaw
+) -> ContactProblem:
     parts = [along] if across is None else [along, across]
     sizes = [len(part.u0) for part in parts]
     m, d = len(x), 1 if across is None else 2
@@ -183,15 +244,26 @@ def _problem(x: Array, along: _Part, across: _Part | None, gap: float, friction:
     nodes = np.append(0.0, x)[:, None] * np.eye(1, d)  # the first one is clamped
     last = np.arange(1, m + 1)
     meaning = [np.column_stack([last[m - sizes[0] :], np.zeros(sizes[0])])]
-    meaning += [] if across is None else [np.column_stack([last, np.full(m, c)]) for c in (-1, 1)]  # rotations, across
+    meaning += (
+        [] if across is None else [np.column_stack([last, np.full(m, c)]) for c in (-1, 1)]
+    )  # rotations, across
     system = system_from_arrays(
         sp.block_diag([part.M for part in parts]),
         sp.block_diag([part.viscosity * part.K for part in parts]) if damped else None,
-        sp.block_diag([part.K for part in parts]), coordinates=nodes, unknowns=np.concatenate(meaning),
-        load=Load(np.zeros(sum(sizes)), tuple(loads)), u0=np.concatenate([part.u0 for part in parts]),
+        sp.block_diag([part.K for part in parts]),
+        coordinates=nodes,
+        unknowns=np.concatenate(meaning),
+        load=Load(np.zeros(sum(sizes)), tuple(loads)),
+        u0=np.concatenate([part.u0 for part in parts]),
         v0=np.concatenate([part.v0 for part in parts]),
     )
     inertia = sp.block_diag([part.inertia[:, None] for part in parts]).toarray()
-    system = system.changed(base_mass=inertia - np.column_stack([system.M @ rigid for rigid in system.influence.T]))
-    tip = contact_points(system, [m], np.eye(1, d), gap0=gap)  # one point, its weight 1: pressures are forces
-    return ContactProblem(system, tip, friction=friction, mass=None if across is None else ConsistentMass())
+    system = system.changed(
+        base_mass=inertia - np.column_stack([system.M @ rigid for rigid in system.influence.T])
+    )
+    tip = contact_points(
+        system, [m], np.eye(1, d), gap0=gap
+    )  # one point, its weight 1: pressures are forces
+    return ContactProblem(
+        system, tip, friction=friction, mass=None if across is None else ConsistentMass()
+    )

@@ -43,14 +43,24 @@ class Elements:
     published_end: bool = False
 
     def __post_init__(self) -> None:
-        counted("Elements", "count", whole("Elements", "count", self.count, least=2), "elements", most=MOST)
+        counted(
+            "Elements",
+            "count",
+            whole("Elements", "count", self.count, least=2),
+            "elements",
+            most=MOST,
+        )
         attributes(self, flags=("reduced_shear", "published_end"))
         if self.published_end and self.reduced_shear:
-            raise InputError("Elements: the published end function goes with reduced_shear=False, as in the source")
+            raise InputError(
+                "Elements: the published end function goes with reduced_shear=False, as in the source"
+            )
 
     def nodes(self, length: float) -> Array:
         """Return the positions of the unknowns: all nodes but the clamped one, shape (count,) [m]."""
-        return np.linspace(0.0, number("Elements.nodes", "length", length, positive=True, unit="m"), self.count + 1)[1:]
+        return np.linspace(
+            0.0, number("Elements.nodes", "length", length, positive=True, unit="m"), self.count + 1
+        )[1:]
 
 
 def beam_matrices(beam: TimoshenkoBeam, elements: Elements) -> tuple[Any, Any, Array]:
@@ -89,7 +99,11 @@ def rod_matrices(rod: Rod, count: int) -> tuple[Any, Any, Array]:
     h = rod.length / count
     lines, slopes = _lines(S), _line_slopes(S) / h
     M, K = (h * (a * W) @ a.T for a in (lines, slopes))
-    return rod.rho * rod.area * _assembled(M, M, count), rod.E * rod.area * _assembled(K, K, count), _uniform(count, h)
+    return (
+        rod.rho * rod.area * _assembled(M, M, count),
+        rod.E * rod.area * _assembled(K, K, count),
+        _uniform(count, h),
+    )
 
 
 def _lines(s: Array) -> Array:

@@ -62,16 +62,28 @@ class RegularisedFriction:
 
     def __post_init__(self) -> None:
         given = () if self.absolute is None else ("absolute",)
-        attributes(self, positive=("eps", "tolerance", *given), counts=("max_iterations",), flags=("safeguard",))
+        attributes(
+            self,
+            positive=("eps", "tolerance", *given),
+            counts=("max_iterations",),
+            flags=("safeguard",),
+        )
 
     def solve(self, c: float, g: float, limit: float) -> Slip:
         """Return the zero of F. StepFailure when max_iterations updates do not reach the tolerance."""
-        s, low, high = 0.0, *sorted((0.0, g / c * (1.0 + 1e-9)))  # a little wider: the zero may be its end
+        s, low, high = (
+            0.0,
+            *sorted((0.0, g / c * (1.0 + 1e-9))),
+        )  # a little wider: the zero may be its end
         for updates in range(self.max_iterations + 1):
             root = math.hypot(s, self.eps)
             F = root * (c * s - g) + limit * s
             round_off = 1e-15 * (abs(c * s) + abs(g) + limit) * root
-            if abs(F) <= (self.tolerance * c * self.eps**2 + round_off if self.absolute is None else self.absolute):
+            if abs(F) <= (
+                self.tolerance * c * self.eps**2 + round_off
+                if self.absolute is None
+                else self.absolute
+            ):
                 return Slip(s, limit * s / root, updates)
             if self.safeguard:
                 low, high = (s, high) if F < 0.0 else (low, s)
@@ -81,6 +93,8 @@ class RegularisedFriction:
                 s = 0.5 * (low + high)
             if not math.isfinite(s):
                 break
-        raise StepFailure(f"Newton's method for the slip of the tip did not converge in {updates} updates (|F| = "
-                          f"{abs(F):.1e} N m): take a smaller time step, a larger eps, safeguard=True or "
-                          "ExactFriction()")
+        raise StepFailure(
+            f"Newton's method for the slip of the tip did not converge in {updates} updates (|F| = "
+            f"{abs(F):.1e} N m): take a smaller time step, a larger eps, safeguard=True or "
+            "ExactFriction()"
+        )

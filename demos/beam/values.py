@@ -68,7 +68,9 @@ class Rod:
     def __post_init__(self) -> None:
         attributes(self, positive=("length", "rho", "area", "E"), not_negative=("viscosity", "gap"))
         for name in ("body_force", "end_force"):
-            optional(function, "Rod", name, getattr(self, name), "give a function of the time, or None")
+            optional(
+                function, "Rod", name, getattr(self, name), "give a function of the time, or None"
+            )
 
 
 @dataclass(frozen=True)
@@ -88,4 +90,6 @@ class Start:
         """Return a field at the nodes; InputError unless it gives finite numbers, one for each node or one for all."""
         values = getattr(self, name)(x)
         shape = () if shape_of(values) == () else x.shape
-        return np.broadcast_to(array("Start", f"what {name}(x) returns", values, shape), x.shape).copy()
+        return np.broadcast_to(
+            array("Start", f"what {name}(x) returns", values, shape), x.shape
+        ).copy()

@@ -18,7 +18,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from demos.boundary_layer.motion import ConstrainedSystem, Evaluations, check_tolerance, one_sentence
+from demos.boundary_layer.motion import (
+    ConstrainedSystem,
+    Evaluations,
+    check_tolerance,
+    one_sentence,
+)
 from vi_contact.core.algebra import Array
 from vi_contact.core.checks import array, instance, several, shown
 from vi_contact.core.errors import InputError, StepFailure
@@ -46,15 +51,25 @@ def bilateral_motion(
 
     Raises InputError for quasi-velocities or no constraint; StepFailure, naming the time, when the integrator stops.
     """
-    owner, k = "bilateral_motion", len(several("bilateral_motion", "systems", systems, "give a list of them"))
+    owner, k = (
+        "bilateral_motion",
+        len(several("bilateral_motion", "systems", systems, "give a list of them")),
+    )
     for system in systems:
         instance(owner, "a system", system, ConstrainedSystem, "give ConstrainedSystem(...)")
     if not systems or any(system.rates is not None for system in systems):
-        raise InputError(f"{owner}: bilateral constraints need at least one system, whose velocities are the rates of "
-                         "q; give one for each constraint")
-    q, v, times = (array(owner, name, value, (None,)) for name, value in (("q0", q0), ("v0", v0), ("times", times)))
+        raise InputError(
+            f"{owner}: bilateral constraints need at least one system, whose velocities are the rates of "
+            "q; give one for each constraint"
+        )
+    q, v, times = (
+        array(owner, name, value, (None,))
+        for name, value in (("q0", q0), ("v0", v0), ("times", times))
+    )
     if len(times) < 2 or np.any(np.diff(times) <= 0.0):
-        raise InputError(f"{owner}: times are {shown(times)}; give two or more that increase, the first the start")
+        raise InputError(
+            f"{owner}: times are {shown(times)}; give two or more that increase, the first the start"
+        )
     check_tolerance(owner, rtol)
     for system in systems:
         system.check(q, v, float(times[0]))
@@ -63,18 +78,26 @@ def bilateral_motion(
     def rates(t: float, y: Array) -> Array:
         evaluations.spend(t)
         place, speed, multiplier, momentum = np.split(y, [n, 2 * n, 2 * n + k])
-        acceleration, _, multiplier_rate, force = _solved(systems, t, place, speed, multiplier, momentum)
+        acceleration, _, multiplier_rate, force = _solved(
+            systems, t, place, speed, multiplier, momentum
+        )
         return np.concatenate([speed, acceleration, multiplier_rate, force])
 
     y0 = np.concatenate([q, v, np.zeros(2 * k)])
     atol = rtol * max(float(np.max(np.abs(y0))), 1e-300)
     with one_sentence():
         if not np.all(np.isfinite(rates(float(times[0]), y0))):
-            raise StepFailure(f"the accelerations at t = {times[0]:.6g} s are not finite: check what the systems' "
-                              "functions return there, and that the constraints are independent")
-        found = solve_ivp(rates, (times[0], times[-1]), y0, t_eval=times, rtol=rtol, atol=atol, method="DOP853")
+            raise StepFailure(
+                f"the accelerations at t = {times[0]:.6g} s are not finite: check what the systems' "
+                "functions return there, and that the constraints are independent"
+            )
+        found = solve_ivp(
+            rates, (times[0], times[-1]), y0, t_eval=times, rtol=rtol, atol=atol, method="DOP853"
+        )
     if found.status < 0:
-        raise StepFailure(f"the motion could not be integrated beyond t = {evaluations.t:.6g} s: {found.message}")
+        raise StepFailure(
+            f"the motion could not be integrated beyond t = {evaluations.t:.6g} s: {found.message}"
+        )
     places, speeds, multipliers, momenta = np.split(found.y.T, [n, 2 * n, 2 * n + k], axis=1)
     phi = np.array([[system.rho(row) for system in systems] for row in places])
     rows = zip(found.t, places, speeds, multipliers, momenta, strict=True)
@@ -83,12 +106,19 @@ def bilateral_motion(
 
 
 def _solved(
-    systems: Sequence[ConstrainedSystem], t: float, q: Array, v: Array, multiplier: Array, momentum: Array
+    systems: Sequence[ConstrainedSystem],
+    t: float,
+    q: Array,
+    v: Array,
+    multiplier: Array,
+    momentum: Array,
 ) -> tuple[Array, Array, Array, Array]:
     """(v̇, reactions, λ̇, (m̄ λ̇)˙) from (31) and (34)."""
     first = systems[0]
     a = np.array([system.gradient(q) for system in systems], dtype=float)
-    both = np.linalg.solve(first.matrix(q), np.column_stack([first.generalised_force(t, q, v), a.T]))
+    both = np.linalg.solve(
+        first.matrix(q), np.column_stack([first.generalised_force(t, q, v), a.T])
+    )
     free, along = both[:, 0], both[:, 1:]
     masses = 1.0 / np.einsum("ri,ir->r", a, along)
     c = along * masses
@@ -96,7 +126,9 @@ def _solved(
     phi = np.array([system.rho(q) for system in systems])
     rate = np.asarray(a @ v)
     turning = np.array([system.turning(q, v) for system in systems])
-    wanted = -(_slope(systems, q, v) * rate + damping * rate + stiffness * phi) / masses  # φ̈ of (34)
+    wanted = (
+        -(_slope(systems, q, v) * rate + damping * rate + stiffness * phi) / masses
+    )  # φ̈ of (34)
     reaction = np.linalg.solve(a @ along, wanted - a @ free - turning)
     multiplier_rate = momentum / masses
     force = reaction - damping * multiplier_rate - stiffness * multiplier + pull

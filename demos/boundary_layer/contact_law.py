@@ -37,7 +37,9 @@ from vi_contact.core.surfaces import ContactSurface
 
 LEAST_RESTITUTION = 1e-3  # below it the search takes minutes
 DOUBLINGS = 60  # of the damping ratio in search of a rebound
-SHORT_STEP = 1e-5  # |rho_1 - rho_0| over rho below which the quotient is the derivative in the middle
+SHORT_STEP = (
+    1e-5  # |rho_1 - rho_0| over rho below which the quotient is the derivative in the middle
+)
 
 
 @dataclass(frozen=True)
@@ -56,12 +58,18 @@ class ContactLayer:
 
     def __post_init__(self) -> None:
         instance("ContactLayer", "layer", self.layer, Layer, "give a Layer")
-        if number("ContactLayer", "the law's mass per area", self.mass, not_negative=True, unit="kg/m²"):
+        if number(
+            "ContactLayer", "the law's mass per area", self.mass, not_negative=True, unit="kg/m²"
+        ):
             sized("ContactLayer", "the law's mass per area", self.mass, "kg/m²")
         if self.layer.speed is None:
-            raise InputError("a contact law needs the layer's speed V: give Layer(speed=...), the speed of approach")
+            raise InputError(
+                "a contact law needs the layer's speed V: give Layer(speed=...), the speed of approach"
+            )
         if self.layer.a >= self.layer.width:
-            raise InputError("a contact law needs a force that fades out: give the layer a start a below its width b")
+            raise InputError(
+                "a contact law needs a force that fades out: give the layer a start a below its width b"
+            )
 
     @cached_property
     def _fading(self) -> CubicHermiteSpline:
@@ -70,19 +78,25 @@ class ContactLayer:
         delta = self.layer.cut_off(np.exp(y))
         middle = self.layer.cut_off(np.exp(0.5 * (y[1:] + y[:-1])))
         trapezia = cumulative_trapezoid(delta, y, initial=0.0)
-        Y = np.append(0.0, np.cumsum(4.0 * middle)) * (y[1] - y[0]) / 6.0 + trapezia / 3.0  # Simpson's rule
+        Y = (
+            np.append(0.0, np.cumsum(4.0 * middle)) * (y[1] - y[0]) / 6.0 + trapezia / 3.0
+        )  # Simpson's rule
         return CubicHermiteSpline(y, Y - Y[-1], delta)
 
     def set_back(self, surface: ContactSurface) -> ContactSurface:
         """Return the surface with its obstacle moved back by b: a body that touched it now touches the layer's edge."""
-        instance("ContactLayer.set_back", "surface", surface, ContactSurface, "give a contact surface")
+        instance(
+            "ContactLayer.set_back", "surface", surface, ContactSurface, "give a contact surface"
+        )
         return replace(surface, gap0=surface.gap0 + self.layer.width)
 
     def potential(self, rho: Array) -> Array:
         """Return Y <= 0: -k b² Y is the energy stored per area when nothing moves [J/m²]."""
         a, b = np.log(self.layer.a), np.log(self.layer.width)
         y = np.log(rho)
-        return np.where(y < a, self._fading(a) + y - a, np.where(y < b, self._fading(np.clip(y, a, b)), 0.0))
+        return np.where(
+            y < a, self._fading(a) + y - a, np.where(y < b, self._fading(np.clip(y, a, b)), 0.0)
+        )
 
     def mean_pressure(self, rho: Array, old: Array, rate: Array, dt: float) -> tuple[Array, Array]:
         """Return (p̄ [Pa], d p̄/d rho_1) of a step from gap ``old`` and rate w_0 [1/s] to gap ``rho``; arrays (m,)."""
@@ -91,8 +105,12 @@ class ContactLayer:
         bracket = squared * (layer.k - damper * np.log(rho / old) + 2.0 * gamma / dt * rate)
         step, middle, cut = rho - old, 0.5 * (rho + old), layer.cut_off
         near = np.abs(step) < SHORT_STEP * middle
-        step = np.where(near, middle, step)  # quotient: (Y_1 - Y_0)/(rho_1 - rho_0); slope: its derivative
-        quotient = np.where(near, cut(middle) / middle, (self.potential(rho) - self.potential(old)) / step)
+        step = np.where(
+            near, middle, step
+        )  # quotient: (Y_1 - Y_0)/(rho_1 - rho_0); slope: its derivative
+        quotient = np.where(
+            near, cut(middle) / middle, (self.potential(rho) - self.potential(old)) / step
+        )
         h = 1e-4 * middle
         bend = 0.5 * (cut(middle + h) / (middle + h) - cut(middle - h) / (middle - h)) / (2.0 * h)
         slope = np.where(near, bend, (cut(rho) / rho - quotient) / step)
@@ -104,12 +122,20 @@ class ContactLayer:
         sized("ContactLayer.rebound", "mass", mass, "kg/m²")
         sized("ContactLayer.rebound", "speed", speed, "m/s")
         if self.mass not in (0.0, mass):
-            raise InputError(f"the law's metric is that of {self.mass} kg/m²: ask for the rebound of that mass")
+            raise InputError(
+                f"the law's metric is that of {self.mass} kg/m²: ask for the rebound of that mass"
+            )
         return _rebound(self.layer, mass, speed, Metric.BLENDED if self.mass else Metric.FLAT)
 
 
 def contact_layer(
-    e: float, *, mass: float, speed: float, width: float, start: float | None = None, strength: float = 1.0,
+    e: float,
+    *,
+    mass: float,
+    speed: float,
+    width: float,
+    start: float | None = None,
+    strength: float = 1.0,
     metric: Metric = Metric.BLENDED,
 ) -> ContactLayer:
     """Find the law that returns a rigid body of ``mass`` [kg/m²] with e times its ``speed`` [m/s], 0.001 <= e <= 1.
@@ -117,14 +143,22 @@ def contact_layer(
     strength: k b²/(mass V²), how soon the body is turned back. start: a [m], half the width when None. metric: BLENDED,
     gamma = mass, or FLAT, gamma = 0. InputError for another and for values outside their range.
     """
-    for name, value, unit in (("mass per area", mass, "kg/m²"), ("speed", speed, "m/s"), ("layer width", width, "m"),
-                              ("strength k b²/(mass V²)", strength, "units of one")):
+    for name, value, unit in (
+        ("mass per area", mass, "kg/m²"),
+        ("speed", speed, "m/s"),
+        ("layer width", width, "m"),
+        ("strength k b²/(mass V²)", strength, "units of one"),
+    ):
         sized("contact_layer", f"the {name}", value, unit)
     if not LEAST_RESTITUTION <= number("contact_layer", "the restitution coefficient e", e) <= 1.0:
-        raise InputError(f"contact_layer: the restitution coefficient e is {e}; give a number from "
-                         f"{LEAST_RESTITUTION:g} to 1")
+        raise InputError(
+            f"contact_layer: the restitution coefficient e is {e}; give a number from "
+            f"{LEAST_RESTITUTION:g} to 1"
+        )
     if metric not in (Metric.BLENDED, Metric.FLAT):
-        raise InputError(f"contact_layer: a law cannot have {shown(metric)}; give Metric.BLENDED or Metric.FLAT")
+        raise InputError(
+            f"contact_layer: a law cannot have {shown(metric)}; give Metric.BLENDED or Metric.FLAT"
+        )
     a = 0.5 * width if start is None else sized("contact_layer", "start", start, "m")
     k = strength * mass * speed**2 / width**2
 

@@ -17,7 +17,10 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.checks import number, optional
 from vi_contact.core.errors import InputError
 
-LARGEST, LARGEST_FORCE = 1e60, 1e150  # of lengths, speeds and masses; of k and c: products of their squares are finite
+LARGEST, LARGEST_FORCE = (
+    1e60,
+    1e150,
+)  # of lengths, speeds and masses; of k and c: products of their squares are finite
 
 
 @dataclass(frozen=True)
@@ -43,13 +46,32 @@ class Layer:
     def __post_init__(self) -> None:
         sized("Layer", "the layer width b", self.width, "m")
         for name, unit in (("k", "N/m"), ("c", "N")):
-            if number("Layer", f"the layer parameter {name}", getattr(self, name), not_negative=True, unit=unit):
-                sized("Layer", f"the layer parameter {name}", getattr(self, name), unit, most=LARGEST_FORCE)
+            if number(
+                "Layer",
+                f"the layer parameter {name}",
+                getattr(self, name),
+                not_negative=True,
+                unit=unit,
+            ):
+                sized(
+                    "Layer",
+                    f"the layer parameter {name}",
+                    getattr(self, name),
+                    unit,
+                    most=LARGEST_FORCE,
+                )
         if self.k == 0.0 and self.c == 0.0:
-            raise InputError("layer parameters k and c are both zero: nothing would push the body back, give k > 0")
+            raise InputError(
+                "layer parameters k and c are both zero: nothing would push the body back, give k > 0"
+            )
         optional(sized, "Layer", "the layer speed V", self.speed, "m/s")
-        if self.start is not None and sized("Layer", "the layer start a", self.start, "m") > self.width:
-            raise InputError(f"Layer: the layer start a is {self.start}; give a length up to the width {self.width} m")
+        if (
+            self.start is not None
+            and sized("Layer", "the layer start a", self.start, "m") > self.width
+        ):
+            raise InputError(
+                f"Layer: the layer start a is {self.start}; give a length up to the width {self.width} m"
+            )
 
     @property
     def a(self) -> float:
@@ -60,7 +82,9 @@ class Layer:
     def v(self) -> float:
         """Return V [m/s]; InputError while it is not known."""
         if self.speed is None:
-            raise InputError("the layer's speed V is not given: give speed, or enter the layer first")
+            raise InputError(
+                "the layer's speed V is not given: give speed, or enter the layer first"
+            )
         return self.speed
 
     def at(self, speed: float) -> "Layer":
@@ -78,12 +102,16 @@ class Layer:
     def force(self, x: Array | float, rate: Array | float) -> Array:
         """Return f̂_1 of (25) [N] at distance x > 0 and rate ẋ."""
         x = np.asarray(x, dtype=float)
-        return np.asarray(self.width**2 * (self.k - self.c / self.v * rate / x) / x * self.cut_off(x))
+        return np.asarray(
+            self.width**2 * (self.k - self.c / self.v * rate / x) / x * self.cut_off(x)
+        )
 
 
 def sized(owner: str, meaning: str, value: Any, unit: str, *, most: float = LARGEST) -> float:
     """Return a positive number whose powers are finite; InputError for another."""
     found = number(owner, meaning, value, positive=True, unit=unit)
     if not 1.0 / most <= found <= most:
-        raise InputError(f"{owner}: {meaning} is {found:g}; give a number from {1.0 / most:g} to {most:g} in {unit}")
+        raise InputError(
+            f"{owner}: {meaning} is {found:g}; give a number from {1.0 / most:g} to {most:g} in {unit}"
+        )
     return found

@@ -23,7 +23,9 @@ from vi_contact.core.checks import array, function, number
 from vi_contact.core.errors import InputError, StepFailure
 
 EVALUATIONS = 100_000  # of the acceleration in one motion
-DIFFERENCE_STEP = 6e-6  # of a central difference over the size of its argument: eps to the power 1/3
+DIFFERENCE_STEP = (
+    6e-6  # of a central difference over the size of its argument: eps to the power 1/3
+)
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,9 @@ class ConstrainedSystem:
         """Raise InputError for functions that return, at this state, other shapes, texts, NaN or infinity."""
         owner, n = "ConstrainedSystem", len(v)
         if self.rates is None and len(q) != n:
-            raise InputError(f"{owner}: {len(q)} coordinates and {n} velocities; give as many, or rates(q, v)")
+            raise InputError(
+                f"{owner}: {len(q)} coordinates and {n} velocities; give as many, or rates(q, v)"
+            )
         number(owner, "rho(q) at the start", self.rho(q))
         array(owner, "gradient(q) at the start", self.gradient(q), (n,))
         if callable(self.mass):
@@ -103,12 +107,19 @@ class ConstrainedSystem:
         f = np.zeros_like(v) if self.force is None else np.asarray(self.force(t, q, v), dtype=float)
         if not callable(self.mass):
             return f
-        h, slopes = self.difference(q), np.empty((len(q), len(v), len(v)))  # ∂M_IJ/∂q_K in [K, I, J], for v = q̇
+        h, slopes = (
+            self.difference(q),
+            np.empty((len(q), len(v), len(v))),
+        )  # ∂M_IJ/∂q_K in [K, I, J], for v = q̇
         for K in range(len(q)):
             side = np.zeros_like(q)
             side[K] = h
-            slopes[K] = (np.asarray(self.mass(q + side)) - np.asarray(self.mass(q - side))) / (2.0 * h)
-        return f - (np.einsum("kij,k,j->i", slopes, v, v) - 0.5 * np.einsum("ijk,j,k->i", slopes, v, v))
+            slopes[K] = (np.asarray(self.mass(q + side)) - np.asarray(self.mass(q - side))) / (
+                2.0 * h
+            )
+        return f - (
+            np.einsum("kij,k,j->i", slopes, v, v) - 0.5 * np.einsum("ijk,j,k->i", slopes, v, v)
+        )
 
     def difference(self, q: Array) -> float:
         """Return the way over which to take a central difference at q."""
@@ -117,7 +128,9 @@ class ConstrainedSystem:
     def accelerations(self, t: float, q: Array, v: Array) -> tuple[Array, Array, float, float]:
         """Return (v̇ without layer, M⁻¹Aᵀ, g_11, ρ̈ without layer)."""
         A = np.asarray(self.gradient(q), dtype=float)
-        both = np.linalg.solve(self.matrix(q), np.column_stack([self.generalised_force(t, q, v), A]))
+        both = np.linalg.solve(
+            self.matrix(q), np.column_stack([self.generalised_force(t, q, v), A])
+        )
         free, along = both[:, 0], both[:, 1]
         return free, along, float(1.0 / (A @ along)), float(A @ free) + self.turning(q, v)
 
@@ -132,8 +145,10 @@ class Evaluations:
         """Count one evaluation; StepFailure, naming the time, when everything is spent."""
         self.spent, self.t = self.spent + 1, t
         if self.spent > EVALUATIONS:
-            raise StepFailure(f"the motion did not get beyond t = {t:.6g} s in {EVALUATIONS} evaluations of its "
-                              "acceleration: give a shorter time, a larger rtol, or forces that vary less")
+            raise StepFailure(
+                f"the motion did not get beyond t = {t:.6g} s in {EVALUATIONS} evaluations of its "
+                "acceleration: give a shorter time, a larger rtol, or forces that vary less"
+            )
 
 
 @contextmanager
@@ -142,8 +157,10 @@ def one_sentence() -> Iterator[None]:
     try:
         yield
     except (ArithmeticError, np.linalg.LinAlgError) as error:
-        raise StepFailure(f"the motion could not be integrated, its numbers left their range ({error}): check forces, "
-                          "masses and the state at the start") from error
+        raise StepFailure(
+            f"the motion could not be integrated, its numbers left their range ({error}): check forces, "
+            "masses and the state at the start"
+        ) from error
 
 
 def check_tolerance(owner: str, rtol: float) -> None:
@@ -155,5 +172,11 @@ def check_tolerance(owner: str, rtol: float) -> None:
 def check_positive(owner: str, meaning: str, matrix: Any, unit: str) -> None:
     """Raise InputError unless the matrix is square, symmetric and positive definite."""
     M = array(owner, meaning, matrix, (None, None), unit=unit)
-    if M.shape[0] != M.shape[1] or not np.allclose(M, M.T) or np.min(np.linalg.eigvalsh(M), initial=np.inf) <= 0.0:
-        raise InputError(f"{owner}: {meaning} is not symmetric positive definite; check its entries")
+    if (
+        M.shape[0] != M.shape[1]
+        or not np.allclose(M, M.T)
+        or np.min(np.linalg.eigvalsh(M), initial=np.inf) <= 0.0
+    ):
+        raise InputError(
+            f"{owner}: {meaning} is not symmetric positive definite; check its entries"
+        )

@@ -46,7 +46,9 @@ class ParticleImpact:
         sized("ParticleImpact", "the particle's mass", self.mass, "kg")
         sized("ParticleImpact", "the particle's speed", self.speed, "m/s")
         if self.layer.k == 0.0:
-            raise InputError("layer parameter k is zero: the particle would stay in the layer, give k > 0")
+            raise InputError(
+                "layer parameter k is zero: the particle would stay in the layer, give k > 0"
+            )
 
     @property
     def damping_ratio(self) -> float:
@@ -91,7 +93,9 @@ class ParticleImpact:
     def velocity(self, t: Array | float) -> Array:
         """Return ẋ [m/s] at times 0 <= t <= t_f."""
         T, s = np.asarray(t, dtype=float) / self._time, self.damping_ratio
-        return np.asarray(self.speed / self.layer.a * self.position(t) * ((1.0 + s) * T * exprel(-s * T) - 1.0))
+        return np.asarray(
+            self.speed / self.layer.a * self.position(t) * ((1.0 + s) * T * exprel(-s * T) - 1.0)
+        )
 
     def boundary_force(self, t: Array | float) -> Array:
         """Return f̂_1 of (25) [N] along the motion, without cut-off: x does not exceed a."""
@@ -126,7 +130,9 @@ def restitution(s: float) -> float:
 def damping_ratio(e: float) -> float:
     """Return s = c/(a k) that gives the restitution 0 < e <= 1: the inverse of ``restitution``."""
     if not LEAST <= number("damping_ratio", "the restitution coefficient e", e) <= 1.0:
-        raise InputError(f"damping_ratio: the restitution coefficient e is {e}; give a number from {LEAST:g} to 1")
+        raise InputError(
+            f"damping_ratio: the restitution coefficient e is {e}; give a number from {LEAST:g} to 1"
+        )
     if e == 1.0:
         return 0.0
     most = (1.0 + 1e-9) / e  # e(s) < 1/s
@@ -134,15 +140,27 @@ def damping_ratio(e: float) -> float:
 
 
 def layer_for(
-    e: float, *, mass: float, speed: float, width: float, start: float | None = None, deepest: float = 0.5
+    e: float,
+    *,
+    mass: float,
+    speed: float,
+    width: float,
+    start: float | None = None,
+    deepest: float = 0.5,
 ) -> Layer:
     """Return the layer from which this mass [kg] with this speed [m/s] returns with e times its speed (dominant terms).
 
     ``deepest``: x_min/a, left of the distance a at the greatest compression. InputError unless 0 < e <= 1, deepest < 1.
     """
     if not 0.0 < number("layer_for", "deepest", deepest) < 1.0:
-        raise InputError(f"layer_for: deepest is {deepest}; give the part of the layer that is left, between 0 and 1")
-    given = (("the mass", mass, "kg"), ("the speed", speed, "m/s"), ("the layer width b", width, "m"))
+        raise InputError(
+            f"layer_for: deepest is {deepest}; give the part of the layer that is left, between 0 and 1"
+        )
+    given = (
+        ("the mass", mass, "kg"),
+        ("the speed", speed, "m/s"),
+        ("the layer width b", width, "m"),
+    )
     for name, value, unit in given:
         sized("layer_for", name, value, unit)
     s = damping_ratio(e)

@@ -61,7 +61,13 @@ class RigidBody:
     def __post_init__(self) -> None:
         owner = "RigidBody"
         sized(owner, "the body's mass", self.mass, "kg")
-        array(owner, "inertia", self.inertia, (3, 3) if len(shape_of(self.inertia)) == 2 else (3,), unit="kg m²")
+        array(
+            owner,
+            "inertia",
+            self.inertia,
+            (3, 3) if len(shape_of(self.inertia)) == 2 else (3,),
+            unit="kg m²",
+        )
         if not callable(self.point) or isinstance(self.point, type):
             array(owner, "point", self.point, (3,), unit="m")
         for name in ("normal", "gravity"):
@@ -128,12 +134,19 @@ class RigidBody:
         """Return the system for ``layer_motion``: coordinates (7,), velocities (6,)."""
         turning = None if callable(self.point) else self._turning
         return ConstrainedSystem(
-            self.matrix, self.rho, self.gradient, force=self._force, rates=_rates, gradient_rate=turning
+            self.matrix,
+            self.rho,
+            self.gradient,
+            force=self._force,
+            rates=_rates,
+            gradient_rate=turning,
         )
 
     def _force(self, t: float, q: Array, v: Array) -> Array:
         spin = v[3:]
-        return np.concatenate([self.mass * np.asarray(self.gravity), -np.cross(spin, self.J @ spin)])
+        return np.concatenate(
+            [self.mass * np.asarray(self.gravity), -np.cross(spin, self.J @ spin)]
+        )
 
     def _turning(self, q: Array, v: Array) -> float:
         """n·R (Omega x (Omega x l_P)), of a point fixed in the body."""
@@ -144,11 +157,13 @@ class RigidBody:
 def rotation(p: Array) -> Array:
     """Return R (3, 3) of the quaternion p (4,), which need not have length one."""
     w, x, y, z = p / np.linalg.norm(p)
-    return np.array([
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-    ])
+    return np.array(
+        [
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+        ]
+    )
 
 
 def _rates(q: Array, v: Array) -> Array:

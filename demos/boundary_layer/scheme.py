@@ -29,7 +29,10 @@ from vi_contact.solvers.condensed import Condensed
 
 NEWTON_STEPS, HALVINGS = 60, 30
 RATE = "layer_rate"  # in a state's memory: d ln(gap)/dt of the contact points [1/s]
-GAP_TOLERANCE, ROUNDING = 1e-11, 1e-15  # change of the gaps relative to the gaps, and to what they are a difference of
+GAP_TOLERANCE, ROUNDING = (
+    1e-11,
+    1e-15,
+)  # change of the gaps relative to the gaps, and to what they are a difference of
 
 
 @dataclass(frozen=True)
@@ -56,14 +59,24 @@ class BoundaryLayer(Midpoint):
         super().check(problem)
         surface = problem.surface
         if problem.frictional:
-            raise InputError(f"BoundaryLayer is a law without friction: leave {problem.friction} out")
+            raise InputError(
+                f"BoundaryLayer is a law without friction: leave {problem.friction} out"
+            )
         if problem.impact is not None:
-            raise InputError(f"BoundaryLayer makes the rebound itself: leave the impact law {problem.impact} out")
+            raise InputError(
+                f"BoundaryLayer makes the rebound itself: leave the impact law {problem.impact} out"
+            )
         if surface.some(surface.bilateral | (surface.compliance != 0.0)):
-            raise InputError("BoundaryLayer needs unilateral contact on rigid supports: leave held points, springs out")
+            raise InputError(
+                "BoundaryLayer needs unilateral contact on rigid supports: leave held points, springs out"
+            )
         if surface.motion is not None:
-            raise InputError("BoundaryLayer needs an obstacle at rest: move the body's support instead")
-        refuse_dense("BoundaryLayer", surface.total, instead="an impact law with restitution, Newton(e)")
+            raise InputError(
+                "BoundaryLayer needs an obstacle at rest: move the body's support instead"
+            )
+        refuse_dense(
+            "BoundaryLayer", surface.total, instead="an impact law with restitution, Newton(e)"
+        )
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
         """Return the state as it is; InputError where the layer would have to begin behind the obstacle."""
@@ -71,36 +84,48 @@ class BoundaryLayer(Midpoint):
         gap = surface.everywhere(surface.gap(state.t) - surface.normal_values(state.u))
         if len(gap) and not gap.min() > 0.0:
             where = int(np.argmin(gap))
-            raise InputError(f"contact point {where} starts with gap {gap[where]:.3g} m, outside the admissible set of "
-                             "the layer, gap > 0: move the obstacle back by the layer's width, for example with "
-                             "ContactLayer.set_back(surface)")
+            raise InputError(
+                f"contact point {where} starts with gap {gap[where]:.3g} m, outside the admissible set of "
+                "the layer, gap > 0: move the obstacle back by the layer's width, for example with "
+                "ContactLayer.set_back(surface)"
+            )
         return state
 
-    def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
+    def step(
+        self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
+    ) -> StepProblem:
         """Prepare the midpoint step with the layer's reactions among the loads."""
         step = super().step(problem, state, A, dt)
         surface = problem.surface
         if surface.total == 0:
             return step
         old = surface.gap(state.t) - surface.normal_values(state.u)
-        closed, away = surface.comm.max(np.array([np.max(-old, initial=-np.inf), max_abs(step.bound - old)]))
+        closed, away = surface.comm.max(
+            np.array([np.max(-old, initial=-np.inf), max_abs(step.bound - old)])
+        )
         if not closed < 0.0:
-            raise StepFailure(f"step {step.k} at t = {step.t:.6g} s begins with a gap of {-closed:.1e} m, a rounding "
-                              f"error beside displacements of {away:.1e} m: make the layer wider")
+            raise StepFailure(
+                f"step {step.k} at t = {step.t:.6g} s begins with a gap of {-closed:.1e} m, a rounding "
+                f"error beside displacements of {away:.1e} m: make the layer wider"
+            )
         free = step.bound - surface.normal_values(A.factor.solve(step.b))
         rate = self._rate(problem, state, old)
         values = surface.everywhere(np.column_stack([old, free, rate, surface.weights]))
         old, free, rate, weights = (np.ascontiguousarray(column) for column in values.T)
         pressure = np.zeros(surface.total)
         if min(old.min(), free.min()) < self.law.layer.width:
-            kept: WeakKeyDictionary[EffectiveMatrix, Array] = problem.equations.cached("layer", WeakKeyDictionary)
+            kept: WeakKeyDictionary[EffectiveMatrix, Array] = problem.equations.cached(
+                "layer", WeakKeyDictionary
+            )
             if A not in kept:  # B A⁻¹ Bᵀ (m, m), made once for every A
                 kept[A] = np.asarray(Condensed().prepare(A, surface, step.scale).delassus)
             G = kept[A] * (step.scale * weights)
             pressure = self._pressure(step, G, free, old, rate, dt)
         reaction = surface.weights * pressure[surface.slots]
         b = step.b - step.scale * surface.reaction_load(reaction, len(step.b))
-        return LayeredStep(**vars(step) | {"b": b, "active": np.zeros(surface.count, dtype=bool)}, layer=reaction)
+        return LayeredStep(
+            **vars(step) | {"b": b, "active": np.zeros(surface.count, dtype=bool)}, layer=reaction
+        )
 
     def _rate(self, problem: ContactProblem, state: State, gap: Array) -> Array:
         """ẏ = w_0 [1/s]: carried inside the layer, from the velocities outside."""
@@ -109,7 +134,9 @@ class BoundaryLayer(Midpoint):
         kept = surface.normal_values(state.memory[RATE]) if RATE in state.memory else rate
         return np.where(gap < self.law.layer.width, kept, rate)
 
-    def _pressure(self, step: StepProblem, G: Array, free: Array, old: Array, rate: Array, dt: float) -> Array:
+    def _pressure(
+        self, step: StepProblem, G: Array, free: Array, old: Array, rate: Array, dt: float
+    ) -> Array:
         """p̄ (m,): gap = free + G p̄(gap) by Newton's method, in steps that leave a tenth of every gap at least."""
         law = self.law
         rho = old * np.maximum(1.0 + dt * rate, 0.2)
@@ -128,17 +155,33 @@ class BoundaryLayer(Midpoint):
                     break
                 share *= 0.5
             rho = rho + share * change
-        raise StepFailure(f"the layer's reactions of step {step.k} at t = {step.t:.6g} s were not found in "
-                          f"{NEWTON_STEPS} Newton steps: reduce the time step, or make the layer wider")
+        raise StepFailure(
+            f"the layer's reactions of step {step.k} at t = {step.t:.6g} s were not found in "
+            f"{NEWTON_STEPS} Newton steps: reduce the time step, or make the layer wider"
+        )
 
-    def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
+    def finish(
+        self,
+        problem: ContactProblem,
+        state: State,
+        step: StepProblem,
+        result: StepResult,
+        dt: float,
+    ) -> State:
         """Return the midpoint's state; its reactions are the layer's, its active points those inside the layer."""
         new = super().finish(problem, state, step, result, dt)
         reaction = step.layer if isinstance(step, LayeredStep) else None
         if reaction is None:
             return new
         surface = problem.surface
-        gap, old = (surface.gap(t) - surface.normal_values(u) for t, u in ((step.t, new.u), (state.t, state.u)))
+        gap, old = (
+            surface.gap(t) - surface.normal_values(u)
+            for t, u in ((step.t, new.u), (state.t, state.u))
+        )
         rate = 2.0 / dt * np.log(np.maximum(gap / old, 1e-300)) - self._rate(problem, state, old)
-        memory = {RATE: surface.reaction_load(rate, len(new.u))}  # vectors of unknowns pass through checkpoints
-        return replace(new, r_n=new.r_n + reaction, active=gap < self.law.layer.width, memory=memory)
+        memory = {
+            RATE: surface.reaction_load(rate, len(new.u))
+        }  # vectors of unknowns pass through checkpoints
+        return replace(
+            new, r_n=new.r_n + reaction, active=gap < self.law.layer.width, memory=memory
+        )

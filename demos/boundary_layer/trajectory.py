@@ -8,7 +8,12 @@ from scipy.integrate import solve_ivp
 
 from demos.boundary_layer.layer import Layer
 from demos.boundary_layer.metric import Metric
-from demos.boundary_layer.motion import ConstrainedSystem, Evaluations, check_tolerance, one_sentence
+from demos.boundary_layer.motion import (
+    ConstrainedSystem,
+    Evaluations,
+    check_tolerance,
+    one_sentence,
+)
 from vi_contact.core.algebra import Array
 from vi_contact.core.checks import array, instance, number, optional, whole
 from vi_contact.core.errors import InputError, StepFailure
@@ -49,8 +54,16 @@ class Trajectory:
 
 
 def layer_motion(
-    system: ConstrainedSystem, layer: Layer, *, q0: Array, v0: Array, t_end: float, metric: Metric = Metric.DOMINANT,
-    contacts: int | None = None, rtol: float = 1e-11, refine: int = 1,
+    system: ConstrainedSystem,
+    layer: Layer,
+    *,
+    q0: Array,
+    v0: Array,
+    t_end: float,
+    metric: Metric = Metric.DOMINANT,
+    contacts: int | None = None,
+    rtol: float = 1e-11,
+    refine: int = 1,
 ) -> Trajectory:
     """Compute the motion from (q0, v0) at t = 0 to t_end, or to the end of so many contacts.
 
@@ -63,7 +76,13 @@ def layer_motion(
         StepFailure: the integrator stopped, or did not come to an end; the message names the time.
     """
     owner = "layer_motion"
-    instance(owner, "system", system, ConstrainedSystem, "give one, as demos/boundary_layer/rigid_body.py does")
+    instance(
+        owner,
+        "system",
+        system,
+        ConstrainedSystem,
+        "give one, as demos/boundary_layer/rigid_body.py does",
+    )
     instance(owner, "layer", layer, Layer, "give a Layer")
     instance(owner, "metric", metric, Metric, "give Metric.DOMINANT, FULL, BLENDED or FLAT")
     q, v = array(owner, "q0", q0, (None,)), array(owner, "v0", v0, (None,))
@@ -74,7 +93,9 @@ def layer_motion(
     whole(owner, "refine", refine, least=1, most=10_000)
     rho = float(system.rho(q))
     if not rho > 0.0:
-        raise InputError(f"the motion starts at distance rho = {rho:g}, outside the admissible set: start at rho > 0")
+        raise InputError(
+            f"the motion starts at distance rho = {rho:g}, outside the admissible set: start at rho > 0"
+        )
     passages = _Passages(system, layer, metric, rtol, refine)
     inside = rho < layer.width or (rho == layer.width and system.normal_rate(q, v) < 0.0)
     t = 0.0
@@ -87,11 +108,22 @@ def layer_motion(
     return passages.trajectory()
 
 
-def passage(layer: Layer, mass: float, speed: float, metric: Metric, *, rtol: float, refine: int = 1) -> Trajectory:
+def passage(
+    layer: Layer, mass: float, speed: float, metric: Metric, *, rtol: float, refine: int = 1
+) -> Trajectory:
     """Return how ``mass`` [kg] on a line crosses the layer, entered with ``speed`` [m/s]; InputError if it stays."""
     particle = ConstrainedSystem(np.array([[mass]]), lambda q: float(q[0]), lambda q: np.ones(1))
-    found = layer_motion(particle, layer, q0=np.array([layer.width]), v0=np.array([-speed]),
-                         t_end=1e6 * layer.width / speed, metric=metric, contacts=1, rtol=rtol, refine=refine)
+    found = layer_motion(
+        particle,
+        layer,
+        q0=np.array([layer.width]),
+        v0=np.array([-speed]),
+        t_end=1e6 * layer.width / speed,
+        metric=metric,
+        contacts=1,
+        rtol=rtol,
+        refine=refine,
+    )
     if not found.contacts:
         raise InputError("the layer holds the body back for ever: give it more k or less c")
     return found
@@ -103,16 +135,30 @@ class _Passages:
     The unknowns are v and q - q_start since the last crossing, over the time since: 1e-8 m is resolved beside 1 m.
     """
 
-    def __init__(self, system: ConstrainedSystem, layer: Layer, metric: Metric, rtol: float, refine: int) -> None:
-        self._system, self._layer, self._metric, self._rtol, self._refine = system, layer, metric, rtol, refine
+    def __init__(
+        self, system: ConstrainedSystem, layer: Layer, metric: Metric, rtol: float, refine: int
+    ) -> None:
+        self._system, self._layer, self._metric, self._rtol, self._refine = (
+            system,
+            layer,
+            metric,
+            rtol,
+            refine,
+        )
         self._parts: list[tuple[Array, Array, Array, Array, Array]] = []
         self._evaluations = Evaluations()
         self.contacts: list[LayerContact] = []
 
-    def run(self, start: float, t_end: float, q: Array, v: Array, inside: bool) -> tuple[float, Array, Array, bool]:
+    def run(
+        self, start: float, t_end: float, q: Array, v: Array, inside: bool
+    ) -> tuple[float, Array, Array, bool]:
         """Integrate to the next crossing of the edge; (t, q, v, whether there was one)."""
         system, n = self._system, len(q)
-        layer = self._layer.at(abs(system.normal_rate(q, v))) if inside and self._layer.speed is None else self._layer
+        layer = (
+            self._layer.at(abs(system.normal_rate(q, v)))
+            if inside and self._layer.speed is None
+            else self._layer
+        )
         width = layer.width
 
         def rates(t: float, y: Array) -> Array:
@@ -124,7 +170,9 @@ class _Passages:
         def edge(t: float, y: Array) -> float:
             rho = float(system.rho(q + y[:n]))
             if not np.isfinite(rho):
-                raise StepFailure(f"the distance rho(q) is {rho:g} at t = {start + t:.6g} s: return a finite number")
+                raise StepFailure(
+                    f"the distance rho(q) is {rho:g} at t = {start + t:.6g} s: return a finite number"
+                )
             return rho - width
 
         def turn(t: float, y: Array) -> float:
@@ -134,30 +182,54 @@ class _Passages:
         turn.direction = 1.0  # type: ignore[attr-defined]
         way = width if inside else max(width, float(np.max(np.abs(q))))
         if not np.all(np.isfinite(rates(0.0, np.r_[np.zeros(n), v]))):
-            raise StepFailure(f"the velocities or accelerations at t = {start:.6g} s are not finite: check what the "
-                              "system's functions return there")
+            raise StepFailure(
+                f"the velocities or accelerations at t = {start:.6g} s are not finite: check what the "
+                "system's functions return there"
+            )
         most = float(np.max(np.abs(self._acceleration(start, q, v, layer, inside)[0])))
-        reached = float(np.sqrt(most * layer.width)) or 1.0  # the speed over the width; 1 where nothing moves
+        reached = (
+            float(np.sqrt(most * layer.width)) or 1.0
+        )  # the speed over the width; 1 where nothing moves
         pace = max(float(np.max(np.abs(v))), layer.speed or 0.0, reached)
         atol = self._rtol * np.r_[np.full(n, way), np.full(len(v), pace)]
-        found = solve_ivp(rates, (0.0, t_end - start), np.r_[np.zeros(n), v], events=(edge, turn), atol=atol,
-                          rtol=self._rtol, method="DOP853", dense_output=self._refine > 1)
+        found = solve_ivp(
+            rates,
+            (0.0, t_end - start),
+            np.r_[np.zeros(n), v],
+            events=(edge, turn),
+            atol=atol,
+            rtol=self._rtol,
+            method="DOP853",
+            dense_output=self._refine > 1,
+        )
         if found.status < 0:
-            raise StepFailure(f"the motion could not be integrated beyond t = {start + found.t[-1]:.6g} s at rho = "
-                              f"{system.rho(q + found.y[:n, -1]):.3g}: give a larger rtol ({found.message})")
+            raise StepFailure(
+                f"the motion could not be integrated beyond t = {start + found.t[-1]:.6g} s at rho = "
+                f"{system.rho(q + found.y[:n, -1]):.3g}: give a larger rtol ({found.message})"
+            )
         places, speeds = q + found.y[:n].T, found.y[n:].T
-        t = np.interp(np.arange(self._refine * (len(found.t) - 1) + 1) / self._refine, np.arange(len(found.t)), found.t)
+        t = np.interp(
+            np.arange(self._refine * (len(found.t) - 1) + 1) / self._refine,
+            np.arange(len(found.t)),
+            found.t,
+        )
         y = found.sol(t) if self._refine > 1 else found.y
         self._keep(start + t, q + y[:n].T, y[n:].T, layer, inside)
         crossed = found.status == 1
         if inside and crossed:
             rate = system.normal_rate(q, v), system.normal_rate(places[-1], speeds[-1])
             turns = zip(found.y_events[1], found.t_events[1], strict=True)
-            deepest, when = min(((float(system.rho(q + y[:n])), float(t)) for y, t in turns), default=(width, 0.0))
-            self.contacts.append(LayerContact(start, start + float(found.t[-1]), *rate, deepest, start + when))
+            deepest, when = min(
+                ((float(system.rho(q + y[:n])), float(t)) for y, t in turns), default=(width, 0.0)
+            )
+            self.contacts.append(
+                LayerContact(start, start + float(found.t[-1]), *rate, deepest, start + when)
+            )
         return start + float(found.t[-1]), places[-1], speeds[-1], crossed
 
-    def _acceleration(self, t: float, q: Array, v: Array, layer: Layer, inside: bool) -> tuple[Array, float]:
+    def _acceleration(
+        self, t: float, q: Array, v: Array, layer: Layer, inside: bool
+    ) -> tuple[Array, float]:
         """(v̇, lambda); NaN where a trial stage has left the admissible set, which makes the integrator step back."""
         free, along, g, normal = self._system.accelerations(t, q, v)
         if not inside:

@@ -20,11 +20,13 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.checks import attributes
 
 # of PeriodicBar: u = c0 + c1 x + c2 s in [phase][zone]
-_PERIOD_THREE = 0.5 * np.array([
-    [(1, -1, 0), (1, 0, -1), (1, -1, 0), (1, 0, -1)],  # released
-    [(0, 0, -1), (0, -1, 0), (-1, 1, 0), (-1, 0, 1)],  # in contact
-    [(0, 0, 1), (0, 0, 1), (1, -1, 0), (1, -1, 0)],  # expanding
-])
+_PERIOD_THREE = 0.5 * np.array(
+    [
+        [(1, -1, 0), (1, 0, -1), (1, -1, 0), (1, 0, -1)],  # released
+        [(0, 0, -1), (0, -1, 0), (-1, 1, 0), (-1, 0, 1)],  # in contact
+        [(0, 0, 1), (0, 0, 1), (1, -1, 0), (1, -1, 0)],  # expanding
+    ]
+)
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,9 @@ class ThrownBar(UprightBar):
     def displacement(self, x: ArrayLike, t: ArrayLike) -> Array:
         """Return u(x, t) [m]."""
         delay, s = self._times(x, t)
-        return -self.height - self.speed * np.minimum(delay, self.crossing - np.abs(s - self.crossing))
+        return -self.height - self.speed * np.minimum(
+            delay, self.crossing - np.abs(s - self.crossing)
+        )
 
     def velocity(self, x: ArrayLike, t: ArrayLike) -> Array:
         """Return u_t(x, t) [m/s]: -v0 ahead of the wave, 0 behind it, v0 behind its reflection."""
@@ -109,7 +113,9 @@ class ThrownBar(UprightBar):
 
     def _times(self, x: ArrayLike, t: ArrayLike) -> tuple[Array, Array]:
         """Return x/c and the time since touch-down [s]."""
-        return np.asarray(x, dtype=float) / self.wave_speed, np.asarray(t, dtype=float) - self.contact_start
+        return np.asarray(x, dtype=float) / self.wave_speed, np.asarray(
+            t, dtype=float
+        ) - self.contact_start
 
 
 @dataclass(frozen=True)

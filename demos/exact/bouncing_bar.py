@@ -53,8 +53,10 @@ class BouncingBar(UprightBar):
         """Return 4T + 4t_f [s]. Raises InputError unless t_f/T is an integer >= 3: no other period is known."""
         ratio = self.fall_time / self.crossing
         if abs(ratio - round(ratio)) > 1e-9 * ratio or round(ratio) < 3:
-            raise InputError(f"BouncingBar: fall time over crossing time is {ratio:.6g}, which gives no known period; "
-                             "choose a height for which it is an integer of at least 3")
+            raise InputError(
+                f"BouncingBar: fall time over crossing time is {ratio:.6g}, which gives no known period; "
+                "choose a height for which it is an integer of at least 3"
+            )
         return 4.0 * (self.crossing + self.fall_time)
 
     @property
@@ -102,8 +104,13 @@ class BouncingBar(UprightBar):
             piece = np.maximum(np.searchsorted(start, s, side="right") - 1, 0)
             value, slope, curvature = np.moveaxis(wave[piece], -1, 0)
             after = s - start[piece]
-            return np.stack([value + (slope + 0.5 * curvature * after) * after, slope + curvature * after,
-                             closed[piece]])
+            return np.stack(
+                [
+                    value + (slope + 0.5 * curvature * after) * after,
+                    slope + curvature * after,
+                    closed[piece],
+                ]
+            )
 
         return t, at(np.asarray(t - delay)), at(np.asarray(t - 2.0 * self.crossing + delay))
 
@@ -127,7 +134,10 @@ def _pieces(bar: BouncingBar, round_trips: int) -> tuple[Array, Array, Array]:
         value, slope, curvature = wave[delayed]
         after = t - trip - start[delayed]
         value, slope = value + (slope + 0.5 * curvature * after) * after, slope + curvature * after
-        a, a1 = 2.0 * slope - g * t, 2.0 * curvature - g  # the free foot's velocity and acceleration
+        a, a1 = (
+            2.0 * slope - g * t,
+            2.0 * curvature - g,
+        )  # the free foot's velocity and acceleration
         y, a = (0.0 if y <= near else y), (0.0 if abs(a) <= slow else a)
         touching = y == 0.0 and (a < 0.0 or (a == 0.0 and a1 < 0.0))
         fall = bar.height - 0.5 * g * t**2  # where the foot would be without F

@@ -25,7 +25,9 @@ def contact_modulus(*bodies: tuple[float, float]) -> float:
     """
     for E, nu in bodies:
         if not (E > 0.0 and math.isfinite(E) and -1.0 < nu <= 0.5):
-            raise InputError(f"contact_modulus: E = {E!r}, nu = {nu!r}; give E > 0 and -1 < nu <= 1/2")
+            raise InputError(
+                f"contact_modulus: E = {E!r}, nu = {nu!r}; give E > 0 and -1 < nu <= 1/2"
+            )
     if not bodies:
         raise InputError("contact_modulus: no elastic body; give the (E, nu) of one or two")
     return 1.0 / sum((1.0 - nu**2) / E for E, nu in bodies)
@@ -36,9 +38,14 @@ def contact_radius(*radii: float) -> float:
 
     Raises InputError unless the sum of 1/radius is finite and positive.
     """
-    if any(radius == 0.0 for radius in radii) or not 0.0 < sum(1.0 / radius for radius in radii) < math.inf:
-        raise InputError(f"contact_radius: {radii} leave no gap that grows away from the contact; "
-                         "give radii whose sum of 1/radius is positive")
+    if (
+        any(radius == 0.0 for radius in radii)
+        or not 0.0 < sum(1.0 / radius for radius in radii) < math.inf
+    ):
+        raise InputError(
+            f"contact_radius: {radii} leave no gap that grows away from the contact; "
+            "give radii whose sum of 1/radius is positive"
+        )
     return 1.0 / sum(1.0 / radius for radius in radii)
 
 
@@ -83,7 +90,9 @@ class HertzPoint:
 
     def pressure(self, r: ArrayLike) -> Array:
         """Return p(r) [Pa] at the distance r from the axis, 0 outside the contact."""
-        return self.peak * np.sqrt(np.maximum(1.0 - (np.asarray(r, dtype=float) / self.contact_radius) ** 2, 0.0))
+        return self.peak * np.sqrt(
+            np.maximum(1.0 - (np.asarray(r, dtype=float) / self.contact_radius) ** 2, 0.0)
+        )
 
 
 @dataclass(frozen=True)
@@ -107,7 +116,9 @@ class HertzImpact:
     @property
     def approach(self) -> float:
         """Return d_max [m]."""
-        return (15.0 * self.mass * self.speed**2 / (16.0 * self.modulus * math.sqrt(self.radius))) ** 0.4
+        return (
+            15.0 * self.mass * self.speed**2 / (16.0 * self.modulus * math.sqrt(self.radius))
+        ) ** 0.4
 
     @property
     def duration(self) -> float:

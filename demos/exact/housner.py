@@ -37,8 +37,10 @@ class HousnerBlock:
     def __post_init__(self) -> None:
         attributes(self, positive=("width", "height", "gravity"))
         if self.restitution <= 0.0:
-            raise InputError(f"HousnerBlock: width {self.width} is too large for height {self.height}, the first "
-                             "impact stops the block; give a width below sqrt(2) times the height")
+            raise InputError(
+                f"HousnerBlock: width {self.width} is too large for height {self.height}, the first "
+                "impact stops the block; give a width below sqrt(2) times the height"
+            )
 
     @property
     def radius(self) -> float:
@@ -92,7 +94,9 @@ class HousnerBlock:
         phi = ±(1 - (1 - phi_n) cosh(p (t - t_n))), t_n the time of the n-th amplitude; 0 after the rest time.
         """
         t = np.asarray(t, dtype=float)
-        impacts = math.ceil(math.log(REST) / math.log(self.energy_ratio))  # then phi is below REST, from any angle
+        impacts = math.ceil(
+            math.log(REST) / math.log(self.energy_ratio)
+        )  # then phi is below REST, from any angle
         phi = self._amplitudes(theta0, impacts)
         ends = self.impact_times(theta0, len(phi) - 1)
         peaks = np.append(0.0, 0.5 * (ends[1:] + ends[:-1]))
@@ -109,13 +113,17 @@ class HousnerBlock:
         """
         excess = acceleration / (self.gravity * self.alpha)
         if not excess > 1.0:
-            raise InputError(f"HousnerBlock: an acceleration of {acceleration!r} does not lift the block; give more "
-                             f"than {self.gravity * self.alpha:.6g}")
+            raise InputError(
+                f"HousnerBlock: an acceleration of {acceleration!r} does not lift the block; give more "
+                f"than {self.gravity * self.alpha:.6g}"
+            )
         return -math.log1p(-1.0 / excess) / self.p
 
     def _phi(self, theta0: float) -> float:
         if not 0.0 < theta0 < self.alpha:
-            raise InputError(f"HousnerBlock: theta0 is {theta0!r}; give one between 0 and alpha = {self.alpha:.6g}")
+            raise InputError(
+                f"HousnerBlock: theta0 is {theta0!r}; give one between 0 and alpha = {self.alpha:.6g}"
+            )
         return theta0 / self.alpha
 
     def _amplitudes(self, theta0: float, impacts: int) -> Array:

@@ -61,7 +61,11 @@ def square_plate() -> tuple[float, float]:
     and under a unit force there, in units of a²/D; a is the side."""
     m = np.arange(1, 60, 2)
     b = 0.5 * np.pi * m
-    load = 4.0 / np.pi**5 * np.sum((-1.0) ** (m // 2) / m**5 * (1.0 - (b * np.tanh(b) + 2.0) / (2.0 * np.cosh(b))))
+    load = (
+        4.0
+        / np.pi**5
+        * np.sum((-1.0) ** (m // 2) / m**5 * (1.0 - (b * np.tanh(b) + 2.0) / (2.0 * np.cosh(b))))
+    )
     m = np.arange(1, 2001, 2)  # the terms fall like 1/m³
     b = np.minimum(0.5 * np.pi * m, 300.0)
     force = np.sum((np.tanh(b) - b / np.cosh(b) ** 2) / m**3) / (2.0 * np.pi**3)

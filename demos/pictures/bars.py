@@ -11,10 +11,16 @@ import numpy as np
 from vi_contact.core.algebra import Array
 from vi_contact.plots.histories import History, canvas, save
 
-COLUMNS = ("displacement of the foot [m]", "contact force / section [Pa]", "energy / exact energy [-]")
+COLUMNS = (
+    "displacement of the foot [m]",
+    "contact force / section [Pa]",
+    "energy / exact energy [-]",
+)
 
 
-def plot_bounces(histories: Mapping[str, History], exact: Any, section: float, path: str | Path) -> Path:
+def plot_bounces(
+    histories: Mapping[str, History], exact: Any, section: float, path: str | Path
+) -> Path:
     """Draw a row per scheme: foot, force, energy; ``exact`` (of demos.exact) in grey behind each.
 
     histories: name -> history with u_?_foot, contact_resultant, energy_kinetic and energy_strain of a bar of that
@@ -25,14 +31,18 @@ def plot_bounces(histories: Mapping[str, History], exact: Any, section: float, p
     curves = (exact.displacement(0.0, fine), exact.force(fine), np.ones_like(fine))
     figure, axes = canvas(len(histories), 3, (13.0, 1.55 * len(histories) + 1.0), sharex=True)
     for row, (name, history) in zip(axes, histories.items(), strict=True):
-        for axis, curve, values in zip(row, curves, _values(history, exact.energy * section, section), strict=True):
+        for axis, curve, values in zip(
+            row, curves, _values(history, exact.energy * section, section), strict=True
+        ):
             axis.plot(fine, curve, color="0.72", lw=2.5, label="exact")
             axis.plot(t, values, color="black", lw=0.8, label="computed")
         row[0].set_title(name, fontsize=9, loc="left")
         _limit_force(row[1], curves[1], history["contact_resultant"] / section)
         _limit_energy(row[2])
     for axis, label in zip(axes[0], COLUMNS, strict=True):
-        axis.annotate(label, (0.5, 1.25), xycoords="axes fraction", ha="center", fontsize=10, weight="bold")
+        axis.annotate(
+            label, (0.5, 1.25), xycoords="axes fraction", ha="center", fontsize=10, weight="bold"
+        )
     for axis in axes[-1]:
         axis.set_xlabel("time [s]")
     axes[0, 2].legend(fontsize=8, loc="lower right")
@@ -49,9 +59,16 @@ def _limit_force(axis: Any, exact: Array, force: Array) -> None:
     top = 3.0 * float(exact.max())
     axis.set_ylim(-0.1 * top, top)
     if force.max() > top:
-        axis.text(0.01, 0.9, f"up to {force.max() / exact.max():.0f} times the exact force", fontsize=8,
-                  transform=axis.transAxes, va="top", color="tab:red",
-                  bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5})
+        axis.text(
+            0.01,
+            0.9,
+            f"up to {force.max() / exact.max():.0f} times the exact force",
+            fontsize=8,
+            transform=axis.transAxes,
+            va="top",
+            color="tab:red",
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5},
+        )
 
 
 def _limit_energy(axis: Any) -> None:

@@ -53,19 +53,27 @@ class Panel:
     x: str = "time [s]"
 
 
-def plot_boundary_snapshots(rows: Mapping[str, Sequence[Shot]], path: str | Path, *, title: str) -> Path:
+def plot_boundary_snapshots(
+    rows: Mapping[str, Sequence[Shot]], path: str | Path, *, title: str
+) -> Path:
     """Draw a row per example, a column per time: deformed outlines, points inside, contact tractions (row's scale)."""
     columns = max(len(shots) for shots in rows.values())
-    figure, axes = canvas(len(rows), columns, (2.6 * columns + 0.6, 2.5 * len(rows) + 0.6), lattice=False)
+    figure, axes = canvas(
+        len(rows), columns, (2.6 * columns + 0.6, 2.5 * len(rows) + 0.6), lattice=False
+    )
     for row, (name, shots) in zip(axes, rows.items(), strict=True):
         points = np.concatenate([outline for shot in shots for outline in shot.outlines])
         low, high = points.min(axis=0), points.max(axis=0)
         size = float((high - low).max())
-        longest = max((float(np.hypot(*shot.arrows.T).max(initial=0.0)) for shot in shots), default=0.0)
+        longest = max(
+            (float(np.hypot(*shot.arrows.T).max(initial=0.0)) for shot in shots), default=0.0
+        )
         for axis, shot in zip(row, shots, strict=True):
             _draw(axis, shot, longest / (ARROW * size), size)
             axis.set(xlim=(low[0] - 0.1 * size, high[0] + 0.1 * size))
-            axis.set(ylim=(low[1] - (0.1 if shot.support is None else 0.35) * size, high[1] + 0.1 * size))
+            axis.set(
+                ylim=(low[1] - (0.1 if shot.support is None else 0.35) * size, high[1] + 0.1 * size)
+            )
             axis.set_title(f"{name}\n{shot.title}", fontsize=8)
             axis.tick_params(labelsize=7)
     figure.supxlabel("x [m]", fontsize=10)
@@ -83,8 +91,17 @@ def _draw(axis: Any, shot: Shot, scale: float, size: float) -> None:
         axis.axhline(shot.support, color="black", lw=1.0)
         axis.axhspan(shot.support - 0.05 * size, shot.support, color="0.8", lw=0.0, zorder=0)
     if scale > 0.0 and len(shot.feet):
-        axis.quiver(*shot.feet.T, *shot.arrows.T, angles="xy", scale_units="xy", scale=scale, pivot="tip", width=0.006,
-                    color="tab:blue", zorder=3)
+        axis.quiver(
+            *shot.feet.T,
+            *shot.arrows.T,
+            angles="xy",
+            scale_units="xy",
+            scale=scale,
+            pivot="tip",
+            width=0.006,
+            color="tab:blue",
+            zorder=3,
+        )
 
 
 def plot_panels(rows: Sequence[Sequence[Panel]], path: str | Path, *, title: str) -> Path:
@@ -99,7 +116,9 @@ def plot_panels(rows: Sequence[Sequence[Panel]], path: str | Path, *, title: str
 
 
 def _panel(axis: Any, panel: Panel) -> None:
-    factor, unit = scale(max(float(np.abs(curve.y).max(initial=0.0)) for curve in panel.curves), panel.unit)
+    factor, unit = scale(
+        max(float(np.abs(curve.y).max(initial=0.0)) for curve in panel.curves), panel.unit
+    )
     for curve in panel.curves:
         style = {"ls": "", "marker": ".", "ms": 3.5} if curve.marked else {"lw": 1.1}
         axis.plot(curve.x, factor * curve.y, color=curve.colour, label=curve.label or None, **style)

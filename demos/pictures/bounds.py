@@ -16,12 +16,17 @@ def gathered(function: Any) -> tuple[Any, Any] | None:
     """Return (points (n, 3), values (n,)) of a scalar Function on rank 0, None on the others. Collective."""
     space = function.function_space
     n = space.dofmap.index_map.size_local
-    parts = space.mesh.comm.gather((space.tabulate_dof_coordinates()[:n], np.array(function.x.array[:n])), root=0)
+    parts = space.mesh.comm.gather(
+        (space.tabulate_dof_coordinates()[:n], np.array(function.x.array[:n])), root=0
+    )
     return None if parts is None else tuple(np.concatenate(one) for one in zip(*parts, strict=True))  # type: ignore
 
 
 def plot_membrane(
-    u: tuple[Any, Any], push: tuple[Any, Any], sizes: Sequence[float], errors: Mapping[str, Sequence[float]],
+    u: tuple[Any, Any],
+    push: tuple[Any, Any],
+    sizes: Sequence[float],
+    errors: Mapping[str, Sequence[float]],
     path: str | Path,
 ) -> Path:
     """Draw the membrane along y = 0, the nodes that lie on the ball, and errors against the cell size."""
@@ -31,20 +36,32 @@ def plot_membrane(
     (points, heights), (_, forces) = u, push
     x = np.linspace(-HALF, HALF, 801)
     line = np.vstack([x, 0.0 * x, 0.0 * x])
-    section.fill_between(x, 0.0, np.where(np.abs(x) < 1.0, np.sqrt(np.maximum(1.0 - x**2, 0.0)), 0.0), color="0.85",
-                         label="ball")
+    section.fill_between(
+        x,
+        0.0,
+        np.where(np.abs(x) < 1.0, np.sqrt(np.maximum(1.0 - x**2, 0.0)), 0.0),
+        color="0.85",
+        label="ball",
+    )
     section.plot(x, known.height(line), color="0.5", lw=3.0, label="exact")
     middle = np.abs(points[:, 1]) < 1e-9
     order_of = np.argsort(points[middle, 0])
-    section.plot(points[middle, 0][order_of], heights[middle][order_of], "k.", ms=4, label="computed")
+    section.plot(
+        points[middle, 0][order_of], heights[middle][order_of], "k.", ms=4, label="computed"
+    )
     section.set(xlabel="x at y = 0", ylabel="height u", xlim=(-HALF, HALF), ylim=(0.0, 1.05))
     section.legend(fontsize=8)
     held = forces > 0.0
     plan.plot(*points[held, :2].T, "s", color="tab:blue", ms=3, label="nodes on the ball")
     plan.plot(*points[~held, :2].T, ".", color="0.8", ms=2)
     angle = np.linspace(0.0, 2.0 * np.pi, 200)
-    plan.plot(known.radius * np.cos(angle), known.radius * np.sin(angle), color="tab:red", lw=1.5,
-              label=f"exact contact radius {known.radius:.4f}")
+    plan.plot(
+        known.radius * np.cos(angle),
+        known.radius * np.sin(angle),
+        color="tab:red",
+        lw=1.5,
+        label=f"exact contact radius {known.radius:.4f}",
+    )
     plan.set(xlabel="x", ylabel="y", xlim=(-1.1, 1.1), ylim=(-1.1, 1.1), aspect="equal")
     plan.legend(fontsize=8, loc="upper right")
     for (name, values), mark in zip(errors.items(), "osd", strict=False):
@@ -57,7 +74,9 @@ def plot_membrane(
 
 
 def plot_torsion(
-    fields: Mapping[str, tuple[Any, Any, Any]], curves: Mapping[str, tuple[Any, Any]], path: str | Path
+    fields: Mapping[str, tuple[Any, Any, Any]],
+    curves: Mapping[str, tuple[Any, Any]],
+    path: str | Path,
 ) -> Path:
     """Draw the stress function and the plastic zone of sections, and torque against twist.
 
@@ -71,7 +90,9 @@ def plot_torsion(
         axis.legend(fontsize=8, loc="upper right")
         figure.colorbar(drawn, ax=axis, label="stress function u / (k a)", shrink=0.8)
     last = axes[0, -1]
-    for (name, (twist, torque)), style in zip(curves.items(), ("-", "o", "s", "--", ":"), strict=False):
+    for (name, (twist, torque)), style in zip(
+        curves.items(), ("-", "o", "s", "--", ":"), strict=False
+    ):
         last.plot(twist, torque, style, color="0.4" if style in "-:--" else None, ms=5, label=name)
     last.set(xlabel="twist G θ a / k", ylabel="torque / limit torque", ylim=(0.0, 1.05))
     last.grid(visible=True, alpha=0.4)
@@ -80,8 +101,12 @@ def plot_torsion(
 
 
 def plot_crack(
-    law: tuple[Any, Any, Any, Any], pulls: Any, energies: Mapping[str, Any],
-    cracks: Mapping[str, tuple[Any, Any]], profile: tuple[Any, Any], path: str | Path,
+    law: tuple[Any, Any, Any, Any],
+    pulls: Any,
+    energies: Mapping[str, Any],
+    cracks: Mapping[str, tuple[Any, Any]],
+    profile: tuple[Any, Any],
+    path: str | Path,
 ) -> Path:
     """Draw stress against strain of the bar that stays homogeneous (strain, stress, exact strain, exact stress), the
     energies of the one that breaks against how far it is pulled, and its damage along the axis beside the exact one."""

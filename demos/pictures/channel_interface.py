@@ -20,7 +20,12 @@ SHOWN = {  # panels of plot_openings: point -> outward normal of the channel the
 }
 RUNS = ("black", "tab:red", "tab:green", "tab:purple")
 CLIPPED = 98.0  # per cent of the closed points whose pressure the colours of a map tell apart
-LEGEND: dict[str, Any] = {"fontsize": 8, "loc": "lower right", "bbox_to_anchor": (1.0, 0.98), "frameon": False}
+LEGEND: dict[str, Any] = {
+    "fontsize": 8,
+    "loc": "lower right",
+    "bbox_to_anchor": (1.0, 0.98),
+    "frameon": False,
+}
 
 
 @dataclass(frozen=True)
@@ -38,7 +43,9 @@ class Outline:
         left, right = normals[:, 0] < -0.5, normals[:, 0] > 0.5
         height = high[1] - low[1]
         right_wall = height + high[0] - low[0] + points[:, 1] - low[1]
-        arc = np.select([left, right], [high[1] - points[:, 1], right_wall], height + points[:, 0] - low[0])
+        arc = np.select(
+            [left, right], [high[1] - points[:, 1], right_wall], height + points[:, 0] - low[0]
+        )
         return cls(arc, {"left wall": left, "base": ~(left | right), "right wall": right})
 
     def along(self) -> list[tuple[str, Array]]:
@@ -70,8 +77,15 @@ def opening(history: History, label: str, normal: Sequence[float]) -> Array:
     names = [f"u_{axis}_{label}" for axis in "xy"]
     missing = [name for one in names for name in (one, f"{one}_soil") if name not in history]
     if missing:
-        raise InputError(f"the history has no column '{missing[0]}': record point {label} on channel and soil")
-    return np.asarray(sum(n * (history[f"{one}_soil"] - history[one]) for n, one in zip(normal, names, strict=True)))
+        raise InputError(
+            f"the history has no column '{missing[0]}': record point {label} on channel and soil"
+        )
+    return np.asarray(
+        sum(
+            n * (history[f"{one}_soil"] - history[one])
+            for n, one in zip(normal, names, strict=True)
+        )
+    )
 
 
 def plot_openings(history: History, path: str | Path, *, title: str) -> Path:
@@ -80,11 +94,19 @@ def plot_openings(history: History, path: str | Path, *, title: str) -> Path:
         name: {label: opening(history, label, normal) for label, normal in points.items()}
         for name, points in SHOWN.items()
     }
-    metres, unit = unit_of(max(float(np.abs(one).max()) for rows in found.values() for one in rows.values()))
+    metres, unit = unit_of(
+        max(float(np.abs(one).max()) for rows in found.values() for one in rows.values())
+    )
     figure, axes = panels(len(found) + 1, (9.0, 9.6))
     for component in shaken(history):
         colour = "black" if component == "x" else "0.6"
-        axes[0].plot(history["t"], history[f"a_g_{component}"], color=colour, lw=0.9, label=f"$a_{{g,{component}}}$")
+        axes[0].plot(
+            history["t"],
+            history[f"a_g_{component}"],
+            color=colour,
+            lw=0.9,
+            label=f"$a_{{g,{component}}}$",
+        )
     axes[0].set_ylabel("acceleration [m/s²]")
     axes[0].set_title("bedrock", fontsize=9, loc="left")
     for axis, (name, rows) in zip(axes[1:], found.items(), strict=True):
@@ -101,7 +123,9 @@ def plot_openings(history: History, path: str | Path, *, title: str) -> Path:
     return save(figure, path, title)
 
 
-def plot_rocking(history: History, path: str | Path, *, title: str, corners: Sequence[str] = ("1", "7")) -> Path:
+def plot_rocking(
+    history: History, path: str | Path, *, title: str, corners: Sequence[str] = ("1", "7")
+) -> Path:
     """Draw Fig. 8: u_y of the bottom corners with their static settlement; what of it is rocking and what is common."""
     left, right = (np.asarray(history[f"u_y_{label}"]) for label in corners)
     t = history["t"]
@@ -109,11 +133,25 @@ def plot_rocking(history: History, path: str | Path, *, title: str, corners: Seq
     figure, (top, bottom) = panels(2, (9.0, 5.6), height_ratios=(3, 2))
     for label, values, colour in zip(corners, (left, right), ("tab:blue", "tab:red"), strict=True):
         top.plot(t, values / metres, color=colour, lw=0.9, label=f"point {label}")
-    top.axhline(left[0] / metres, color="black", ls="--", lw=0.8, label="static, before the shaking")
+    top.axhline(
+        left[0] / metres, color="black", ls="--", lw=0.8, label="static, before the shaking"
+    )
     top.set_ylabel(f"$u_y$ [{unit}]")
-    bottom.plot(t, 0.5 * (right - left) / metres, color="black", lw=0.9, label="rocking, half the difference")
+    bottom.plot(
+        t,
+        0.5 * (right - left) / metres,
+        color="black",
+        lw=0.9,
+        label="rocking, half the difference",
+    )
     common = 0.5 * (left + right)
-    bottom.plot(t, (common - common[0]) / metres, color="tab:green", lw=1.2, label="common, mean less static")
+    bottom.plot(
+        t,
+        (common - common[0]) / metres,
+        color="tab:green",
+        lw=1.2,
+        label="common, mean less static",
+    )
     bottom.set_ylabel(f"parts of $u_y$ [{unit}]")
     top.set_xlim(t[0], t[-1])
     for axis in (top, bottom):
@@ -121,7 +159,9 @@ def plot_rocking(history: History, path: str | Path, *, title: str, corners: Seq
     return save(figure, path, title)
 
 
-def plot_interface(runs: Mapping[str, History], outline: Outline, path: str | Path, *, title: str) -> Path:
+def plot_interface(
+    runs: Mapping[str, History], outline: Outline, path: str | Path, *, title: str
+) -> Path:
     """Draw a map over time and arc length, a panel per run: pressure where closed (root scale), opening where open."""
     import matplotlib
     from matplotlib.colors import Normalize, PowerNorm
@@ -135,27 +175,46 @@ def plot_interface(runs: Mapping[str, History], outline: Outline, path: str | Pa
     widest = max(float(gap.max()) for *_, gap in maps.values())
     metres, length = unit_of(widest)
     drawn = {
-        f"opening [{length}], where open": ("Blues", Normalize(0.0, widest / metres or 1.0), "neither"),
+        f"opening [{length}], where open": (
+            "Blues",
+            Normalize(0.0, widest / metres or 1.0),
+            "neither",
+        ),
         f"pressure [{unit}], where closed": ("YlOrRd", PowerNorm(0.5, 0.0, factor * most), "max"),
     }
     figure, axes = panels(len(maps), (10.0, 2.9 * len(maps) + 1.0))
     for axis, (name, (t, pressure, gap)) in zip(axes, maps.items(), strict=True):
         axis.grid(False)
         edges = cell_edges(t), np.clip(cell_edges(arc), arc.min(), arc.max())
-        values = np.where(gap > 0.0, gap / metres, np.nan), np.where(gap > 0.0, np.nan, pressure * factor)
+        values = (
+            np.where(gap > 0.0, gap / metres, np.nan),
+            np.where(gap > 0.0, np.nan, pressure * factor),
+        )
         images = [
-            axis.pcolormesh(*edges, one.T, cmap=matplotlib.colormaps[colours], norm=norm, rasterized=True)
+            axis.pcolormesh(
+                *edges, one.T, cmap=matplotlib.colormaps[colours], norm=norm, rasterized=True
+            )
             for one, (colours, norm, _) in zip(values, drawn.values(), strict=True)
         ]
         for corner in outline.corners():
             axis.axhline(corner, color="black", lw=0.8)
         for side, part in outline.along():
             middle = 0.5 * float(outline.arc[part].min() + outline.arc[part].max())
-            axis.text(0.004, middle, side, rotation=90, fontsize=8, va="center", transform=axis.get_yaxis_transform())
+            axis.text(
+                0.004,
+                middle,
+                side,
+                rotation=90,
+                fontsize=8,
+                va="center",
+                transform=axis.get_yaxis_transform(),
+            )
         axis.set(xlim=(t[0], t[-1]), ylim=(arc.max(), arc.min()), ylabel="arc length [m]")
         axis.set_title(name, fontsize=10, loc="left")
     for image, (label, (*_, extend)) in zip(images, drawn.items(), strict=True):
-        figure.colorbar(image, ax=axes, label=label, pad=0.01, fraction=0.04, aspect=35, extend=extend)
+        figure.colorbar(
+            image, ax=axes, label=label, pad=0.01, fraction=0.04, aspect=35, extend=extend
+        )
     return save(figure, path, title)
 
 
@@ -168,10 +227,15 @@ def _reduced(run: History, parts: Any) -> tuple[Array, Array, Array]:
     return t, pressure, thinned(run["t"], gap)[1]
 
 
-def plot_envelope(runs: Mapping[str, History], outline: Outline, path: str | Path, *, title: str) -> Path:
+def plot_envelope(
+    runs: Mapping[str, History], outline: Outline, path: str | Path, *, title: str
+) -> Path:
     """Draw along the arc largest pressure and static pressure (dotted), largest opening, and share of time open."""
     keys = ("pressure", "gap", "active")
-    rows = {name: [np.reshape(run[key], (len(run["t"]), -1)) for key in keys] for name, run in runs.items()}
+    rows = {
+        name: [np.reshape(run[key], (len(run["t"]), -1)) for key in keys]
+        for name, run in runs.items()
+    }
     factor, unit = scale(max(float(pressure.max()) for pressure, *_ in rows.values()), "Pa")
     metres, length = unit_of(max(float(gap.max()) for _, gap, _ in rows.values()))
     figure, axes = canvas(3, 1, (9.0, 8.0), sharex=True)
@@ -194,6 +258,13 @@ def plot_envelope(runs: Mapping[str, History], outline: Outline, path: str | Pat
         for corner in outline.corners():
             axis.axvline(corner, color="black", lw=0.8)
     for name, one in outline.along():
-        axes[0].text(float(np.mean(outline.arc[one])), 1.01, name, ha="center", va="bottom", fontsize=9,
-                     transform=axes[0].get_xaxis_transform())
+        axes[0].text(
+            float(np.mean(outline.arc[one])),
+            1.01,
+            name,
+            ha="center",
+            va="bottom",
+            fontsize=9,
+            transform=axes[0].get_xaxis_transform(),
+        )
     return save(figure, path, title)

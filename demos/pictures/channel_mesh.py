@@ -17,7 +17,9 @@ from vi_contact.plots.histories import History, canvas, scale
 
 SOIL, CONCRETE, CONTACT = "#efe3c8", "#9aa3ab", "tab:red"
 MAP = "YlOrRd"  # colours of pressures
-INWARDS = 0.04  # of the channel's height: how far inside the channel the points are that show its contact
+INWARDS = (
+    0.04  # of the channel's height: how far inside the channel the points are that show its contact
+)
 AROUND = 0.8  # heights of the channel that are shown beside and below it
 
 
@@ -48,13 +50,19 @@ def read_bodies(folder: str | Path) -> Bodies:
     centres = frames.points[frames.cells].mean(axis=1)
     cells = np.all((low < centres) & (centres < high), axis=1)
     own = np.unique(frames.cells[cells])
-    nearest = [np.argmin(np.sum((frames.points[own] - point) ** 2, axis=1)) for point in tractions.points]
+    nearest = [
+        np.argmin(np.sum((frames.points[own] - point) ** 2, axis=1)) for point in tractions.points
+    ]
     nodes = own[np.array(nearest, dtype=np.int64)]
     _, where, counts = np.unique(nodes, return_inverse=True, return_counts=True)
     base = tractions.normals[:, 1] < -0.5
-    along = np.where(base[:, None], [1.0, 0.0], [0.0, 1.0]) * np.sign(0.5 * (low + high) - tractions.points)
+    along = np.where(base[:, None], [1.0, 0.0], [0.0, 1.0]) * np.sign(
+        0.5 * (low + high) - tractions.points
+    )
     inwards = np.where((counts[where] > 1)[:, None], 2.0 * along, 0.0) - tractions.normals
-    return Bodies(frames, tractions, cells, nodes, INWARDS * (high[1] - low[1]) * inwards, low, high)
+    return Bodies(
+        frames, tractions, cells, nodes, INWARDS * (high[1] - low[1]) * inwards, low, high
+    )
 
 
 @dataclass(frozen=True)
@@ -79,8 +87,15 @@ class Colours:
         from matplotlib.cm import ScalarMappable
 
         label = f"contact pressure [{self.unit}], open points white"
-        figure.colorbar(ScalarMappable(self.norm, MAP), ax=axes, label=label, fraction=0.04, aspect=35, pad=0.01,
-                        shrink=shrink)
+        figure.colorbar(
+            ScalarMappable(self.norm, MAP),
+            ax=axes,
+            label=label,
+            fraction=0.04,
+            aspect=35,
+            pad=0.01,
+            shrink=shrink,
+        )
 
 
 def draw_bodies(
@@ -95,7 +110,13 @@ def draw_bodies(
     filled(axis, moved[frames.cells[bodies.cells]], CONCRETE)
     pressure, _ = tractions.at(shown)
     places = moved[bodies.nodes] + bodies.inwards
-    dots: dict[str, Any] = {"s": 26, "edgecolors": "black", "linewidths": 0.5, "norm": colours.norm, "cmap": MAP}
+    dots: dict[str, Any] = {
+        "s": 26,
+        "edgecolors": "black",
+        "linewidths": 0.5,
+        "norm": colours.norm,
+        "cmap": MAP,
+    }
     closed = pressure > 0.0
     axis.scatter(*places[~closed].T, s=26, c="white", edgecolors="black", linewidths=0.5, zorder=4)
     axis.scatter(*places[closed].T, c=colours.factor * pressure[closed], zorder=5, **dots)
@@ -103,8 +124,14 @@ def draw_bodies(
 
 
 def animate(
-    folder: str | Path, path: str | Path, *,
-    title: str, history: History, openings: Mapping[str, Array], times: Sequence[float], magnified: float,
+    folder: str | Path,
+    path: str | Path,
+    *,
+    title: str,
+    history: History,
+    openings: Mapping[str, Array],
+    times: Sequence[float],
+    magnified: float,
     fps: int = 10,
 ) -> Path:
     """Write a GIF of the frames at ``times`` [s]: bodies, displaced relative to the bedrock, and contact; below the
@@ -116,7 +143,9 @@ def animate(
 
     path = Path(path)
     if path.suffix != ".gif":
-        raise InputError(f"'{path.name}' is not a .gif: give such a name, or draw moments with plot_moments")
+        raise InputError(
+            f"'{path.name}' is not a .gif: give such a name, or draw moments with plot_moments"
+        )
     bodies = read_bodies(folder)
     colours = Colours.of(np.concatenate([bodies.tractions.at(t)[0] for t in times]))
     reach = 2.0 * AROUND * bodies.height
@@ -131,17 +160,27 @@ def animate(
             top.clear()
             shown = draw_bodies(top, bodies, t, magnified=magnified, colours=colours)
             bedrock(top, bodies)
-            top.set(xlim=(bodies.low[0] - reach, bodies.high[0] + reach), xlabel="x [m]", ylabel="y [m]",
-                    ylim=(-0.15 * reach, bodies.high[1] + 0.15 * reach))
-            top.set_title(f"{title}, t = {shown:.3f} s (displacements x {magnified:g})", fontsize=10)
+            top.set(
+                xlim=(bodies.low[0] - reach, bodies.high[0] + reach),
+                xlabel="x [m]",
+                ylabel="y [m]",
+                ylim=(-0.15 * reach, bodies.high[1] + 0.15 * reach),
+            )
+            top.set_title(
+                f"{title}, t = {shown:.3f} s (displacements x {magnified:g})", fontsize=10
+            )
             marker.set_xdata([shown, shown])
             writer.grab_frame()
     return path
 
 
-def _traces(axis: Any, history: History, openings: Mapping[str, Array], span: tuple[float, float]) -> Any:
+def _traces(
+    axis: Any, history: History, openings: Mapping[str, Array], span: tuple[float, float]
+) -> Any:
     """Openings and, dashed, the acceleration during the animation; the line that marks a moment."""
-    for colour, (name, values) in zip(("tab:blue", "tab:red", "black"), openings.items(), strict=False):
+    for colour, (name, values) in zip(
+        ("tab:blue", "tab:red", "black"), openings.items(), strict=False
+    ):
         axis.plot(history["t"], 1e3 * values, color=colour, lw=1.0, label=name)
     axis.set(xlabel="time [s]", ylabel="opening [mm]", xlim=span)
     behind = axis.twinx()
@@ -161,7 +200,9 @@ def plane(size: tuple[float, float], heights: Sequence[float] = (1.0,)) -> tuple
 def filled(axis: Any, cells: Array, colour: str, lw: float = 0.4) -> None:
     from matplotlib.collections import PolyCollection
 
-    axis.add_collection(PolyCollection(list(cells), facecolor=colour, edgecolor="0.45", linewidth=lw))
+    axis.add_collection(
+        PolyCollection(list(cells), facecolor=colour, edgecolor="0.45", linewidth=lw)
+    )
     axis.set_aspect("equal")
 
 
@@ -169,4 +210,12 @@ def bedrock(axis: Any, bodies: Bodies) -> None:
     """Draw the bedrock's line, hatched below."""
     width, depth = bodies.frames.points.max(axis=0)
     axis.axhline(0.0, color="black", lw=1.5, zorder=3)
-    axis.fill_between([-1.0, width + 1.0], -0.05 * depth, 0.0, facecolor="none", edgecolor="0.4", hatch="////", lw=0.0)
+    axis.fill_between(
+        [-1.0, width + 1.0],
+        -0.05 * depth,
+        0.0,
+        facecolor="none",
+        edgecolor="0.4",
+        hatch="////",
+        lw=0.0,
+    )

@@ -34,8 +34,11 @@ def plot_snapshots(
     shots = [[frames.at(t) for t in times] for frames, _ in runs.values()]
     stresses = np.array([stress.max() for row in shots for *_, stress in row])
     shown, unit = scaled(stresses, "Pa")
-    longest = max(float(np.linalg.norm(_arrows(tractions, t), axis=1).max(initial=0.0))
-                  for _, tractions in runs.values() for t in times)
+    longest = max(
+        float(np.linalg.norm(_arrows(tractions, t), axis=1).max(initial=0.0))
+        for _, tractions in runs.values()
+        for t in times
+    )
     points = next(iter(runs.values()))[0].points
     size = float(np.ptp(points, axis=0).max())
     low, high = _limits([points + magnified * u for row in shots for _, u, _ in row], size)
@@ -81,7 +84,9 @@ def _draw_body(axis: Any, cells: Array, stress: Array) -> Any:
     return drawn
 
 
-def _draw_tractions(axis: Any, frames: StoredFrames, tractions: Tractions, u: Array, t: float, scale: float) -> None:
+def _draw_tractions(
+    axis: Any, frames: StoredFrames, tractions: Tractions, u: Array, t: float, scale: float
+) -> None:
     """Arrows that end at the contact points; nothing at open ones. scale: Pa per metre of arrow."""
     arrows = _arrows(tractions, t)
     acts = np.any(arrows != 0.0, axis=1)
@@ -90,8 +95,17 @@ def _draw_tractions(axis: Any, frames: StoredFrames, tractions: Tractions, u: Ar
     points = tractions.points[acts]
     nodes = [int(np.argmin(np.sum((frames.points - point) ** 2, axis=1))) for point in points]
     tips = points + u[nodes]
-    axis.quiver(*tips.T, *arrows[acts].T, angles="xy", scale_units="xy", scale=scale, pivot="tip", width=0.004,
-                color="tab:blue", zorder=3)
+    axis.quiver(
+        *tips.T,
+        *arrows[acts].T,
+        angles="xy",
+        scale_units="xy",
+        scale=scale,
+        pivot="tip",
+        width=0.004,
+        color="tab:blue",
+        zorder=3,
+    )
 
 
 def _arrows(tractions: Tractions, t: float) -> Array:
@@ -114,9 +128,16 @@ def plot_tractions(
     """
     from matplotlib import colormaps
 
-    figure, axes = canvas(2, len(folders), (3.8 * len(folders) + 0.5, 5.4), sharex=True, sharey="row")
+    figure, axes = canvas(
+        2, len(folders), (3.8 * len(folders) + 0.5, 5.4), sharex=True, sharey="row"
+    )
     runs = {name: read_tractions(folder) for name, folder in folders.items()}
-    size = max(float(np.abs(part).max(initial=0.0)) for run in runs.values() for t in times for part in run.at(t))
+    size = max(
+        float(np.abs(part).max(initial=0.0))
+        for run in runs.values()
+        for t in times
+        for part in run.at(t)
+    )
     factor, unit = scale(size, "Pa")
     colours = colormaps["viridis"](np.linspace(0.0, 0.85, len(times)))
     for column, (name, tractions) in zip(axes.T, runs.items(), strict=True):
@@ -125,7 +146,15 @@ def plot_tractions(
             pressure, shear = tractions.at(t)
             along = np.linalg.norm(shear, axis=1) * np.sign(shear[:, 0])
             for axis, values in zip(column, (pressure, along), strict=True):
-                axis.plot(x[order], factor * values[order], ".-", ms=3, lw=0.9, color=colour, label=_moment(t))
+                axis.plot(
+                    x[order],
+                    factor * values[order],
+                    ".-",
+                    ms=3,
+                    lw=0.9,
+                    color=colour,
+                    label=_moment(t),
+                )
         column[0].set_title(name, fontsize=10)
         column[1].set_xlabel("x [m]")
     axes[0, 0].set_ylabel(f"pressure $p_n$ [{unit}]")

@@ -27,13 +27,17 @@ def plot_errors(rows: Sequence[Mapping[str, Any]], path: str | Path) -> Path:
 
 
 def _panel(axis: Any, case: str, rows: Sequence[Mapping[str, Any]]) -> None:
-    finest = rows[0]["finest"]  # a row of the unsymmetric form there is no error, but a difference of the forms
+    finest = rows[0][
+        "finest"
+    ]  # a row of the unsymmetric form there is no error, but a difference of the forms
     reference = rows[0]["reference_error"]
     for form, style in STYLES.items():
         chosen = [row for row in rows if row["form"] == form and row["k"] < finest]
         h = np.array([1.0 / row["k"] for row in chosen])
         errors = np.array([row["error_squared"] for row in chosen]) + reference
-        told = f"{form}: {chosen[0]['slope']:.2f}" + ("" if chosen[0]["settled"] else " (not settled)")
+        told = f"{form}: {chosen[0]['slope']:.2f}" + (
+            "" if chosen[0]["settled"] else " (not settled)"
+        )
         axis.loglog(h, errors, label=told, **style)
     axis.axhline(reference, color="0.5", lw=0.9, ls=":", label=f"$e^2$, k = {finest}")
     axis.set_title(case, fontsize=9)

@@ -10,11 +10,23 @@ from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 from vi_contact.plots.deformed import contact_states
 from vi_contact.plots.faces import STATES
-from vi_contact.plots.histories import History, canvas, cell_edges, length_unit, panels, save, scaled
+from vi_contact.plots.histories import (
+    History,
+    canvas,
+    cell_edges,
+    length_unit,
+    panels,
+    save,
+    scaled,
+)
 
 
 def plot_hysteresis(
-    history: History, path: str | Path, *, axis: str | None = None, tangent: int = 0,
+    history: History,
+    path: str | Path,
+    *,
+    axis: str | None = None,
+    tangent: int = 0,
     title: str = "Friction force and slip",
 ) -> Path:
     """Draw the tangential force of the body on its support along an axis, against the mean slip of all contact points.
@@ -36,13 +48,19 @@ def plot_hysteresis(
     plot.plot(slip[:1] / metres, newtons[:1], "o", color="tab:green", ms=5, label="start")
     plot.plot(slip[-1:] / metres, newtons[-1:], "s", color="tab:red", ms=5, label="end")
     plot.legend(fontsize=8, ncol=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
-    plot.set(xlabel=f"mean slip [{unit}]", ylabel=f"friction force on the support, {name} [{force_unit}]")
+    plot.set(
+        xlabel=f"mean slip [{unit}]", ylabel=f"friction force on the support, {name} [{force_unit}]"
+    )
     plot.set_title(title, loc="left")
     return save(figure, path)
 
 
 def plot_states(
-    history: History, path: str | Path, *, position: Array, axis_label: str = "position [m]",
+    history: History,
+    path: str | Path,
+    *,
+    position: Array,
+    axis_label: str = "position [m]",
     title: str = "Open, sticking and slipping points",
 ) -> Path:
     """Map the states of the contact points over position and time. ``position``: (m,) of the points.
@@ -59,11 +77,24 @@ def plot_states(
     panel.grid(False)
     colours = ListedColormap([colour for _, colour in STATES.values()])
     panel.pcolormesh(
-        cell_edges(t), cell_edges(np.asarray(position)[order]), states.T, cmap=colours,
-        norm=BoundaryNorm([0.5, 1.5, 2.5, 3.5], 3), rasterized=True,
+        cell_edges(t),
+        cell_edges(np.asarray(position)[order]),
+        states.T,
+        cmap=colours,
+        norm=BoundaryNorm([0.5, 1.5, 2.5, 3.5], 3),
+        rasterized=True,
     )
-    patches = [Patch(facecolor=colour, edgecolor="0.5", label=label) for label, colour in STATES.values()]
-    panel.legend(handles=patches, fontsize=8, ncol=3, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    patches = [
+        Patch(facecolor=colour, edgecolor="0.5", label=label) for label, colour in STATES.values()
+    ]
+    panel.legend(
+        handles=patches,
+        fontsize=8,
+        ncol=3,
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        frameon=False,
+    )
     panel.set_ylabel(axis_label)
     panel.set_title(title, loc="left")
     return save(figure, path)
@@ -72,7 +103,9 @@ def plot_states(
 def _slip(history: History) -> Array:
     """(rows, m, d - 1)."""
     if "slip" not in history:
-        raise InputError("the history has no column slip: run a problem with friction and record Contact()")
+        raise InputError(
+            "the history has no column slip: run a problem with friction and record Contact()"
+        )
     rows = len(history["t"])
     points = np.reshape(history["active"], (rows, -1)).shape[1]
     return np.reshape(history["slip"], (rows, points, -1)).astype(float)
@@ -82,9 +115,13 @@ def _force(history: History, axis: str | None) -> tuple[Array, str]:
     """Force of the body on its support along the axis, and the name of the axis."""
     names = {name[-1]: name for name in history if name.startswith("friction_force_")}
     if not names:
-        raise InputError("the history has no friction_force: run a problem with friction and record Contact()")
+        raise InputError(
+            "the history has no friction_force: run a problem with friction and record Contact()"
+        )
     if axis is None:
         axis = max(names, key=lambda one: float(np.ptp(history[names[one]])))
     if axis not in names:
-        raise InputError(f"plot_hysteresis: no friction force is along {axis!r}, choose one of {', '.join(names)}")
+        raise InputError(
+            f"plot_hysteresis: no friction force is along {axis!r}, choose one of {', '.join(names)}"
+        )
     return 0.0 - history[names[axis]], axis

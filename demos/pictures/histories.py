@@ -26,32 +26,61 @@ SOIL = "_soil"  # after the label of a point: that of the soil which touches it
 
 
 def draw_histories(
-    history: History, contact: ContactSurface | None, out: Path, *, title: str,
-    unilateral: Sequence[str] | None = None, reference: History | None = None,
+    history: History,
+    contact: ContactSurface | None,
+    out: Path,
+    *,
+    title: str,
+    unilateral: Sequence[str] | None = None,
+    reference: History | None = None,
 ) -> list[Path]:
     """Draw the pictures of recorded histories, each where there is something to draw; ``reference``: in grey."""
     drawn = []
     if shaken(history):
         drawn.append(plot_excitation(history, out / "excitation.png"))
     for axis in "xyz":
-        labels = [name.removeprefix(f"u_{axis}_") for name in history
-                  if name.startswith(f"u_{axis}_") and not name.endswith(SOIL)]
+        labels = [
+            name.removeprefix(f"u_{axis}_")
+            for name in history
+            if name.startswith(f"u_{axis}_") and not name.endswith(SOIL)
+        ]
         if any(np.any(history[f"u_{axis}_{label}"]) for label in labels):
-            drawn.append(plot_points(history, labels, out / f"displacements_{axis}.png", title=plain(title),
-                                     component=axis, unilateral=unilateral if axis == "x" else None,
-                                     reference=reference))
+            drawn.append(
+                plot_points(
+                    history,
+                    labels,
+                    out / f"displacements_{axis}.png",
+                    title=plain(title),
+                    component=axis,
+                    unilateral=unilateral if axis == "x" else None,
+                    reference=reference,
+                )
+            )
     if "energy_defect" in history:
         drawn.append(plot_energy(history, out / "energy.png"))
     drawn.append(plot_certificate(history, out / "certificate.png"))
-    if contact is not None and "pressure" in history and contact.points.shape[0] and contact.points.shape[1] == 2:
+    if (
+        contact is not None
+        and "pressure" in history
+        and contact.points.shape[0]
+        and contact.points.shape[1] == 2
+    ):
         position, label = arc_position(contact.points, contact.normals)
-        drawn.append(plot_contact(history, out / "contact.png", position=position, axis_label=label))
+        drawn.append(
+            plot_contact(history, out / "contact.png", position=position, axis_label=label)
+        )
     return drawn
 
 
 def plot_points(
-    history: History, labels: Sequence[str], path: str | Path, *, title: str, component: str = "x",
-    unilateral: Sequence[str] | None = (), reference: History | None = None,
+    history: History,
+    labels: Sequence[str],
+    path: str | Path,
+    *,
+    title: str,
+    component: str = "x",
+    unilateral: Sequence[str] | None = (),
+    reference: History | None = None,
 ) -> Path:
     """Draw the displacement against time, a panel for each point, as Figs. 4 and 5 of the boundary method.
 
@@ -64,7 +93,9 @@ def plot_points(
     figure, axes = panels(len(names), (9.0, 1.5 * len(names) + 1.2), sharey=True)
     for axis, name, label in zip(axes, names, labels, strict=True):
         if reference is not None:
-            axis.plot(reference["t"], reference[name] / metres, color="0.65", lw=0.8, label="no contact")
+            axis.plot(
+                reference["t"], reference[name] / metres, color="0.65", lw=0.8, label="no contact"
+            )
         axis.plot(history["t"], history[name] / metres, color="black", lw=0.9, label="with contact")
         kind = "" if unilateral is None else " (free point)"
         if unilateral is not None and label in unilateral:
@@ -73,11 +104,15 @@ def plot_points(
         axis.set_ylabel(f"$u_{component}$ [{unit}]")
         axis.set_title(f"point {plain(label)}{kind}", fontsize=9, loc="left")
     if reference is not None:
-        axes[0].legend(fontsize=8, ncol=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
+        axes[0].legend(
+            fontsize=8, ncol=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False
+        )
     return save(figure, path, title)
 
 
-def plot_excitation(history: History, path: str | Path, *, title: str = "Ground acceleration") -> Path:
+def plot_excitation(
+    history: History, path: str | Path, *, title: str = "Ground acceleration"
+) -> Path:
     """Draw the ground acceleration components that the run used (Fig. 3)."""
     figure, (axis,) = panels(1, (9.0, 3.0))
     for component in shaken(history):
@@ -113,7 +148,9 @@ def plot_certificate(history: History, path: str | Path, *, tolerance: float = 1
     return save(figure, path)
 
 
-def plot_contact(history: History, path: str | Path, *, position: Array, axis_label: str = "position [m]") -> Path:
+def plot_contact(
+    history: History, path: str | Path, *, position: Array, axis_label: str = "position [m]"
+) -> Path:
     """Draw a map of contact pressure over position and time, and the uplift ratio. ``position``: (m,) of the points.
 
     Open points are white; held points that pull are blue.

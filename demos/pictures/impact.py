@@ -26,7 +26,9 @@ class ImpactCurves:
 
 
 def plot_impact(
-    runs: Mapping[str, ImpactCurves], exact: HertzImpact, course: Callable[[Array], tuple[Array, Array]],
+    runs: Mapping[str, ImpactCurves],
+    exact: HertzImpact,
+    course: Callable[[Array], tuple[Array, Array]],
     path: str | Path,
 ) -> Path:
     """Draw force and approach over time, pressure over the distance from the axis; the theory in grey behind them.
@@ -40,8 +42,11 @@ def plot_impact(
     free = np.where(t < 0.0, exact.speed * t, exact.speed * (exact.duration - t))
     way, push = course(t)
     way = np.where((t < 0.0) | (t > exact.duration), free, way)
-    for axis, x, y in ((force, 1e6 * t, push), (approach, 1e6 * t, 1e6 * way),
-                       (pressure, 1e3 * r, 1e-9 * exact.deepest.pressure(r))):
+    for axis, x, y in (
+        (force, 1e6 * t, push),
+        (approach, 1e6 * t, 1e6 * way),
+        (pressure, 1e3 * r, 1e-9 * exact.deepest.pressure(r)),
+    ):
         axis.plot(x, y, color="0.75", lw=4.0, label="Hertz, quasi-static")
     for (name, run), style in zip(runs.items(), ("tab:orange", "black", "tab:blue"), strict=False):
         force.plot(1e6 * run.t, run.force, color=style, lw=1.0, label=name)
@@ -49,7 +54,10 @@ def plot_impact(
         pressure.plot(1e3 * run.distance, 1e-9 * run.pressure, ".", color=style, ms=5.0, label=name)
     force.set(xlabel="time since the first touch [µs]", ylabel="contact force [N]")
     approach.set(xlabel="time since the first touch [µs]", ylabel="approach of the centre [µm]")
-    pressure.set(xlabel="distance from the axis [mm]", ylabel="pressure at the largest force [GPa]",
-                 xlim=(0.0, 1.3e3 * a))
+    pressure.set(
+        xlabel="distance from the axis [mm]",
+        ylabel="pressure at the largest force [GPa]",
+        xlim=(0.0, 1.3e3 * a),
+    )
     pressure.legend(fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 0.1))
     return save(figure, path)

@@ -16,7 +16,9 @@ from vi_contact.plots.histories import canvas, save
 COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple")
 
 
-def plot_particle(impacts: Mapping[str, Sequence[tuple[str, ParticleImpact]]], path: str | Path) -> Path:
+def plot_particle(
+    impacts: Mapping[str, Sequence[tuple[str, ParticleImpact]]], path: str | Path
+) -> Path:
     """Draw Fig. 1: distance and velocity against t/t_f, a row of panels for each group; group -> (label, impact)."""
     figure, axes = canvas(len(impacts), 2, (10.0, 3.3 * len(impacts) + 0.3))
     for (place, speed), (title, group) in zip(axes, impacts.items(), strict=True):
@@ -38,17 +40,29 @@ def plot_parameters(values: Sequence[float], dampers: Sequence[float], path: str
     duration, rebound = axes[0]
     for c, colour in zip(dampers, COLOURS, strict=False):
         impacts = [ParticleImpact(Layer(1.0, k=k, c=c), 1.0, 1.0) for k in values]
-        duration.plot(values, [one.duration for one in impacts], color=colour, lw=1.2, label=f"c = {c:g}")
-        rebound.plot(values, [one.restitution for one in impacts], color=colour, lw=1.2, label=f"c = {c:g}")
-        rebound.plot(values, [one.poisson_covector for one in impacts], color=colour, lw=1.0, ls="--")
+        duration.plot(
+            values, [one.duration for one in impacts], color=colour, lw=1.2, label=f"c = {c:g}"
+        )
+        rebound.plot(
+            values, [one.restitution for one in impacts], color=colour, lw=1.2, label=f"c = {c:g}"
+        )
+        rebound.plot(
+            values, [one.poisson_covector for one in impacts], color=colour, lw=1.0, ls="--"
+        )
     duration.set(xlabel="k [m V²/a²]", ylabel="duration t_f [a/V]", ylim=(0.0, 5.0))
-    rebound.set(xlabel="k [m V²/a²]", ylabel="restitution [-]", ylim=(0.0, 1.05),
-                title="Newton's (solid), Poisson's with $\\hat f_1$ (dashed)")
+    rebound.set(
+        xlabel="k [m V²/a²]",
+        ylabel="restitution [-]",
+        ylim=(0.0, 1.05),
+        title="Newton's (solid), Poisson's with $\\hat f_1$ (dashed)",
+    )
     duration.legend(fontsize=8)
     return save(figure, path)
 
 
-def plot_cut_off(motions: Mapping[str, Trajectory], exact: ParticleImpact, path: str | Path) -> Path:
+def plot_cut_off(
+    motions: Mapping[str, Trajectory], exact: ParticleImpact, path: str | Path
+) -> Path:
     """Draw Fig. 3: distance and velocity against time for several a/b, the closed form behind them; label -> motion."""
     figure, axes = canvas(1, 2, (10.0, 3.8))
     place, speed = axes[0]
@@ -79,7 +93,14 @@ def plot_bounces_of_body(
     place.legend(fontsize=8)
     ledger.plot(motion.t, energy, color="black", lw=1.2, label="through the layer")
     if still is not None:
-        ledger.plot(motion.t, still, color="tab:red", lw=1.2, ls="--", label="½ g₁₁ (1 - e²) ρ̇² less at every impact")
+        ledger.plot(
+            motion.t,
+            still,
+            color="tab:red",
+            lw=1.2,
+            ls="--",
+            label="½ g₁₁ (1 - e²) ρ̇² less at every impact",
+        )
     ledger.set(ylabel="energy [J]", ylim=(0.0, None))
     ledger.legend(fontsize=8)
     for axis, name, colour in zip(range(3), "123", COLOURS, strict=False):
@@ -90,7 +111,11 @@ def plot_bounces_of_body(
 
 
 def plot_thin_limit(
-    errors: Mapping[str, tuple[Array, Array]], path: str | Path, *, quantity: str, slope: str = "order 1"
+    errors: Mapping[str, tuple[Array, Array]],
+    path: str | Path,
+    *,
+    quantity: str,
+    slope: str = "order 1",
 ) -> Path:
     """Draw an error over the width of the layer; label -> (widths [m], errors). A line of order 1 beside them."""
     figure, axes = canvas(1, 1, (6.5, 4.2))
@@ -105,7 +130,9 @@ def plot_thin_limit(
 
 
 def plot_layered_bar(
-    runs: Mapping[str, tuple[Array, Array, Array]], exact: tuple[Array, Array, Array], path: str | Path
+    runs: Mapping[str, tuple[Array, Array, Array]],
+    exact: tuple[Array, Array, Array],
+    path: str | Path,
 ) -> Path:
     """Draw the height of a bar's foot [m] and contact pressure [Pa] against time; label -> (t, height, pressure)."""
     figure, axes = canvas(1, 2, (11.0, 4.0))

@@ -18,7 +18,9 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # run from the source tree without installing
+sys.path.insert(
+    0, str(Path(__file__).resolve().parents[2])
+)  # run from the source tree without installing
 
 import vi_contact as vc
 from vi_contact.core.units import STANDARD_GRAVITY as G
@@ -31,7 +33,10 @@ def wall(axes: Any, h: History) -> None:
     thrust, mid, slid = axes
     soil, phi = 0.5 * 1900.0 * G * 5.4**2 / 1e3, 0.593
     thrust.plot(h["t"], h["N_stem"] / 1e3)
-    for factor, name in ((math.tan(math.pi / 4 - phi / 2) ** 2, "Rankine, 34°"), (0.3 / 0.7, "K0, nu = 0.3")):
+    for factor, name in (
+        (math.tan(math.pi / 4 - phi / 2) ** 2, "Rankine, 34°"),
+        (0.3 / 0.7, "K0, nu = 0.3"),
+    ):
         thrust.axhline(factor * soil, color="0.5", ls="--", lw=0.8)
         thrust.text(h["t"][-1], factor * soil, name, ha="right", va="bottom", fontsize=8)
     thrust.set_title("thrust on the stem [kN/m]")
@@ -65,7 +70,14 @@ def pier(axes: Any, h: History) -> None:
     for share, name in ((6.0, "W B/6"), (4.0, "W B/4"), (2.0, "W B/2")):
         for sign in (-1.0, 1.0):
             loop.axhline(sign * weight * 7.0 / share / 1e6, color="0.5", ls="--", lw=0.8)
-        loop.text(1e3 * h["theta_raft"].max(), weight * 7.0 / share / 1e6, name, ha="right", va="bottom", fontsize=8)
+        loop.text(
+            1e3 * h["theta_raft"].max(),
+            weight * 7.0 / share / 1e6,
+            name,
+            ha="right",
+            va="bottom",
+            fontsize=8,
+        )
     loop.set(title="M of the raft [MN m/m] over theta [mrad]", xlabel="theta [mrad]")
     turn.plot(h["t"], 1e3 * h["theta_raft"])
     turn.set_title("rotation on the soil [mrad]")
@@ -76,7 +88,9 @@ def pier(axes: Any, h: History) -> None:
 def culvert(axes: Any, h: History) -> None:
     """Racking of box and free field, one over the other, and the load on the roof."""
     both, ratio, roof = axes
-    free, box = (1e3 * (h[f"racking_{one}"] - h[f"racking_{one}"][0]) for one in ("free_field", "box"))
+    free, box = (
+        1e3 * (h[f"racking_{one}"] - h[f"racking_{one}"][0]) for one in ("free_field", "box")
+    )
     both.plot(h["t"], free, color="0.6", label="free field")
     both.plot(h["t"], box, label="box")
     both.legend(fontsize=8, frameon=False)
@@ -89,7 +103,14 @@ def culvert(axes: Any, h: History) -> None:
     ratio.set(title="box over free field [mrad]", xlabel="free field [mrad]")
     roof.plot(h["t"], h["N_roof"] / 6e3)
     roof.axhline(1900.0 * G * 5.0 / 1e3, color="0.5", ls="--", lw=0.8)
-    roof.text(h["t"][-1], 1900.0 * G * 5.0 / 1e3, "weight of the cover", ha="right", va="bottom", fontsize=8)
+    roof.text(
+        h["t"][-1],
+        1900.0 * G * 5.0 / 1e3,
+        "weight of the cover",
+        ha="right",
+        va="bottom",
+        fontsize=8,
+    )
     roof.set_title("mean pressure on the roof [kPa]")
 
 
@@ -109,7 +130,11 @@ def pounding(axes: Any, h: History) -> None:
 
 
 CASES: Mapping[str, Callable[[Any, History], None]] = {
-    "wall": wall, "dam": dam, "pier": pier, "pounding": pounding, "culvert": culvert,
+    "wall": wall,
+    "dam": dam,
+    "pier": pier,
+    "pounding": pounding,
+    "culvert": culvert,
 }
 
 

@@ -12,7 +12,14 @@ from vi_contact.plots.histories import History, panels, save
 
 
 def plot_rocking(
-    history: History, path: str | Path, *, angle: float, exact: Array, energy: Array, impacts: Array, title: str
+    history: History,
+    path: str | Path,
+    *,
+    angle: float,
+    exact: Array,
+    energy: Array,
+    impacts: Array,
+    title: str,
 ) -> Path:
     """Draw rotation, corner reactions and mechanical energy of a released block against time.
 
@@ -27,22 +34,49 @@ def plot_rocking(
     top.set(ylabel="rotation / overturning angle [-]", title=title)
     top.legend(fontsize=8, loc="upper right")
     for name, colour in (("left", "tab:blue"), ("right", "tab:orange")):
-        middle.plot(t[1:], 1e-3 * history[f"r_{name}"][1:], ".", ms=1.5, color=colour, label=f"{name} corner")
+        middle.plot(
+            t[1:],
+            1e-3 * history[f"r_{name}"][1:],
+            ".",
+            ms=1.5,
+            color=colour,
+            label=f"{name} corner",
+        )
     weight = float(np.median(history["r_left"][1:] + history["r_right"][1:]))
     middle.set(ylabel="reaction [kN]", ylim=(-0.1e-3 * weight, 2.5e-3 * weight))
-    middle.legend(fontsize=8, loc="upper right", markerscale=6, title="peaks of impacts cut off", title_fontsize=8)
+    middle.legend(
+        fontsize=8,
+        loc="upper right",
+        markerscale=6,
+        title="peaks of impacts cut off",
+        title_fontsize=8,
+    )
     left = energy[0] + history["energy_kinetic"] + history["energy_strain"] - history["work_input"]
     left = left - history["energy_kinetic"][0] - history["energy_strain"][0]
-    bottom.plot(t, left, color="black", lw=1.2, label="finite elements: kinetic + strain + potential")
-    bottom.step(np.concatenate([[0.0], impacts, t[-1:]]), np.append(energy, energy[-1]), where="post", color="tab:red",
-                lw=1.2, ls="--", label="rigid block: energy times e² at every impact")
+    bottom.plot(
+        t, left, color="black", lw=1.2, label="finite elements: kinetic + strain + potential"
+    )
+    bottom.step(
+        np.concatenate([[0.0], impacts, t[-1:]]),
+        np.append(energy, energy[-1]),
+        where="post",
+        color="tab:red",
+        lw=1.2,
+        ls="--",
+        label="rigid block: energy times e² at every impact",
+    )
     bottom.set(ylabel="energy above rest [J]", ylim=(0.0, None))
     bottom.legend(fontsize=8, loc="upper right")
     return save(figure, path)
 
 
 def plot_pulses(
-    onset: Mapping[str, History], overturning: Mapping[str, History], path: str | Path, *, angle: float, unit: float
+    onset: Mapping[str, History],
+    overturning: Mapping[str, History],
+    path: str | Path,
+    *,
+    angle: float,
+    unit: float,
 ) -> Path:
     """Draw slow pulses around the onset of rocking above, rectangular ones around overturning below; label -> history.
 

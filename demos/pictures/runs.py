@@ -9,7 +9,11 @@ from vi_contact.plots.histories import History, panels, save, scale
 
 
 def plot_runs(
-    runs: Mapping[str, History], quantities: Sequence[tuple[str, str, str]], path: str | Path, *, title: str
+    runs: Mapping[str, History],
+    quantities: Sequence[tuple[str, str, str]],
+    path: str | Path,
+    *,
+    title: str,
 ) -> Path:
     """Draw the same quantities of several runs, a panel per quantity. quantities: (column, label, SI unit)."""
     figure, axes = panels(len(quantities), (9.0, 2.1 * len(quantities) + 1.2))

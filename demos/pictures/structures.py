@@ -50,8 +50,19 @@ def _beam(axis: Any, shown: Shown) -> None:
     axis.axhspan(-3.0, 0.0, color="0.85", lw=0.0, label="ground")
     axis.plot(fine, 1e3 * known.shape(fine), color="0.5", lw=3.0, label="closed form")
     axis.plot(x, 1e3 * w, "k.", ms=6, label=f"{len(x) - 1} elements")
-    axis.axvline(known.length, color="tab:red", lw=1.0, ls="--", label=f"touches at 2P/q = {known.length:g} m")
-    axis.set(xlabel="x [m]", ylabel="height [mm]", ylim=(-3.0, None), title="A heavy beam, pulled up at its end")
+    axis.axvline(
+        known.length,
+        color="tab:red",
+        lw=1.0,
+        ls="--",
+        label=f"touches at 2P/q = {known.length:g} m",
+    )
+    axis.set(
+        xlabel="x [m]",
+        ylabel="height [mm]",
+        ylim=(-3.0, None),
+        title="A heavy beam, pulled up at its end",
+    )
     axis.legend(fontsize=8)
 
 
@@ -75,10 +86,27 @@ def _disk(axis: Any, shown: Shown) -> None:
     fine = np.linspace(0.0, 1.0, 400)
     radius, ground = float(r.max()), -1e3 * scale * known.gap
     axis.axhspan(1.15 * ground, ground, color="0.85", lw=0.0, label="ground")
-    axis.plot(radius * fine, -1e3 * scale * known.deflection(fine), color="0.5", lw=3.0, label="closed form")
+    axis.plot(
+        radius * fine,
+        -1e3 * scale * known.deflection(fine),
+        color="0.5",
+        lw=3.0,
+        label="closed form",
+    )
     axis.plot(r, 1e3 * w, "k.", ms=2, label="nodes")
-    axis.axvline(radius * known.b, color="tab:red", lw=1.0, ls="--", label=f"touches for r < {radius * known.b:.4f} m")
-    axis.set(xlabel="r [m]", ylabel="deflection [mm]", ylim=(1.15 * ground, None), title="A clamped disk on the ground")
+    axis.axvline(
+        radius * known.b,
+        color="tab:red",
+        lw=1.0,
+        ls="--",
+        label=f"touches for r < {radius * known.b:.4f} m",
+    )
+    axis.set(
+        xlabel="r [m]",
+        ylabel="deflection [mm]",
+        ylim=(1.15 * ground, None),
+        title="A clamped disk on the ground",
+    )
     axis.legend(fontsize=8, loc="upper left")
 
 
@@ -87,19 +115,26 @@ def _errors(axis: Any, shown: Shown) -> None:
         axis.loglog(counts, errors, f"{mark}-", ms=5, lw=1.2, label=name)
     n = np.array(sorted({count for counts, _ in shown.errors.values() for count in counts}))
     axis.loglog(n, 0.4 / n**2.0, color="0.6", ls="--", lw=1.0, label="order 2")
-    axis.set(xlabel="elements along the beam, the side or the diameter", ylabel="relative error",
-             title="Against closed forms")
+    axis.set(
+        xlabel="elements along the beam, the side or the diameter",
+        ylabel="relative error",
+        title="Against closed forms",
+    )
     plain_numbers(axis.xaxis)
     axis.legend(fontsize=8, loc="lower left")
 
 
 def _thrown(gaps: Any, energies: Any, shown: Shown) -> None:
-    for (name, (t, gap, energy, touch)), colour in zip(shown.thrown.items(), ("tab:blue", "tab:orange"), strict=False):
+    for (name, (t, gap, energy, touch)), colour in zip(
+        shown.thrown.items(), ("tab:blue", "tab:orange"), strict=False
+    ):
         point = {"beam": "tip of a cantilever", "plate": "middle of a plate"}[name]
         gaps.plot(1e3 * t, 1e3 * gap, color=colour, lw=1.4, label=point)
         gaps.axvline(1e3 * touch, color=colour, lw=1.0, ls="--", label="touches, closed form")
         energies.plot(1e3 * t, energy, color=colour, lw=1.4, label=point)
     gaps.set(xlabel="time [ms]", ylabel="gap [mm]", title="Thrown at a stop")
-    energies.set(xlabel="time [ms]", ylabel="energy / energy at the start [-]", title="Energy never grows")
+    energies.set(
+        xlabel="time [ms]", ylabel="energy / energy at the start [-]", title="Energy never grows"
+    )
     for axis in (gaps, energies):
         axis.legend(fontsize=8)

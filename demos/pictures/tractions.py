@@ -35,7 +35,13 @@ def read_tractions(folder: str | Path) -> Tractions:
     run = read_run(folder)
     contact, history = run.contact, run.history
     if contact is None or "pressure" not in history or contact.points.shape[1] < 2:
-        raise InputError(f"'{folder}' is not a finished run in plane or space with Contact(): finish one")
+        raise InputError(
+            f"'{folder}' is not a finished run in plane or space with Contact(): finish one"
+        )
     pressure, tangents = history["pressure"], stored_tangents(contact)
-    shear = -history["traction_t"] if "traction_t" in history else np.zeros((*pressure.shape, tangents.shape[2]))
+    shear = (
+        -history["traction_t"]
+        if "traction_t" in history
+        else np.zeros((*pressure.shape, tangents.shape[2]))
+    )
     return Tractions(contact.points, contact.normals, tangents, history["t"], pressure, shear)

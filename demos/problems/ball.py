@@ -43,13 +43,17 @@ class Ball:
     radius: float = 0.01
     speed: float = 0.1
     height: float = 1.0e-7
-    material: LinearElastic = field(default_factory=lambda: LinearElastic(E=2.1e11, nu=0.3, rho=7800.0))
+    material: LinearElastic = field(
+        default_factory=lambda: LinearElastic(E=2.1e11, nu=0.3, rho=7800.0)
+    )
     cells: float = 5.0
 
     def __post_init__(self) -> None:
         if not self.cells >= 3.0 or not self.height >= 0.0:
-            raise InputError(f"Ball: {self.cells!r} cells in the contact radius, {self.height!r} m above the plane; "
-                             "give at least 3 cells and a height >= 0")
+            raise InputError(
+                f"Ball: {self.cells!r} cells in the contact radius, {self.height!r} m above the plane; "
+                "give at least 3 cells and a height >= 0"
+            )
 
     def impact(self, mass: float) -> HertzImpact:
         """Return the quasi-static impact of such a ball of that mass [kg]."""
@@ -61,8 +65,13 @@ class Ball:
         """Return the mesh, fine where the sphere of volume 4/3 pi R³ is going to touch."""
         sphere = 4.0 / 3.0 * math.pi * self.radius**3
         a = self.impact(self.material.rho * sphere).deepest.contact_radius
-        return BallMesh(radius=self.radius, size=a / self.cells, foot=FOOT * a, growth=CELL_GROWTH / self.cells,
-                        coarsest=self.radius / self.cells)
+        return BallMesh(
+            radius=self.radius,
+            size=a / self.cells,
+            foot=FOOT * a,
+            growth=CELL_GROWTH / self.cells,
+            coarsest=self.radius / self.cells,
+        )
 
 
 @dataclass(frozen=True)
@@ -89,19 +98,28 @@ class BallModel:
     def problem(self, *, mass: MassLaw | None = None) -> ContactProblem:
         """Set up the ball above the plane y = -height."""
         plane = HalfSpace(point=(0.0, -self.ball.height, 0.0), normal=(0.0, 1.0, 0.0))
-        return ContactProblem(self.system, contact_surface(self.system, self.foot, obstacle=plane), mass=mass)
+        return ContactProblem(
+            self.system, contact_surface(self.system, self.foot, obstacle=plane), mass=mass
+        )
 
     def probes(self) -> dict[str, tuple[float, ...]]:
         """Return the points foot, centre and top."""
-        return {name: (0.0, share * self.ball.radius, 0.0) for name, share in (("foot", 0), ("centre", 1), ("top", 2))}
+        return {
+            name: (0.0, share * self.ball.radius, 0.0)
+            for name, share in (("foot", 0), ("centre", 1), ("top", 2))
+        }
 
 
 def build(ball: Ball, comm: Any) -> BallModel:
     """Mesh and assemble a quarter of the ball; collective."""
     mesh, tags = build_mesh(ball.mesh, comm)
     system = assemble(
-        mesh, ball.material,
-        prescribed=[Prescribed(tags["side_x"], components=(0,)), Prescribed(tags["side_z"], components=(2,))],
+        mesh,
+        ball.material,
+        prescribed=[
+            Prescribed(tags["side_x"], components=(0,)),
+            Prescribed(tags["side_z"], components=(2,)),
+        ],
         initial_velocity=(0.0, -ball.speed, 0.0),
     )
     up = system.influence[:, 1]

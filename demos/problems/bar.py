@@ -23,7 +23,11 @@ from vi_contact.fem.mesh import build_mesh
 from vi_contact.laws.materials import LinearElastic, PlaneStrain, Solid
 from vi_contact.meshes.block import BlockMesh
 
-SIDES = {1: ("left", "right"), 2: ("bottom", "top"), 3: ("bottom", "top")}  # foot and top of a BlockMesh
+SIDES = {
+    1: ("left", "right"),
+    2: ("bottom", "top"),
+    3: ("bottom", "top"),
+}  # foot and top of a BlockMesh
 UP = {1: 0, 2: 1, 3: 1}  # component of the bar's axis
 
 
@@ -80,7 +84,9 @@ class BarModel:
     foot: Any
     gap: float
 
-    def problem(self, *, mass: MassLaw | None = None, impact: ImpactLaw | None = None) -> ContactProblem:
+    def problem(
+        self, *, mass: MassLaw | None = None, impact: ImpactLaw | None = None
+    ) -> ContactProblem:
         """Set up the bar in possible contact along its foot."""
         normal = self.bar.along(1.0)
         wall = HalfSpace(point=tuple(-self.gap * normal), normal=tuple(normal))
@@ -99,7 +105,9 @@ def build(bar: Bar, comm: Any) -> BarModel:
     d, case = bar.dimension, bar.case
     lengths = tuple(bar.along(bar.length, bar.across * bar.cell))
     divisions = tuple(int(n) for n in bar.along(bar.elements, bar.across))
-    mesh, tags = build_mesh(BlockMesh(lengths=lengths, divisions=divisions, simplices=bar.triangles), comm)
+    mesh, tags = build_mesh(
+        BlockMesh(lengths=lengths, divisions=divisions, simplices=bar.triangles), comm
+    )
     foot, top = (tags[name] for name in SIDES[d])
     data: dict[str, Any] = {}
     gap = 0.0
@@ -113,4 +121,6 @@ def build(bar: Bar, comm: Any) -> BarModel:
         data["clamped"] = top
         data["initial_displacement"] = lambda x: np.outer(0.5 * (1.0 - x[:, UP[d]]), bar.along(1.0))
     section = {1: None, 2: PlaneStrain(), 3: Solid()}[d]
-    return BarModel(bar, assemble(mesh, bar.material, section=section, degree=bar.degree, **data), foot, gap)
+    return BarModel(
+        bar, assemble(mesh, bar.material, section=section, degree=bar.degree, **data), foot, gap
+    )

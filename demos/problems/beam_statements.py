@@ -17,7 +17,15 @@ from demos.beam.tip import RegularisedFriction
 from demos.beam.values import TimoshenkoBeam
 from vi_contact.core.algebra import Array
 
-from .published_beam import DT, STEPS, Force, published_elements, published_mu, published_start, readings
+from .published_beam import (
+    DT,
+    STEPS,
+    Force,
+    published_elements,
+    published_mu,
+    published_start,
+    readings,
+)
 
 EPS = 0.002  # of the friction, and the least swing that counts [m]
 FACTORS = (0.01, 0.1, 1.0, 10.0)  # of the normal force of a reading
@@ -63,16 +71,26 @@ class Row:
 
     def line(self) -> str:
         """Return the row of a table in Markdown, under HEAD."""
-        cells = (self.reading, f"{self.a2:g}", ", ".join(map(str, self.turning_points)),
-                 ", ".join(map(str, self.swings)), f"{self.peak_contact_force:g}", f"{self.friction_loss:.4f}",
-                 f"{self.viscous_loss:.4f}", f"{self.ratio:.3f}", str(self.statement_1).lower(),
-                 str(self.statement_2).lower())
+        cells = (
+            self.reading,
+            f"{self.a2:g}",
+            ", ".join(map(str, self.turning_points)),
+            ", ".join(map(str, self.swings)),
+            f"{self.peak_contact_force:g}",
+            f"{self.friction_loss:.4f}",
+            f"{self.viscous_loss:.4f}",
+            f"{self.ratio:.3f}",
+            str(self.statement_1).lower(),
+            str(self.statement_2).lower(),
+        )
         return f"| {' | '.join(cells)} |"
 
 
 HEAD = (
     "| reading | a2 [s] | turning points, force x 0.01, 0.1, 1, 10 | swings above eps, same forces | peak contact "
-    "force [N] | friction loss [J] | viscous loss [J] | ratio | statement 1 | statement 2 |\n|" + "---|" * 10
+    "force [N] | friction loss [J] | viscous loss [J] | ratio | statement 1 | statement 2 |\n|"
+    + "---|"
+    * 10
 )
 
 
@@ -87,20 +105,41 @@ def turning_points(u: Array, least: float = 0.0) -> int:
     return count
 
 
-def rubbed(a2: float, force: Force, factor: float = 1.0, *, count: int = 1000, dt: float = DT) -> BeamRun:
+def rubbed(
+    a2: float, force: Force, factor: float = 1.0, *, count: int = 1000, dt: float = DT
+) -> BeamRun:
     """Run the source's beam for 2 s under ``factor`` times a normal force; ``count`` elements, steps of dt [s]."""
     stepper = BeamStepper(
-        TimoshenkoBeam(viscosity=a2), published_elements(count), dt, normal_force=lambda t: factor * force(t),
-        mu=published_mu, friction=RegularisedFriction(EPS, absolute=1e-10),
+        TimoshenkoBeam(viscosity=a2),
+        published_elements(count),
+        dt,
+        normal_force=lambda t: factor * force(t),
+        mu=published_mu,
+        friction=RegularisedFriction(EPS, absolute=1e-10),
     )
     return run_beam(stepper, published_start(), steps=round(STEPS * DT / dt))
 
 
-def row(reading: str, a2: float, *, count: int = 1000, dt: float = DT, factors: Sequence[float] = FACTORS) -> Row:
+def row(
+    reading: str,
+    a2: float,
+    *,
+    count: int = 1000,
+    dt: float = DT,
+    factors: Sequence[float] = FACTORS,
+) -> Row:
     """Return the row of a reading "A", "B" or "C" at a viscosity a2 [s], of a run for each factor; 1 is one of them."""
-    runs = {factor: rubbed(a2, readings(dt)[reading], factor, count=count, dt=dt).history for factor in factors}
+    runs = {
+        factor: rubbed(a2, readings(dt)[reading], factor, count=count, dt=dt).history
+        for factor in factors
+    }
     tips, whole = [run["u_tip"] for run in runs.values()], runs[1.0]
     return Row(
-        reading, a2, tuple(turning_points(tip) for tip in tips), tuple(turning_points(tip, EPS) for tip in tips),
-        float(whole["normal_force"].max()), float(whole["loss_friction"][-1]), float(whole["loss_damping"][-1]),
+        reading,
+        a2,
+        tuple(turning_points(tip) for tip in tips),
+        tuple(turning_points(tip, EPS) for tip in tips),
+        float(whole["normal_force"].max()),
+        float(whole["loss_friction"][-1]),
+        float(whole["loss_damping"][-1]),
     )

@@ -20,7 +20,9 @@ def boundary_curve(*facets: Facets) -> tuple[BoundaryMesh, npt.NDArray[np.int64]
     for group in facets:
         facets_of("boundary_curve", "a group", group, getattr(facets[0], "mesh", None))
     if not facets or facets[0].mesh.geometry.dim != 2:
-        raise InputError("boundary_curve: give boundary groups of a plane mesh; boundary elements are two-dimensional")
+        raise InputError(
+            "boundary_curve: give boundary groups of a plane mesh; boundary elements are two-dimensional"
+        )
     mesh = facets[0].mesh
     numbers, rows, labels = node_numbers(mesh), [], []
     for label, group in enumerate(facets):
@@ -28,7 +30,9 @@ def boundary_curve(*facets: Facets) -> tuple[BoundaryMesh, npt.NDArray[np.int64]
         rows.append(compat.entities_to_geometry(mesh, 1, owned))
         labels.append(np.full(len(owned), label))
     local = np.concatenate(rows).reshape(-1, 2)
-    gathered = mesh.comm.allgather((numbers[local], mesh.geometry.x[local][:, :, :2], np.concatenate(labels)))
+    gathered = mesh.comm.allgather(
+        (numbers[local], mesh.geometry.x[local][:, :, :2], np.concatenate(labels))
+    )
     segments, places, tags = (np.concatenate(parts) for parts in zip(*gathered, strict=True))
     order = np.lexsort(np.sort(segments, axis=1).T)  # independent of the number of ranks
     nodes, first, renamed = np.unique(segments[order], return_index=True, return_inverse=True)

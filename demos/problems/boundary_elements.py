@@ -27,12 +27,16 @@ Load = Callable[[float], float]
 BOTTOM, RIGHT, TOP, LEFT = range(4)  # sides of a box
 
 
-def steklov(mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: int) -> PoincareSteklov:
+def steklov(
+    mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: int
+) -> PoincareSteklov:
     """Return the symmetric Poincaré-Steklov operator of a homogeneous body."""
     return PoincareSteklov(energetic_blocks(mesh, material, dt=dt, steps=steps), material.rho)
 
 
-def pressed(operator: PoincareSteklov, *, pressure: Load, top: int, contact: Mask, **more: Any) -> BoundaryProblem:
+def pressed(
+    operator: PoincareSteklov, *, pressure: Load, top: int, contact: Mask, **more: Any
+) -> BoundaryProblem:
     """Set up a body under pressure(t) [Pa] on elements ``top``; contact: mask of elements; more: fixed, prescribed."""
     instance("pressed", "operator", operator, PoincareSteklov, "give steklov(...)")
     function("pressed", "pressure", pressure, "give a function of the time in Pa")
@@ -41,7 +45,9 @@ def pressed(operator: PoincareSteklov, *, pressure: Load, top: int, contact: Mas
     def traction(points: Array, normals: Array, t: float) -> Array:
         return -pressure(t) * normals
 
-    loads = traction_forces(mesh, traction, dt=blocks.dt, steps=blocks.steps, elements=mesh.labels == top)
+    loads = traction_forces(
+        mesh, traction, dt=blocks.dt, steps=blocks.steps, elements=mesh.labels == top
+    )
     return BoundaryProblem(operator, loads, contact=contact, **more)
 
 
@@ -53,7 +59,13 @@ def unloaded(operator: PoincareSteklov, *, contact: Mask, **more: Any) -> Bounda
 
 
 def square_problem(
-    elements: int, material: LinearElastic, *, dt: float, steps: int, pressure: Load = lambda t: 1.0, side: float = 1.0,
+    elements: int,
+    material: LinearElastic,
+    *,
+    dt: float,
+    steps: int,
+    pressure: Load = lambda t: 1.0,
+    side: float = 1.0,
 ) -> BoundaryProblem:
     """Set up [-a/2, a/2]² of ``elements`` per side, pressed on its top; its bottom may come into contact."""
     a, h = _halves("square_problem", side, elements)
@@ -62,7 +74,9 @@ def square_problem(
     return pressed(operator, pressure=pressure, top=TOP, contact=mesh.labels == BOTTOM)
 
 
-def disk_problem(elements: int, material: LinearElastic, *, dt: float, steps: int, radius: float) -> BoundaryProblem:
+def disk_problem(
+    elements: int, material: LinearElastic, *, dt: float, steps: int, radius: float
+) -> BoundaryProblem:
     """Set up a disk around (0, radius) of ``elements`` chords; its foot, 60° to each side, may come into contact."""
     number("disk_problem", "radius", radius, positive=True, unit="m")
     mesh = circle(radius, elements, centre=(0.0, radius))
@@ -70,19 +84,28 @@ def disk_problem(elements: int, material: LinearElastic, *, dt: float, steps: in
     return unloaded(steklov(mesh, material, dt=dt, steps=steps), contact=foot)
 
 
-def disk_contact(problem: BoundaryProblem, push: Load, friction: FrictionLaw | None = None) -> BoundaryContact:
+def disk_contact(
+    problem: BoundaryProblem, push: Load, friction: FrictionLaw | None = None
+) -> BoundaryContact:
     """Set up the contact of the disk with the plane y = push(t)."""
     instance("disk_contact", "problem", problem, BoundaryProblem, "give disk_problem(...)")
     function("disk_contact", "push", push, "give a function of the time in m")
     plane = HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
-    return BoundaryContact(problem.condensed(), obstacle=plane, friction=friction or Frictionless(), towards=push)
+    return BoundaryContact(
+        problem.condensed(), obstacle=plane, friction=friction or Frictionless(), towards=push
+    )
 
 
 def _halves(owner: str, side: float, elements: int, *, multiple: int = 1) -> tuple[float, float]:
     """Half a side [m] and the length of an element; InputError unless its elements are such a multiple."""
-    length, count = number(owner, "side", side, positive=True, unit="m"), whole(owner, "elements", elements, least=1)
+    length, count = (
+        number(owner, "side", side, positive=True, unit="m"),
+        whole(owner, "elements", elements, least=1),
+    )
     if count % multiple:
-        raise InputError(f"{owner}: elements is {count}; give an even number, half of them are in the notch")
+        raise InputError(
+            f"{owner}: elements is {count}; give an even number, half of them are in the notch"
+        )
     return 0.5 * length, length / count
 
 
@@ -102,7 +125,13 @@ class EmbeddedBox:
 
 
 def embedded_problem(
-    elements: int, material: LinearElastic, *, dt: float, steps: int, pressure: Load, side: float = 1.0
+    elements: int,
+    material: LinearElastic,
+    *,
+    dt: float,
+    steps: int,
+    pressure: Load,
+    side: float = 1.0,
 ) -> EmbeddedBox:
     """Set up box and block with ``elements``, an even number, along a side of the box."""
     a, h = _halves("embedded_problem", side, elements, multiple=2)
@@ -114,4 +143,6 @@ def embedded_problem(
     one = pressed(make(box, material), pressure=pressure, top=TOP, contact=in_notch)
     clamped = np.tile(block.nodes_of(block.labels == 0), (2, 1))
     notch = (block.labels >= 3) & (block.labels <= 5)
-    return EmbeddedBox(TwoBodies(one, unloaded(make(block, material), contact=notch, fixed=clamped)))
+    return EmbeddedBox(
+        TwoBodies(one, unloaded(make(block, material), contact=notch, fixed=clamped))
+    )

@@ -54,7 +54,9 @@ class Channel:
 
     shape: ChannelMesh = field(default_factory=ChannelMesh)
     soil: LinearElastic = field(default_factory=lambda: LinearElastic(E=1.0e8, nu=0.3, rho=1800.0))
-    concrete: LinearElastic = field(default_factory=lambda: LinearElastic(E=2.0e10, nu=0.2, rho=2400.0))
+    concrete: LinearElastic = field(
+        default_factory=lambda: LinearElastic(E=2.0e10, nu=0.2, rho=2400.0)
+    )
     damping: Damping = field(default_factory=NoDamping)
 
     def point(self, number: int) -> tuple[float, float]:
@@ -63,7 +65,9 @@ class Channel:
         Evenly spaced: 1-7 base from left to right, 8-13 right wall and 14-19 left wall, upwards to the surface.
         """
         if not 1 <= number <= POINTS:
-            raise InputError(f"the channel has boundary points 1 to {POINTS}, there is no point {number}")
+            raise InputError(
+                f"the channel has boundary points 1 to {POINTS}, there is no point {number}"
+            )
         left, right = self.shape.x[1], self.shape.x[4]
         bottom, height = self.shape.y[1], self.shape.height
         if number <= 7:
@@ -97,9 +101,13 @@ class ChannelModel:
     surface: ContactSurface
 
     def problem(
-        self, *, friction: FrictionLaw | None = None, bilateral: bool = False,
+        self,
+        *,
+        friction: FrictionLaw | None = None,
+        bilateral: bool = False,
         excitation: Excitation | Sequence[Excitation] | None = None,
-        impact: ImpactLaw | None = Inelastic(ImpulseUpdate()), mass: MassLaw | None = None,
+        impact: ImpactLaw | None = Inelastic(ImpulseUpdate()),
+        mass: MassLaw | None = None,
     ) -> ContactProblem:
         """Set up channel and soil under the harmonic motion, sliding freely; inelastic impulses, consistent mass.
 
@@ -109,10 +117,14 @@ class ChannelModel:
             impact, mass: schemes with massless contact nodes take no impact law: give impact=None, and leave mass to
                 them. An impact law runs on consistent mass unless another is given.
         """
-        return ContactProblem(self.system, self.surface.bilateral_everywhere() if bilateral else self.surface,
-                              friction=friction or Frictionless(), impact=impact,
-                              mass=ConsistentMass() if impact is not None and mass is None else mass,
-                              excitation=self.channel.harmonic() if excitation is None else excitation)
+        return ContactProblem(
+            self.system,
+            self.surface.bilateral_everywhere() if bilateral else self.surface,
+            friction=friction or Frictionless(),
+            impact=impact,
+            mass=ConsistentMass() if impact is not None and mass is None else mass,
+            excitation=self.channel.harmonic() if excitation is None else excitation,
+        )
 
     def recorders(self) -> tuple[Recorder, ...]:
         """Return recorders: energy, contact, probes on channel (u_x_1, ...) and soil (u_x_1_soil, ...), openings."""
@@ -141,12 +153,16 @@ class SoilProbe(Probe):
         faced: dict[int, int] = {}
         for part in surface.parts if isinstance(surface, FemSurface) else ():
             if part.facing is not None:
-                opposite = part.facing.nodes.numbers[np.asarray(part.facing.P.argmax(axis=1)).ravel()]
+                opposite = part.facing.nodes.numbers[
+                    np.asarray(part.facing.P.argmax(axis=1)).ravel()
+                ]
                 for numbers, partners in from_each(surface.comm, (part.nodes.numbers, opposite)):
                     faced |= dict(zip(numbers.tolist(), partners.tolist(), strict=True))
         if not faced.keys() >= set(nodes):
-            raise InputError("a soil probe is not at the interface with the channel: give points of the channel's "
-                             "outline")
+            raise InputError(
+                "a soil probe is not at the interface with the channel: give points of the channel's "
+                "outline"
+            )
         return np.array([faced[node] for node in nodes], dtype=np.int64)
 
 
@@ -157,9 +173,14 @@ class Openings:
     sides: Mapping[str, Mask]
 
     def columns(self) -> Columns:
-        return {f"opening_{side}": ("m", f"largest gap of the contact side '{side}'") for side in self.sides}
+        return {
+            f"opening_{side}": ("m", f"largest gap of the contact side '{side}'")
+            for side in self.sides
+        }
 
-    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
+    def start(
+        self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
+    ) -> Row:
         return self._row(problem.surface, state)
 
     def row(self, report: Report) -> Row:
@@ -171,8 +192,13 @@ class Openings:
 
 
 def build(
-    channel: Channel, comm: Any, *, sides: Sides | None = None, weighing: Sequence[str] = ("channel",),
-    base: BaseMotion | RockBelow | None = None, meshed: tuple[Any, Any] | None = None,
+    channel: Channel,
+    comm: Any,
+    *,
+    sides: Sides | None = None,
+    weighing: Sequence[str] = ("channel",),
+    base: BaseMotion | RockBelow | None = None,
+    meshed: tuple[Any, Any] | None = None,
 ) -> ChannelModel:
     """Mesh and assemble channel and soil; collective.
 
@@ -194,22 +220,38 @@ def build(
         absorbing.append(base.absorber(tags))
     else:
         held.append(Prescribed(tags["bedrock"], **motion))  # last: the corners are its own
-    system = assemble(mesh, [(tags["channel"], channel.concrete), (tags["soil"], channel.soil)], section=PlaneStrain(),
-                      prescribed=held, dashpots=absorbing, damping=channel.damping, **ends)
+    system = assemble(
+        mesh,
+        [(tags["channel"], channel.concrete), (tags["soil"], channel.soil)],
+        section=PlaneStrain(),
+        prescribed=held,
+        dashpots=absorbing,
+        damping=channel.damping,
+        **ends,
+    )
     system = weighted(system, weighing)
     pairs = [contact_pair(system, tags[f"channel_{side}"], tags[f"soil_{side}"]) for side in SIDES]
-    return ChannelModel(channel, mesh, tags, system, joined_surfaces(*pairs).with_frictionless_corners())
+    return ChannelModel(
+        channel, mesh, tags, system, joined_surfaces(*pairs).with_frictionless_corners()
+    )
 
 
 def staged(
-    channel: Channel, comm: Any, *, sides: Sides | None, weighing: Sequence[str], base: BaseMotion | RockBelow | None
+    channel: Channel,
+    comm: Any,
+    *,
+    sides: Sides | None,
+    weighing: Sequence[str],
+    base: BaseMotion | RockBelow | None,
 ) -> tuple[ChannelModel, ChannelModel | None]:
     """Return the model, and on its mesh the one for its gravity stage where its own supports hold no static load."""
     ends = sides or Rollers()
     if ends.firm and (base is None or not base.lets_waves_in):
         return build(channel, comm, sides=ends, weighing=weighing, base=base), None
     firm = build(channel, comm, sides=ends if ends.firm else None, weighing=weighing)
-    return build(channel, comm, sides=ends, weighing=weighing, base=base, meshed=(firm.mesh, firm.tags)), firm
+    return build(
+        channel, comm, sides=ends, weighing=weighing, base=base, meshed=(firm.mesh, firm.tags)
+    ), firm
 
 
 def weighted(system: SemiDiscreteSystem, weighing: Sequence[str]) -> SemiDiscreteSystem:

@@ -52,7 +52,11 @@ BASES = ("relative", "prescribed", "compliant")
 
 
 def bedrock(
-    base: str, excitations: Sequence[Excitation], *, dt: float | None, rock: LinearElastic | None = None
+    base: str,
+    excitations: Sequence[Excitation],
+    *,
+    dt: float | None,
+    rock: LinearElastic | None = None,
 ) -> BaseMotion | RockBelow | None:
     """Return what moves the bottom of the layer, None where the motion is an inertia load.
 
@@ -63,13 +67,17 @@ def bedrock(
     """
     check_word("base", base, BASES)
     if rock is not None and base != "compliant":
-        raise InputError("rock is what is under a compliant base: give base = 'compliant' too, or leave rock out")
+        raise InputError(
+            "rock is what is under a compliant base: give base = 'compliant' too, or leave rock out"
+        )
     if base == "relative":
         return None
     if base == "prescribed":
         return base_motion(excitations)
     step = None if dt is None else 0.1 * dt
-    waves = [upgoing(one, dt=getattr(getattr(one, "record", None), "dt", step)) for one in excitations]
+    waves = [
+        upgoing(one, dt=getattr(getattr(one, "record", None), "dt", step)) for one in excitations
+    ]
     return RockBelow(lambda t: np.asarray(sum(wave(t) for wave in waves)), rock)
 
 
@@ -82,7 +90,11 @@ class Rollers:
     component: int = 1
 
     def conditions(self, tags: Any, motion: Mapping[str, Any]) -> dict[str, Any]:
-        return {"prescribed": [Prescribed(tags[end], components=(self.component,), **motion) for end in ENDS]}
+        return {
+            "prescribed": [
+                Prescribed(tags[end], components=(self.component,), **motion) for end in ENDS
+            ]
+        }
 
 
 @dataclass(frozen=True)

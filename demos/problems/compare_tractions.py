@@ -31,25 +31,39 @@ class Tractions:
     theirs: Array
 
     def difference(
-        self, *, window: float = 0.0, width: float = 0.0, between: tuple[float, float] = (0.0, np.inf),
+        self,
+        *,
+        window: float = 0.0,
+        width: float = 0.0,
+        between: tuple[float, float] = (0.0, np.inf),
         nodes: Mask | None = None,
     ) -> float:
         """Return the relative L2 difference over time and contact boundary of means over windows [s] (a step by
         default) and hats of a ``width`` [m] (an element), in an interval of time, at chosen nodes of both."""
         dt = float(self.times[1] - self.times[0])
         count = max(1, round(window / dt))
-        place = np.linspace(self.x[0], self.x[-1], round(np.ptp(self.x) / width) + 1) if width else self.x
+        place = (
+            np.linspace(self.x[0], self.x[-1], round(np.ptp(self.x) / width) + 1)
+            if width
+            else self.x
+        )
         weights = shares(self.x, place) * self.lengths[:, None]
         lengths, chosen = weights.sum(axis=0), slice(None) if nodes is None else nodes
         inside = (self.times > between[0] * (1 + 1e-9)) & (self.times <= between[1] * (1 + 1e-9))
-        covered = np.where(lengths > 0.0, lengths, 1.0)  # a hat between the nodes of a coarse mesh has none of them
-        mine, theirs = ((_means(values[inside], count) @ weights / covered)[:, chosen]
-                        for values in (self.mine, self.theirs))
+        covered = np.where(
+            lengths > 0.0, lengths, 1.0
+        )  # a hat between the nodes of a coarse mesh has none of them
+        mine, theirs = (
+            (_means(values[inside], count) @ weights / covered)[:, chosen]
+            for values in (self.mine, self.theirs)
+        )
         size = np.sqrt(lengths[chosen])
         return float(np.linalg.norm((mine - theirs) * size) / np.linalg.norm(theirs * size))
 
 
-def compared(run: ContactRun, surface: ContactSurface, history: Mapping[str, Array]) -> tuple[Tractions, Tractions]:
+def compared(
+    run: ContactRun, surface: ContactSurface, history: Mapping[str, Array]
+) -> tuple[Tractions, Tractions]:
     """Return pressures, and shears of the support on the body along +x, of a run of boundary elements and of a history
     of finite elements on the contact points of ``surface`` (all of them, on one rank)."""
     order, points = np.argsort(run.contact.compliance.points[:, 0]), surface.points
@@ -57,11 +71,21 @@ def compared(run: ContactRun, surface: ContactSurface, history: Mapping[str, Arr
     collect = shares(points[:, 0], x) * surface.weights[:, None]
     found = []
     for sign, mine, theirs in ((1.0, run.pressure, "pressure"), (-1.0, run.shear, "traction_t")):
-        values = history[theirs].reshape(len(history["t"]), -1) if theirs in history else np.zeros(
-            history["pressure"].shape)
+        values = (
+            history[theirs].reshape(len(history["t"]), -1)
+            if theirs in history
+            else np.zeros(history["pressure"].shape)
+        )
         steps = _over_steps(history["t"], values, run.times)
-        found.append(Tractions(x, lengths, run.times[: len(steps)], sign * mine[: len(steps), order],
-                               sign * (steps @ collect) / lengths))
+        found.append(
+            Tractions(
+                x,
+                lengths,
+                run.times[: len(steps)],
+                sign * mine[: len(steps), order],
+                sign * (steps @ collect) / lengths,
+            )
+        )
     return found[0], found[1]
 
 
@@ -73,8 +97,12 @@ def shares(x: Array, nodes: Array) -> Array:
 def _over_steps(times: Array, values: Array, ends: Array) -> Array:
     """Return means over the steps that end at ``ends`` of values that are linear between times."""
     inside = ends <= times[-1] * (1.0 + 1e-9)
-    area = np.concatenate([np.zeros((1, values.shape[1])),
-                           np.cumsum(0.5 * np.diff(times)[:, None] * (values[1:] + values[:-1]), axis=0)])
+    area = np.concatenate(
+        [
+            np.zeros((1, values.shape[1])),
+            np.cumsum(0.5 * np.diff(times)[:, None] * (values[1:] + values[:-1]), axis=0),
+        ]
+    )
     edges = np.concatenate([[0.0], ends[inside]])
     at = np.stack([np.interp(edges, times, column) for column in area.T], axis=1)
     return np.asarray(np.diff(at, axis=0) / np.diff(edges)[:, None])

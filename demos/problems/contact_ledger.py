@@ -30,10 +30,14 @@ class ContactLedger:
         """Return |energy - load - contact - support| over the largest of them."""
         terms = (self.energy, self.load, self.contact, self.support)
         size = max(float(np.abs(term).max(initial=0.0)) for term in terms)
-        return float(np.abs(self.energy - self.load - self.contact - self.support).max()) / (size or 1.0)
+        return float(np.abs(self.energy - self.load - self.contact - self.support).max()) / (
+            size or 1.0
+        )
 
 
-def ledger(run: ContactRun, motion: BoundaryMotion, loads: Array, *, supported: Mask | None = None) -> ContactLedger:
+def ledger(
+    run: ContactRun, motion: BoundaryMotion, loads: Array, *, supported: Mask | None = None
+) -> ContactLedger:
     """Return the works of a run from its boundary motion, BoundaryProblem.solve(run.forces); loads: (steps, 2, n).
 
     supported: (2, n), the ``fixed`` of the problem.
@@ -42,8 +46,10 @@ def ledger(run: ContactRun, motion: BoundaryMotion, loads: Array, *, supported: 
     instance("ledger", "motion", motion, BoundaryMotion, "give BoundaryProblem.solve(run.forces)")
     loads = array("ledger", "loads", loads, motion.displacement.shape, unit="N/m")
     if len(run.times) != len(motion.times):
-        raise InputError(f"ledger: the run has {len(run.times)} steps and the motion {len(motion.times)}; give the "
-                         "motion of this run, BoundaryProblem.solve(run.forces)")
+        raise InputError(
+            f"ledger: the run has {len(run.times)} steps and the motion {len(motion.times)}; give the "
+            "motion of this run, BoundaryProblem.solve(run.forces)"
+        )
     optional(mask, "ledger", "supported", supported, motion.displacement.shape[1:])
     held = np.zeros(loads.shape[1:], bool) if supported is None else supported
     support = work(np.where(held, motion.forces, 0.0), motion.displacement)

@@ -41,15 +41,25 @@ def split(problem: ContactProblem, report: Report) -> Decomposition | None:
     step, result, surface = report.step, report.result, problem.surface
     space: Any = problem.system.space
     n = len(step.b)
-    parts = [result.x, step.A.factor.solve(step.b), -step.A.factor.solve(surface.reaction_load(result.r_n, n))]
-    defect = surface.comm.max(np.array([max_abs(parts[0] - parts[1] - parts[2]), max_abs(parts[1])]))
+    parts = [
+        result.x,
+        step.A.factor.solve(step.b),
+        -step.A.factor.solve(surface.reaction_load(result.r_n, n)),
+    ]
+    defect = surface.comm.max(
+        np.array([max_abs(parts[0] - parts[1] - parts[2]), max_abs(parts[1])])
+    )
     fields = [space.expand(problem.cartesian(one), report.new.t) for one in parts]
     rows = space.comm.mpi.gather(np.hstack([space.points, *fields]), root=0)
-    forces = -surface.everywhere(result.r_n)[:, None] * surface.everywhere(surface.normals) / step.scale
+    forces = (
+        -surface.everywhere(result.r_n)[:, None] * surface.everywhere(surface.normals) / step.scale
+    )
     contact = surface.everywhere(surface.points)
     if rows is None:
         return None
     rows = np.vstack(rows)
     rows = rows[np.lexsort(np.round(rows[:, :2], 9).T)]
     points, u, loaded, pressed = np.split(rows, 4, axis=1)
-    return Decomposition(points, u, loaded, pressed, contact, forces, report.new.t, float(defect[0] / defect[1]))
+    return Decomposition(
+        points, u, loaded, pressed, contact, forces, report.new.t, float(defect[0] / defect[1])
+    )

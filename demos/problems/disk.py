@@ -37,7 +37,11 @@ class Push:
 
     def __call__(self, t: float) -> float:
         """[m]"""
-        return self.height * math.sin(0.5 * math.pi * t / self.rise) ** 2 if 0.0 < t < 2.0 * self.rise else 0.0
+        return (
+            self.height * math.sin(0.5 * math.pi * t / self.rise) ** 2
+            if 0.0 < t < 2.0 * self.rise
+            else 0.0
+        )
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,9 @@ class Disk:
 
     radius: float = 0.5
     size: float = 0.04
-    material: LinearElastic = field(default_factory=lambda: LinearElastic.from_wave_speeds(2.0, 1.0, 1.0))
+    material: LinearElastic = field(
+        default_factory=lambda: LinearElastic.from_wave_speeds(2.0, 1.0, 1.0)
+    )
     push: Push = field(default_factory=Push)
 
     def __post_init__(self) -> None:
@@ -69,10 +75,14 @@ class DiskModel:
     foot: Any
     mass: float
 
-    def problem(self, *, friction: FrictionLaw | None = None, mass: MassLaw | None = None) -> ContactProblem:
+    def problem(
+        self, *, friction: FrictionLaw | None = None, mass: MassLaw | None = None
+    ) -> ContactProblem:
         """Set up the disk on its moving plane."""
         plane = HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
-        surface = contact_surface(self.system, self.foot, obstacle=plane).moving(towards=self.disk.push)
+        surface = contact_surface(self.system, self.foot, obstacle=plane).moving(
+            towards=self.disk.push
+        )
         return ContactProblem(self.system, surface, friction=friction or Frictionless(), mass=mass)
 
     def probes(self) -> dict[str, tuple[float, float]]:
@@ -103,7 +113,9 @@ class Momentum:
             "momentum_angular": ("kg m²/s", "angular momentum, positive anticlockwise"),
         }
 
-    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
+    def start(
+        self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
+    ) -> Row:
         """Return the momentum of the initial state."""
         self._system = system = problem.equations
         x, y = (system.space.coordinates - self._centre).T
@@ -116,4 +128,7 @@ class Momentum:
 
     def _row(self, state: State) -> Row:
         impulse = self._system.M @ state.v
-        return {f"momentum_{name}": self._system.algebra.dot(motion, impulse) for name, motion in self._motions.items()}
+        return {
+            f"momentum_{name}": self._system.algebra.dot(motion, impulse)
+            for name, motion in self._motions.items()
+        }

@@ -26,7 +26,11 @@ from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.cut import Welded
 from vi_contact.meshes.two_blocks import Blocks
 
-CONTACT = (("foot_bottom", "under_top"), ("foot_left", "left_wall_right"), ("foot_right", "right_wall_left"))
+CONTACT = (
+    ("foot_bottom", "under_top"),
+    ("foot_left", "left_wall_right"),
+    ("foot_right", "right_wall_left"),
+)
 TRANSMISSION = (
     ("left_right", "under_left"), ("right_left", "under_right"),
     ("left_top", "left_wall_bottom"), ("right_top", "right_wall_bottom"),
@@ -46,22 +50,39 @@ class Embedded:
     block: LinearElastic | None = None
 
     def __post_init__(self) -> None:
-        instance("Embedded", "box", self.box, Square, "give a Square, for example concrete(cells=10)")
-        optional(instance, "Embedded", "block", self.block, LinearElastic, "give a LinearElastic, or None")
+        instance(
+            "Embedded", "box", self.box, Square, "give a Square, for example concrete(cells=10)"
+        )
+        optional(
+            instance,
+            "Embedded",
+            "block",
+            self.block,
+            LinearElastic,
+            "give a LinearElastic, or None",
+        )
         if self.box.cells % 2:
-            raise InputError(f"Embedded: box of {self.box.cells} cells per side: give an even number, half are in it")
+            raise InputError(
+                f"Embedded: box of {self.box.cells} cells per side: give an even number, half are in it"
+            )
         if self.box.confined:
-            raise InputError("Embedded: the box is on rollers; give a box with confined=False, the notch is what "
-                             "confines it")
+            raise InputError(
+                "Embedded: the box is on rollers; give a box with confined=False, the notch is what "
+                "confines it"
+            )
 
     def blocks(self) -> Blocks:
         """Return the sub-meshes: "foot" and "head" of the box, "left", "right", "under" (the notch), "left_wall" and
         "right_wall" of the block."""
         a, n = 0.5 * self.box.side, self.box.cells // 2
         places = {  # lowest corner, width, height in units of half a side
-            "foot": (-1, -1, 2, 1), "head": (-1, 0, 2, 1),
-            "left": (-3, -4, 2, 3), "right": (1, -4, 2, 3), "under": (-1, -4, 2, 3),
-            "left_wall": (-3, -1, 2, 1), "right_wall": (1, -1, 2, 1),
+            "foot": (-1, -1, 2, 1),
+            "head": (-1, 0, 2, 1),
+            "left": (-3, -4, 2, 3),
+            "right": (1, -4, 2, 3),
+            "under": (-1, -4, 2, 3),
+            "left_wall": (-3, -1, 2, 1),
+            "right_wall": (1, -1, 2, 1),
         }
         return Blocks({
             name: BlockMesh(lengths=(a * w, a * h), divisions=(n * w, n * h), corner=(a * x, a * y))
@@ -84,9 +105,13 @@ class EmbeddedModel:
     system: SemiDiscreteSystem
     surface: ContactSurface
 
-    def problem(self, *, friction: FrictionLaw | None = None, mass: MassLaw | None = None) -> ContactProblem:
+    def problem(
+        self, *, friction: FrictionLaw | None = None, mass: MassLaw | None = None
+    ) -> ContactProblem:
         """Set up the box in its notch, at rest."""
-        return ContactProblem(self.system, self.surface, friction=friction or Frictionless(), mass=mass)
+        return ContactProblem(
+            self.system, self.surface, friction=friction or Frictionless(), mass=mass
+        )
 
     def probes(self) -> dict[str, tuple[float, float]]:
         """Return the middle of the top of the box, rim of the block half a side from the notch."""

@@ -58,12 +58,16 @@ class Example:
         """Assemble the symmetric operator of the square with k elements per side."""
         dt = self.ratio / (k * self.material.c_p)
         mesh = polygon([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)], 1.0 / k)
-        blocks = energetic_blocks(mesh, self.material, dt=dt, steps=self.count * k, compressed=compressed)
+        blocks = energetic_blocks(
+            mesh, self.material, dt=dt, steps=self.count * k, compressed=compressed
+        )
         return PoincareSteklov(blocks, self.material.rho)
 
     def problem(self, operator: PoincareSteklov) -> BoundaryProblem:
         """Press the square, its base in contact."""
-        return pressed(operator, pressure=self.pressure, top=TOP, contact=operator.mesh.labels == BOTTOM)
+        return pressed(
+            operator, pressure=self.pressure, top=TOP, contact=operator.mesh.labels == BOTTOM
+        )
 
     def only(self, *supports: str) -> "Example":
         """Return the example with these supports alone."""
@@ -74,11 +78,19 @@ HELD: dict[str, tuple[int, ...] | FrictionLaw] = {"rollers": (1,), "clamped": (0
 _BOX = square.concrete()
 EXAMPLES = {
     "square": Example(
-        LinearElastic.from_wave_speeds(1.0, 0.5, 1.0), lambda t: 1.0, 1.0, 4,
-        HELD | {"no friction": Frictionless(), "Tresca 0.05": Tresca(0.05)}),
+        LinearElastic.from_wave_speeds(1.0, 0.5, 1.0),
+        lambda t: 1.0,
+        1.0,
+        4,
+        HELD | {"no friction": Frictionless(), "Tresca 0.05": Tresca(0.05)},
+    ),
     "concrete on steel": Example(
-        _BOX.material, lambda t: _BOX.pressure * math.tanh((t / 0.015) ** 2), 4.0, 8,
-        HELD | {"Coulomb 0.3": Coulomb(0.3)}),
+        _BOX.material,
+        lambda t: _BOX.pressure * math.tanh((t / 0.015) ** 2),
+        4.0,
+        8,
+        HELD | {"Coulomb 0.3": Coulomb(0.3)},
+    ),
 }
 
 
@@ -90,7 +102,9 @@ class Solutions:
     energy: dict[tuple[str, str, int], Array] = field(default_factory=dict)
     worst: float = 0.0
 
-    def add(self, example: Example, operator: PoincareSteklov, forms: Sequence[str] = tuple(FORMS)) -> None:
+    def add(
+        self, example: Example, operator: PoincareSteklov, forms: Sequence[str] = tuple(FORMS)
+    ) -> None:
         """Solve all supports with these forms of an operator."""
         made, k = example.problem(operator), len(operator.mesh) // 4
         for form in forms:
@@ -157,7 +171,11 @@ def measure(name: str, levels: Sequence[int], *supports: str) -> list[Row]:
     ``levels``: numbers of elements per side, at least three, all divisors of the last, which is twice and four times
     two of them. With more than MARCHED elements the last level is solved in the symmetric form alone.
     """
-    example, fine, found = EXAMPLES[name].only(*(supports or EXAMPLES[name].supports)), levels[-1], Solutions()
+    example, fine, found = (
+        EXAMPLES[name].only(*(supports or EXAMPLES[name].supports)),
+        levels[-1],
+        Solutions(),
+    )
     large = fine > MARCHED
     for k in levels[:-1]:
         found.add(example, example.operator(k))
@@ -169,20 +187,40 @@ def measure(name: str, levels: Sequence[int], *supports: str) -> list[Row]:
     rows = []
     for support in example.supports:
         places = [key for key in found.displacement if key[0] == support]
-        norm = EnergyNorm(operator, [prolonged(found.displacement[key], key[2], fine) for key in places])
+        norm = EnergyNorm(
+            operator, [prolonged(found.displacement[key], key[2], fine) for key in places]
+        )
         squares = Differences(norm, [key[1:] for key in places])
         e2, cosine = squares.reference_error(fine)
         for form in FORMS:
             best = found.energy[support, "symmetric", fine]
-            solved = [k for k in levels if (support, form, k) in found.energy and (form, k) != ("symmetric", fine)]
+            solved = [
+                k
+                for k in levels
+                if (support, form, k) in found.energy and (form, k) != ("symmetric", fine)
+            ]
             errors = {k: squares.between((form, k), ("symmetric", fine)) for k in solved}
             below = levels[:-1]
             slopes = _slopes(below, [errors[k] + e2 for k in below])
             for k in solved:
-                off = np.abs(found.energy[support, form, k] - best[fine // k - 1 :: fine // k]).max() / best.max()
-                rows.append({"case": f"{name}, {support}", "form": form, "k": k, "finest": fine,
-                             "error_squared": errors[k], "energy_difference": float(off),
-                             "reference_error": e2, "cosine": cosine, "certificate": found.worst, **slopes})
+                off = (
+                    np.abs(found.energy[support, form, k] - best[fine // k - 1 :: fine // k]).max()
+                    / best.max()
+                )
+                rows.append(
+                    {
+                        "case": f"{name}, {support}",
+                        "form": form,
+                        "k": k,
+                        "finest": fine,
+                        "error_squared": errors[k],
+                        "energy_difference": float(off),
+                        "reference_error": e2,
+                        "cosine": cosine,
+                        "certificate": found.worst,
+                        **slopes,
+                    }
+                )
     return rows
 
 

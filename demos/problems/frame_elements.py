@@ -42,8 +42,13 @@ def frame(nodes: Any, members: Sequence[tuple[int, int]], **section: float) -> d
         M[rows] += mass
         K[rows] += stiffness
     node = np.repeat(np.arange(len(nodes)), 3)
-    return {"M": M.tocsr(), "C": None, "K": K.tocsr(), "coordinates": nodes,
-            "unknowns": np.column_stack([node, np.tile([0, 1, -1], len(nodes))])}
+    return {
+        "M": M.tocsr(),
+        "C": None,
+        "K": K.tocsr(),
+        "coordinates": nodes,
+        "unknowns": np.column_stack([node, np.tile([0, 1, -1], len(nodes))]),
+    }
 
 
 def line(a: Any, b: Any, count: int) -> Any:

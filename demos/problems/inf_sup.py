@@ -23,7 +23,9 @@ def space_constant(mesh: BoundaryMesh, elements: Mask, patch: int, degree: int =
     fine = refined(mesh)
     coarse = _loads(mesh, elements, patch, degree)
     much = _loads(fine, np.repeat(elements, FINER), FINER * patch, degree)
-    seen, there = (load.T @ np.linalg.solve(half_norm(on), load) for load, on in ((coarse, mesh), (much, fine)))
+    seen, there = (
+        load.T @ np.linalg.solve(half_norm(on), load) for load, on in ((coarse, mesh), (much, fine))
+    )
     return float(np.sqrt(max(eigh(seen, there, eigvals_only=True)[0], 0.0)))
 
 
@@ -36,7 +38,9 @@ def time_constant(steps: int, interval: int, testing: str) -> float:
     hats[-1, -1] = 1.0 / 3.0
     both = 0.5 * (np.eye(steps) + np.eye(steps, k=-1))  # of the step and its hats at end and start
     pairing = np.add.reduceat(both, np.arange(0, steps, interval), axis=0)
-    return float(np.sqrt(np.linalg.eigvalsh(pairing @ np.linalg.solve(hats, pairing.T) / interval)[0]))
+    return float(
+        np.sqrt(np.linalg.eigvalsh(pairing @ np.linalg.solve(hats, pairing.T) / interval)[0])
+    )
 
 
 def refined(mesh: BoundaryMesh) -> BoundaryMesh:
@@ -52,7 +56,9 @@ def half_norm(mesh: BoundaryMesh) -> Array:
     M, K = np.zeros((n, n)), np.zeros((n, n))
     for a in range(2):
         for b in range(2):
-            np.add.at(M, (mesh.elements[:, a], mesh.elements[:, b]), h * (2.0 if a == b else 1.0) / 6.0)
+            np.add.at(
+                M, (mesh.elements[:, a], mesh.elements[:, b]), h * (2.0 if a == b else 1.0) / 6.0
+            )
             np.add.at(K, (mesh.elements[:, a], mesh.elements[:, b]), (1.0 if a == b else -1.0) / h)
     values, vectors = eigh(M + K, M)  # vectors.T M vectors = 1
     return np.asarray((M @ vectors) * np.sqrt(np.maximum(values, 1.0)) @ (M @ vectors).T)
@@ -61,8 +67,15 @@ def half_norm(mesh: BoundaryMesh) -> Array:
 def _loads(mesh: BoundaryMesh, elements: Mask, patch: int, degree: int) -> Array:
     """Return <phi_i, psi_p> of all nodes (n, p) for functions psi_p with the mean 1."""
     nodes = np.flatnonzero(mesh.nodes_of(elements))
-    nothing = CondensedCompliance(np.zeros((1, 2 * len(nodes), 2 * len(nodes))), np.zeros((1, 2 * len(nodes))), nodes,
-                                  mesh.points[nodes], mesh.normals[nodes], mesh.node_lengths(elements)[nodes], 1.0)
+    nothing = CondensedCompliance(
+        np.zeros((1, 2 * len(nodes), 2 * len(nodes))),
+        np.zeros((1, 2 * len(nodes))),
+        nodes,
+        mesh.points[nodes],
+        mesh.normals[nodes],
+        mesh.node_lengths(elements)[nodes],
+        1.0,
+    )
     patches = MultiplierMesh(mesh, elements, nothing, patch=patch, interval=1, degree=degree)
     loads = np.zeros((len(mesh), patches.pairing.shape[1]))
     loads[nodes] = patches.pairing

@@ -6,7 +6,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vi_contact.bem.boundary_mesh import BoundaryMesh
-from vi_contact.bem.boundary_operators import N_DOUBLE, N_SINGLE, double_local, integrands, joined_at_nodes, tensor
+from vi_contact.bem.boundary_operators import (
+    N_DOUBLE,
+    N_SINGLE,
+    double_local,
+    integrands,
+    joined_at_nodes,
+    tensor,
+)
 from vi_contact.bem.fundamental_solution import TimeKernels
 from vi_contact.bem.loops import distances
 from vi_contact.bem.poincare_steklov import BoundaryMotion, PoincareSteklov
@@ -20,7 +27,11 @@ ORDER, CLOSEST = 8, 1e-3  # points a piece; least distance from the boundary in 
 
 
 def interior_displacement(
-    operator: PoincareSteklov, motion: BoundaryMotion, points: ArrayLike, *, steps: Sequence[int] | None = None
+    operator: PoincareSteklov,
+    motion: BoundaryMotion,
+    points: ArrayLike,
+    *,
+    steps: Sequence[int] | None = None,
 ) -> Array:
     """Return (len(steps), m, 2) displacement [m] at the times motion.times[steps] (None: all) of inner points (m, 2).
 
@@ -30,12 +41,18 @@ def interior_displacement(
     instance(owner, "operator", operator, PoincareSteklov, "give PoincareSteklov(blocks, rho)")
     instance(owner, "motion", motion, BoundaryMotion, "give the answer of BoundaryProblem.solve()")
     mesh, blocks = operator.mesh, operator.blocks
-    x = array(owner, "points", points, (2,) if shape_of(points) == (2,) else (None, 2), unit="m").reshape(-1, 2)
+    x = array(
+        owner, "points", points, (2,) if shape_of(points) == (2,) else (None, 2), unit="m"
+    ).reshape(-1, 2)
     _check_inside(mesh, x)
-    wanted = np.arange(len(motion.times)) if steps is None else integers(owner, "steps", steps, (None,))
+    wanted = (
+        np.arange(len(motion.times)) if steps is None else integers(owner, "steps", steps, (None,))
+    )
     if len(wanted) and not 0 <= wanted.min() <= wanted.max() < len(motion.times):
-        raise InputError(f"{owner}: steps are from {wanted.min()} to {wanted.max()}; this motion has steps 0 to "
-                         f"{len(motion.times) - 1}")
+        raise InputError(
+            f"{owner}: steps are from {wanted.min()} to {wanted.max()}; this motion has steps 0 to "
+            f"{len(motion.times) - 1}"
+        )
     traction = motion.traction.reshape(len(motion.times), -1) / operator.rho
     increments = np.diff(motion.displacement, axis=0, prepend=0.0).reshape(len(motion.times), -1)
     total = np.zeros((len(wanted), 2 * len(x)))
@@ -50,7 +67,9 @@ def interior_displacement(
     return total.reshape(len(wanted), 2, len(x)).swapaxes(1, 2)
 
 
-def _matrices(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) -> tuple[Array, Array]:
+def _matrices(
+    mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float
+) -> tuple[Array, Array]:
     """Return (2m, 4n) of V integrated once, (2m, 2n) of K integrated twice, both up to t; density 1."""
     m, n = len(x), len(mesh)
     moments = np.concatenate(list(_moments(mesh, x, t, c_p, c_s)), axis=1)
@@ -75,7 +94,10 @@ def _moments(mesh: BoundaryMesh, x: Array, t: float, c_p: float, c_s: float) -> 
         fronts = [roots(b2, -2.0 * projection, d2 - (c * t) ** 2) for c in (c_p, c_s)]
         foot, height = projection / b2, np.abs(b[:, 0] * offset[:, 1] - b[:, 1] * offset[:, 0]) / b2
         row, low, length = pieces(np.concatenate([*fronts, foot[:, None]], axis=1))
-        eta, weight = (part.ravel() for part in placed(low, length, smoothed(ORDER), about=(foot[row], height[row])))
+        eta, weight = (
+            part.ravel()
+            for part in placed(low, length, smoothed(ORDER), about=(foot[row], height[row]))
+        )
         owner = np.repeat(row, ORDER)
         weight = weight * np.sqrt(b2)[owner]
         d = (offset[owner] - eta[:, None] * b[owner]).T
@@ -91,9 +113,13 @@ def _check_inside(mesh: BoundaryMesh, x: Array) -> None:
     """Raise InputError unless all points are inside: winding number 1 (0 for an exterior body), off the boundary."""
     start, end = mesh.points - x[:, None], mesh.points[mesh.after] - x[:, None]
     distance = distances(x[:, None], mesh.points, mesh.points[mesh.after]) / mesh.lengths
-    turn = np.arctan2(start[..., 0] * end[..., 1] - start[..., 1] * end[..., 0], (start * end).sum(2)).sum(1)
+    turn = np.arctan2(
+        start[..., 0] * end[..., 1] - start[..., 1] * end[..., 0], (start * end).sum(2)
+    ).sum(1)
     winding = np.rint(turn / (2.0 * np.pi)) + (1.0 if mesh.exterior else 0.0)
     bad = (distance.min(axis=1) < CLOSEST) | (winding != 1.0)
     if bad.any():
-        raise InputError(f"interior_displacement: the point {x[int(bad.argmax())].tolist()} lies on the boundary or "
-                         "outside the body; give points inside and take boundary values from the motion")
+        raise InputError(
+            f"interior_displacement: the point {x[int(bad.argmax())].tolist()} lies on the boundary or "
+            "outside the body; give points inside and take boundary values from the motion"
+        )

@@ -11,7 +11,11 @@ from vi_contact.core.errors import InputError
 
 
 def from_segments(
-    points: ArrayLike, segments: ArrayLike, *, labels: ArrayLike | None = None, exterior: bool = False
+    points: ArrayLike,
+    segments: ArrayLike,
+    *,
+    labels: ArrayLike | None = None,
+    exterior: bool = False,
 ) -> BoundaryMesh:
     """Join loose segments to a mesh, for example the facets of a finite element boundary, in any order and direction.
 
@@ -21,20 +25,28 @@ def from_segments(
     coordinates = array("from_segments", "points", points, (None, None), unit="m")[:, :2]
     pairs = integers("from_segments", "segments", segments, (None, 2))
     if len(pairs) and not 0 <= pairs.min() <= pairs.max() < len(coordinates):
-        raise InputError(f"from_segments: segments name the points {pairs.min()} to {pairs.max()}, there are "
-                         f"{len(coordinates)}; number points from 0 on")
+        raise InputError(
+            f"from_segments: segments name the points {pairs.min()} to {pairs.max()}, there are "
+            f"{len(coordinates)}; number points from 0 on"
+        )
     order, sizes = ordered_loops(coordinates, pairs, exterior=exterior)
-    tags = integers("from_segments", "labels", np.zeros(len(pairs)) if labels is None else labels, (len(pairs),))
+    tags = integers(
+        "from_segments", "labels", np.zeros(len(pairs)) if labels is None else labels, (len(pairs),)
+    )
     return BoundaryMesh(coordinates[order[:, 0]], sizes, tags[order[:, 1]], exterior)
 
 
-def ordered_loops(points: Array, segments: Indices, *, exterior: bool) -> tuple[Indices, tuple[int, ...]]:
+def ordered_loops(
+    points: Array, segments: Indices, *, exterior: bool
+) -> tuple[Indices, tuple[int, ...]]:
     """Return ((n, 2) start point and number of each segment, loop after loop; sizes of the loops), body on the left."""
     ends = np.bincount(segments.ravel(), minlength=len(points))
     if len(segments) == 0 or (ends[np.unique(segments)] != 2).any():
         bad = int(np.argmax((ends != 2) & (ends > 0)))
-        raise InputError(f"the boundary curve is open or branches at point {bad} ({points[bad].tolist()}), where "
-                         f"{int(ends[bad])} segments meet; give every segment of closed curves")
+        raise InputError(
+            f"the boundary curve is open or branches at point {bad} ({points[bad].tolist()}), where "
+            f"{int(ends[bad])} segments meet; give every segment of closed curves"
+        )
     at_point: dict[int, list[int]] = {}
     for number, pair in enumerate(segments.tolist()):
         for point in pair:
@@ -53,7 +65,9 @@ def ordered_loops(points: Array, segments: Indices, *, exterior: bool) -> tuple[
     chains = [np.array(loop, np.int64) for loop in loops]
     curves = [points[chain[:, 0]] for chain in chains]
     turned = []
-    for chain, curve, forward in zip(chains, curves, should_run_forward(curves, exterior=exterior), strict=True):
+    for chain, curve, forward in zip(
+        chains, curves, should_run_forward(curves, exterior=exterior), strict=True
+    ):
         if (signed_area(curve) > 0.0) != forward:
             chain = np.stack([np.roll(chain[::-1, 0], 1), chain[::-1, 1]], axis=1)
         turned.append(chain)

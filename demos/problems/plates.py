@@ -56,7 +56,12 @@ def disk_mesh(comm: Any, radius: float, cells: int) -> Any:
 
 
 def plate_system(
-    on: Any, plate: Plate, *, clamped: bool, pressure: float = 0.0, speed: Callable[[Array], Array] | None = None
+    on: Any,
+    plate: Plate,
+    *,
+    clamped: bool,
+    pressure: float = 0.0,
+    speed: Callable[[Array], Array] | None = None,
 ) -> SemiDiscreteSystem:
     """Return the system of a plate on a mesh of triangles, held along its boundary. Collective.
 
@@ -69,7 +74,9 @@ def plate_system(
     V = compat.lagrange(on, 2)
     w, v = ufl.TrialFunction(V), ufl.TestFunction(V)
     K = compat.assemble_matrix(compat.compile_form(_stiffness(on, plate, w, v, clamped)))
-    M = compat.assemble_matrix(compat.compile_form(compat.constant(on, plate.mass) * w * v * ufl.dx))
+    M = compat.assemble_matrix(
+        compat.compile_form(compat.constant(on, plate.mass) * w * v * ufl.dx)
+    )
     n = V.dofmap.index_map.size_local
     points = V.tabulate_dof_coordinates()[:n]
     edges = dolfinx.mesh.locate_entities_boundary(on, 1, lambda x: np.full(x.shape[1], True))
@@ -79,8 +86,14 @@ def plate_system(
     area = (M * ones).array / plate.mass  # the integral of each function
     v0 = None if speed is None else np.where(np.isin(np.arange(n), held), 0.0, speed(points))
     return fem.system_from_matrices(
-        M, None, K, coordinates=points, unknowns=np.column_stack([np.arange(n), np.full(n, 2)]),
-        clamped=held[held < n], load=-pressure * area, v0=v0,
+        M,
+        None,
+        K,
+        coordinates=points,
+        unknowns=np.column_stack([np.arange(n), np.full(n, 2)]),
+        clamped=held[held < n],
+        load=-pressure * area,
+        v0=v0,
     )
 
 
@@ -104,10 +117,17 @@ def _stiffness(on: Any, plate: Plate, w: Any, v: Any, clamped: bool) -> Any:
     def turned(u: Any) -> Any:  # the slopes of both sides count along their own outward normals
         return slope(u)("+") + slope(u)("-")
 
-    form = ufl.inner(moment(w), curvature(v)) * ufl.dx + (
-        4.0 * D * ufl.avg(slender) * turned(w) * turned(v)
-        - ufl.avg(across(w)) * turned(v) - ufl.avg(across(v)) * turned(w)
-    ) * ufl.dS
+    form = (
+        ufl.inner(moment(w), curvature(v)) * ufl.dx
+        + (
+            4.0 * D * ufl.avg(slender) * turned(w) * turned(v)
+            - ufl.avg(across(w)) * turned(v)
+            - ufl.avg(across(v)) * turned(w)
+        )
+        * ufl.dS
+    )
     if clamped:
-        form += (4.0 * D * slender * slope(w) * slope(v) - across(w) * slope(v) - across(v) * slope(w)) * ufl.ds
+        form += (
+            4.0 * D * slender * slope(w) * slope(v) - across(w) * slope(v) - across(v) * slope(w)
+        ) * ufl.ds
     return form

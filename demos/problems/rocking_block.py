@@ -48,17 +48,23 @@ class RockingBlock:
     """
 
     shape: HousnerBlock = field(default_factory=lambda: HousnerBlock(width=0.4, height=2.0))
-    material: LinearElastic = field(default_factory=lambda: LinearElastic(E=3.0e10, nu=0.0, rho=2400.0))
+    material: LinearElastic = field(
+        default_factory=lambda: LinearElastic(E=3.0e10, nu=0.0, rho=2400.0)
+    )
     damping: Damping = field(default_factory=lambda: Rayleigh(alpha=0.0, beta=3.0e-4))
     divisions: tuple[int, int] = (2, 10)
 
     def __post_init__(self) -> None:
         least = self.material.rho * (RIGID * self.shape.p * self.shape.height) ** 2
         if least > self.material.E:
-            raise InputError(f"RockingBlock: E = {self.material.E:g} Pa is too soft for a rigid block of this size: "
-                             f"give at least {least:.2g} Pa")
+            raise InputError(
+                f"RockingBlock: E = {self.material.E:g} Pa is too soft for a rigid block of this size: "
+                f"give at least {least:.2g} Pa"
+            )
         if self.divisions[1] < 4:
-            raise InputError(f"RockingBlock: {self.divisions[1]} elements over the height: give at least 4")
+            raise InputError(
+                f"RockingBlock: {self.divisions[1]} elements over the height: give at least 4"
+            )
 
     @property
     def overturning_angle(self) -> float:
@@ -113,7 +119,11 @@ class RockingModel:
 
     def tilted(self, theta: float, *, rate: float = 0.0) -> State:
         """Return the block at rest, turned by theta [rad] about its lower left corner, turning at ``rate`` [rad/s]."""
-        u, v, none = self.rest.u + theta * self._turn, rate * self._turn, np.zeros(self.problem.surface.count)
+        u, v, none = (
+            self.rest.u + theta * self._turn,
+            rate * self._turn,
+            np.zeros(self.problem.surface.count),
+        )
         return replace(self.rest, u=u, v=v, r_n=none, active=none.astype(bool))
 
     @property
@@ -121,7 +131,13 @@ class RockingModel:
         """Return the horizontal acceleration [m/s²] that lifts the block when it grows slowly: m g b / turn·M r."""
         system = self.problem.equations
         overturning = float(system.algebra.dot(self._turn, system.inertia(np.array([1.0, 0.0]))))
-        return 0.5 * self.block.mass * self.block.shape.gravity * self.block.shape.width / abs(overturning)
+        return (
+            0.5
+            * self.block.mass
+            * self.block.shape.gravity
+            * self.block.shape.width
+            / abs(overturning)
+        )
 
     def angle(self, state: State) -> float:
         """Return the rotation [rad] by the heights of the corners, positive when the right one is up."""
@@ -164,7 +180,9 @@ class Rocking:
             "r_right": ("N", "reaction of the ground at the right corner, mean of the step"),
         }
 
-    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
+    def start(
+        self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
+    ) -> Row:
         """Return the row of the initial state."""
         return self._row(state)
 
@@ -173,8 +191,12 @@ class Rocking:
 
     def _row(self, state: State) -> Row:
         left, right = self.model.problem.surface.everywhere(state.r_n)
-        return {"theta": self.model.angle(state), "theta_rate": self.model.spin(state), "r_left": float(left),
-                "r_right": float(right)}
+        return {
+            "theta": self.model.angle(state),
+            "theta_rate": self.model.spin(state),
+            "r_left": float(left),
+            "r_right": float(right),
+        }
 
 
 def build(block: RockingBlock, comm: Any) -> RockingModel:
@@ -185,13 +207,20 @@ def build(block: RockingBlock, comm: Any) -> RockingModel:
     """
     width, height, gravity = block.shape.width, block.shape.height, block.shape.gravity
     mesh, tags = build_mesh(BlockMesh(lengths=(width, height), divisions=block.divisions), comm)
-    system = assemble(mesh, block.material, section=PlaneStress(1.0), damping=block.damping,
-                      prescribed=Prescribed(tags["bottom"], components=(0,)),
-                      loads=BodyForce((0.0, -block.material.rho * gravity)))
+    system = assemble(
+        mesh,
+        block.material,
+        section=PlaneStress(1.0),
+        damping=block.damping,
+        prescribed=Prescribed(tags["bottom"], components=(0,)),
+        loads=BodyForce((0.0, -block.material.rho * gravity)),
+    )
     ground = HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
     whole = ContactProblem(system, contact_surface(system, tags["bottom"], obstacle=ground))
     heavy = geometric_stiffness(whole, static_equilibrium(whole))
-    corners = contact_surface(heavy, tags["bottom"], obstacle=ground, points=[(0.0, 0.0), (width, 0.0)])
+    corners = contact_surface(
+        heavy, tags["bottom"], obstacle=ground, points=[(0.0, 0.0), (width, 0.0)]
+    )
     problem = ContactProblem(heavy, corners)
     return RockingModel(block, problem, static_equilibrium(problem))
 
@@ -209,7 +238,9 @@ def impacts(history: Mapping[str, Array]) -> tuple[Array, Array]:
         share = theta[after - 1] / (theta[after - 1] - theta[after])
         times.append(float(t[after - 1] + share * (t[after] - t[after - 1])))
     ends = np.searchsorted(t, [t[0], *times])
-    peaks = [float(np.max(np.abs(theta[i : j + 1]))) for i, j in zip(ends[:-1], ends[1:], strict=True)]
+    peaks = [
+        float(np.max(np.abs(theta[i : j + 1]))) for i, j in zip(ends[:-1], ends[1:], strict=True)
+    ]
     return np.array(times), np.array(peaks)
 
 
@@ -220,7 +251,9 @@ def restitution(block: RockingBlock, history: Mapping[str, Array], impact: float
     sqrt(theta'² + p² theta (2b/h - theta)), which is constant between impacts: vibrations have left the mean by then.
     """
     t, theta, unit = history["t"], np.abs(history["theta"]), 1.0 / block.p
-    speed = np.sqrt(history["theta_rate"] ** 2 + theta * (2.0 * block.overturning_angle - theta) / unit**2)
+    speed = np.sqrt(
+        history["theta_rate"] ** 2 + theta * (2.0 * block.overturning_angle - theta) / unit**2
+    )
     before = (t > impact - 0.3 * unit) & (t < impact - 0.1 * unit)
     after = (t > impact + 0.1 * unit) & (t < impact + 0.3 * unit)
     return float(np.mean(speed[after]) / np.mean(speed[before]))

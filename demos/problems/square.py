@@ -30,15 +30,21 @@ class Square:
 
     cells: int = 20
     side: float = 1.0
-    material: LinearElastic = field(default_factory=lambda: LinearElastic.from_wave_speeds(1.0, 0.5, 1.0))
+    material: LinearElastic = field(
+        default_factory=lambda: LinearElastic.from_wave_speeds(1.0, 0.5, 1.0)
+    )
     pressure: float = 0.1
     history: Callable[[float], float] | None = None
     confined: bool = False
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("side",), finite=("pressure",), counts=("cells",), flags=("confined",))
+        attributes(
+            self, positive=("side",), finite=("pressure",), counts=("cells",), flags=("confined",)
+        )
         instance("Square", "material", self.material, LinearElastic, "give a LinearElastic")
-        optional(function, "Square", "history", self.history, "give a function of the time, or None")
+        optional(
+            function, "Square", "history", self.history, "give a function of the time, or None"
+        )
 
     @property
     def time_step(self) -> float:
@@ -48,8 +54,12 @@ class Square:
 
 def concrete(cells: int = 20) -> Square:
     """Describe a box of concrete on steel, 1 m wide: c_P = 3253 m/s, c_S = 1992 m/s, 4 MPa tanh((t/15 ms)²)."""
-    return Square(cells=cells, material=LinearElastic.from_wave_speeds(3253.0, 1992.0, 2400.0), pressure=4.0e6,
-                  history=lambda t: math.tanh((t / 0.015) ** 2))
+    return Square(
+        cells=cells,
+        material=LinearElastic.from_wave_speeds(3253.0, 1992.0, 2400.0),
+        pressure=4.0e6,
+        history=lambda t: math.tanh((t / 0.015) ** 2),
+    )
 
 
 @dataclass(frozen=True)
@@ -60,7 +70,9 @@ class SquareModel:
     system: SemiDiscreteSystem
     bottom: Any
 
-    def problem(self, *, friction: FrictionLaw | None = None, mass: MassLaw | None = None) -> ContactProblem:
+    def problem(
+        self, *, friction: FrictionLaw | None = None, mass: MassLaw | None = None
+    ) -> ContactProblem:
         """Set up the square on a support that it fits."""
         surface = contact_surface(self.system, self.bottom)
         return ContactProblem(self.system, surface, friction=friction or Frictionless(), mass=mass)
@@ -75,9 +87,14 @@ def build(square: Square, comm: Any) -> SquareModel:
     """Mesh and assemble the square; collective."""
     half = 0.5 * square.side
     mesh, tags = build_mesh(
-        BlockMesh(lengths=(square.side,) * 2, divisions=(square.cells,) * 2, corner=(-half, -half)), comm
+        BlockMesh(lengths=(square.side,) * 2, divisions=(square.cells,) * 2, corner=(-half, -half)),
+        comm,
     )
     load = Traction(tags["top"], (0.0, -square.pressure), history=square.history)
-    rollers = [Prescribed(tags[side], components=(0,)) for side in ("left", "right")] if square.confined else []
+    rollers = (
+        [Prescribed(tags[side], components=(0,)) for side in ("left", "right")]
+        if square.confined
+        else []
+    )
     system = assemble(mesh, square.material, section=PlaneStrain(), loads=load, prescribed=rollers)
     return SquareModel(square, system, tags["bottom"])

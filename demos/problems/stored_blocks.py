@@ -28,48 +28,67 @@ def stored_blocks(
     owner = "stored_blocks"
     target = checks.path(owner, "path", path)
     if not target.parent.is_dir():
-        raise InputError(f"{owner}: there is no folder {checks.shown(str(target.parent))}; make it first")
+        raise InputError(
+            f"{owner}: there is no folder {checks.shown(str(target.parent))}; make it first"
+        )
     if target.exists():
         check_body(mesh, material, Orders())
         steps = checks.whole(owner, "steps", steps, least=1)
-        return _read(target, mesh, material, checks.number(owner, "dt", dt, positive=True, unit="s"), steps)
+        return _read(
+            target, mesh, material, checks.number(owner, "dt", dt, positive=True, unit="s"), steps
+        )
     blocks = energetic_blocks(mesh, material, dt=dt, steps=steps, compressed=False)
     assert isinstance(blocks, EnergeticBlocks)
 
     def fill(file: Any) -> None:
-        file.attrs.update(format=FORMAT, c_p=blocks.c_p, c_s=blocks.c_s, dt=dt, exterior=mesh.exterior)
+        file.attrs.update(
+            format=FORMAT, c_p=blocks.c_p, c_s=blocks.c_s, dt=dt, exterior=mesh.exterior
+        )
         file["points"], file["loop_sizes"] = mesh.points, np.array(mesh.loop_sizes)
         file["single"], file["double"], file["hyper"] = blocks.single, blocks.double, blocks.hyper
 
     try:
         hdf5_atomically(target, fill)
     except OSError as error:
-        raise InputError(f"{owner}: {target.name} cannot be written ({checks.shown(str(error))}); give a file in a "
-                         "folder with room that may be written to") from error
+        raise InputError(
+            f"{owner}: {target.name} cannot be written ({checks.shown(str(error))}); give a file in a "
+            "folder with room that may be written to"
+        ) from error
     return blocks
 
 
-def _read(path: Path, mesh: BoundaryMesh, material: LinearElastic, dt: float, steps: int) -> EnergeticBlocks:
+def _read(
+    path: Path, mesh: BoundaryMesh, material: LinearElastic, dt: float, steps: int
+) -> EnergeticBlocks:
     import h5py
 
     try:
         with h5py.File(path, "r") as file:
             different = _differences(file, mesh, material, dt, steps)
             if different:
-                raise InputError(f"{path.name} holds the operator of another problem ({'; '.join(different)}); "
-                                 "assemble the operator of this one")
+                raise InputError(
+                    f"{path.name} holds the operator of another problem ({'; '.join(different)}); "
+                    "assemble the operator of this one"
+                )
             n = len(mesh)
             shapes = {"single": (4 * n, 4 * n), "double": (4 * n, 2 * n), "hyper": (2 * n, 2 * n)}
-            found = {key: checks.array(path.name, key, file[key][:steps], (steps, *shapes[key])) for key in shapes}
+            found = {
+                key: checks.array(path.name, key, file[key][:steps], (steps, *shapes[key]))
+                for key in shapes
+            }
     except InputError:
         raise
     except (KeyError, ValueError, TypeError, OSError, AttributeError) as error:
-        raise InputError(f"{path.name}: no HDF5 file of boundary element blocks, or a damaged one "
-                         f"({checks.shown(str(error))}); remove it, and it is made again") from error
+        raise InputError(
+            f"{path.name}: no HDF5 file of boundary element blocks, or a damaged one "
+            f"({checks.shown(str(error))}); remove it, and it is made again"
+        ) from error
     return EnergeticBlocks(mesh, material.c_p, material.c_s, dt, **found)
 
 
-def _differences(file: Any, mesh: BoundaryMesh, material: LinearElastic, dt: float, steps: int) -> list[str]:
+def _differences(
+    file: Any, mesh: BoundaryMesh, material: LinearElastic, dt: float, steps: int
+) -> list[str]:
     if file.attrs["format"] != FORMAT:
         return [f"in the format {checks.shown(file.attrs['format'])}, here '{FORMAT}'"]
     points = file["points"][:]
@@ -80,7 +99,10 @@ def _differences(file: Any, mesh: BoundaryMesh, material: LinearElastic, dt: flo
         there = float(file.attrs[name])
         if not abs(there - here) <= EQUAL * abs(here):
             different.append(f"{name} = {there:.6g}, here {here:.6g}")
-    if not np.abs(points - mesh.points).max() <= EQUAL * mesh.size or tuple(file["loop_sizes"][:]) != mesh.loop_sizes:
+    if (
+        not np.abs(points - mesh.points).max() <= EQUAL * mesh.size
+        or tuple(file["loop_sizes"][:]) != mesh.loop_sizes
+    ):
         different.append("other points of the boundary")
     if bool(file.attrs["exterior"]) != mesh.exterior:
         different.append("the other side of the boundary")

@@ -10,7 +10,13 @@ from typing import Any
 import numpy as np
 
 import vi_contact as vc
-from demos.exact.structures import DiskOnGround, LiftedBeam, clamped_disk, disk_on_ground, square_plate
+from demos.exact.structures import (
+    DiskOnGround,
+    LiftedBeam,
+    clamped_disk,
+    disk_on_ground,
+    square_plate,
+)
 from vi_contact.core.algebra import Array
 from vi_contact.core.problem import ContactProblem
 from vi_contact.core.step import State
@@ -28,7 +34,9 @@ CANTILEVER = 1.8751040687119611  # root of cos z cosh z = -1
 
 def frame_on_a_stop(gap: float, normal: tuple[float, float]) -> ContactProblem:
     """Return a clamped column with an arm, loaded at its end, which a stop in this direction [m] holds."""
-    nodes = np.concatenate([line([0.0, 0.0], [0.0, HEIGHT], 6), line([0.0, HEIGHT], [ARM, HEIGHT], 3)[1:]])
+    nodes = np.concatenate(
+        [line([0.0, 0.0], [0.0, HEIGHT], 6), line([0.0, HEIGHT], [ARM, HEIGHT], 3)[1:]]
+    )
     load = np.zeros(3 * len(nodes))
     load[-3:-1] = END_LOAD
     members = [(i, i + 1) for i in range(len(nodes) - 1)]
@@ -40,7 +48,9 @@ def heavy_beam(count: int) -> ContactProblem:
     """Return a beam of so many elements on the ground, whose left end is pulled up; its weight acts at the nodes. Its
     right end is clamped at the height of the ground, on which it lies there anyway."""
     h = HEAVY_LENGTH / count
-    parts = frame(line([0.0, 0.0], [HEAVY_LENGTH, 0.0], count), [(i, i + 1) for i in range(count)], **SECTION)
+    parts = frame(
+        line([0.0, 0.0], [HEAVY_LENGTH, 0.0], count), [(i, i + 1) for i in range(count)], **SECTION
+    )
     load = np.zeros((count + 1, 3))
     load[:, 1] = -HEAVY.q * h
     load[[0, -1], 1] *= 0.5
@@ -57,7 +67,9 @@ def thrown_beam(count: int, gap: float, speed: float) -> tuple[ContactProblem, f
     mode = np.cosh(z * x) - np.cos(z * x) - ratio * (np.sinh(z * x) - np.sin(z * x))
     slope = z * (np.sinh(z * x) + np.sin(z * x) - ratio * (np.cosh(z * x) - np.cos(z * x)))
     v0 = -speed * np.column_stack([np.zeros(count + 1), mode, slope]) / mode[-1]
-    parts = frame(line([0.0, 0.0], [TIP_LENGTH, 0.0], count), [(i, i + 1) for i in range(count)], **SECTION)
+    parts = frame(
+        line([0.0, 0.0], [TIP_LENGTH, 0.0], count), [(i, i + 1) for i in range(count)], **SECTION
+    )
     system = vc.system_from_arrays(**parts, clamped=[0, 1, 2], v0=v0.ravel())
     surface = vc.contact_points(system, [count], [0.0, -1.0], gap0=gap)
     omega = z**2 * float(np.sqrt(SECTION["EI"] / SECTION["rho_A"]))
@@ -65,7 +77,9 @@ def thrown_beam(count: int, gap: float, speed: float) -> tuple[ContactProblem, f
     return problem, float(np.arcsin(gap * omega / speed)) / omega
 
 
-def plate_on_a_stop(comm: Any, disk: bool, cells: int, share: float) -> tuple[ContactProblem, float]:
+def plate_on_a_stop(
+    comm: Any, disk: bool, cells: int, share: float
+) -> tuple[ContactProblem, float]:
     """Return a plate under PRESSURE above a stop at its middle, a clamped disk or a simply supported square, and the
     exact force of the stop [N]; share: of the free deflection, at which the stop is."""
     size = 0.5 * SIDE if disk else SIDE
@@ -84,15 +98,20 @@ def disk_above_ground(comm: Any, cells: int, share: float) -> tuple[ContactProbl
     on = disk_mesh(comm, radius, cells)
     system = plate_system(on, PLATE, clamped=True, pressure=PRESSURE)
     own = on.geometry.x[np.hypot(*on.geometry.x[:, :2].T) < 0.99 * radius]
-    vertices = np.unique(np.round(np.concatenate(comm.allgather(own)), 12), axis=0)  # those on two ranks once
+    vertices = np.unique(
+        np.round(np.concatenate(comm.allgather(own)), 12), axis=0
+    )  # those on two ranks once
     gap = known.gap * PRESSURE * radius**4 / PLATE.D
-    return vc.ContactProblem(system, vc.contact_points(
-        system, system.space.find_nodes(vertices), [0.0, 0.0, -1.0], gap0=gap)), known
+    return vc.ContactProblem(
+        system,
+        vc.contact_points(system, system.space.find_nodes(vertices), [0.0, 0.0, -1.0], gap0=gap),
+    ), known
 
 
 def thrown_plate(comm: Any, cells: int, gap: float, speed: float) -> tuple[ContactProblem, float]:
     """Return a simply supported square that swings in its first mode, its middle at this speed [m/s] towards a stop,
     and the time [s] at which it touches."""
+
     def mode(x: Array) -> Array:
         return np.asarray(-speed * np.cos(np.pi * x[:, 0] / SIDE) * np.cos(np.pi * x[:, 1] / SIDE))
 
@@ -113,7 +132,15 @@ def residual(problem: ContactProblem, state: State) -> float:
     off = system.K @ state.u - load + surface.reaction_load(state.r_n, system.K.rows)
     left = surface.gap(state.t) - surface.normal_values(state.u)
     arrays = (load, state.r_n, state.u, off, -state.r_n, -left, np.abs(state.r_n * left))
-    largest = [float(np.max(one, initial=0.0)) for one in (np.abs(arrays[0]), *arrays[1:2], np.abs(arrays[2]),
-                                                           np.abs(arrays[3]), *arrays[4:])]
+    largest = [
+        float(np.max(one, initial=0.0))
+        for one in (
+            np.abs(arrays[0]),
+            *arrays[1:2],
+            np.abs(arrays[2]),
+            np.abs(arrays[3]),
+            *arrays[4:],
+        )
+    ]
     f, r, u, balance, pull, deep, both = comm.max(np.array(largest)).tolist()
     return float(max(balance / max(f, r), pull / max(f, r), deep / u, both / (max(f, r) * u)))

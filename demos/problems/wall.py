@@ -51,7 +51,9 @@ class Wall:
     height: float = 9.0
     width: float = 6.0
     thickness: float = 0.20
-    material: LinearElastic = field(default_factory=lambda: LinearElastic(E=2.0e10, nu=0.0, rho=2400.0))
+    material: LinearElastic = field(
+        default_factory=lambda: LinearElastic(E=2.0e10, nu=0.0, rho=2400.0)
+    )
     damping: Damping = field(default_factory=NoDamping)
     divisions: tuple[int, int] | None = (8, 12)
     size: float | None = None
@@ -61,7 +63,11 @@ class Wall:
         """Return the Gmsh description; a ``size`` replaces the exact divisions."""
         divisions = None if self.size is not None else self.divisions
         return WallMesh(
-            height=self.height, width=self.width, divisions=divisions, size=self.size, triangles=self.triangles
+            height=self.height,
+            width=self.width,
+            divisions=divisions,
+            size=self.size,
+            triangles=self.triangles,
         )
 
     def point(self, number: int) -> tuple[float, float]:
@@ -70,7 +76,9 @@ class Wall:
         1-12 right side upwards (12 = top right corner), 13-20 top, 21-32 left side downwards, 33-40 base.
         """
         if not 1 <= number <= 40:
-            raise InputError(f"the wall has boundary points 1 to 40 (Fig. 2), there is no point {number}")
+            raise InputError(
+                f"the wall has boundary points 1 to 40 (Fig. 2), there is no point {number}"
+            )
         dx, dy = self.width / 8.0, self.height / 12.0
         if number <= 12:
             return self.width, number * dy
@@ -104,16 +112,24 @@ class WallModel:
         return surface.bilateral_everywhere() if case == "bilateral" else surface
 
     def problem(
-        self, case: str, *, excitation: Excitation | Sequence[Excitation] | None = None,
-        impact: ImpactLaw | None = Inelastic(), mass: MassLaw | None = None,
+        self,
+        case: str,
+        *,
+        excitation: Excitation | Sequence[Excitation] | None = None,
+        impact: ImpactLaw | None = Inelastic(),
+        mass: MassLaw | None = None,
     ) -> ContactProblem:
         """Set up the wall in a case; by default the harmonic of Fig. 3 and the source's inelastic impact on its mass.
 
         Schemes with massless contact nodes take impact=None and their own mass; an impact law runs on consistent mass.
         """
-        return ContactProblem(self.system, self.surface(case), impact=impact,
-                              mass=ConsistentMass() if impact is not None and mass is None else mass,
-                              excitation=self.harmonic() if excitation is None else excitation)
+        return ContactProblem(
+            self.system,
+            self.surface(case),
+            impact=impact,
+            mass=ConsistentMass() if impact is not None and mass is None else mass,
+            excitation=self.harmonic() if excitation is None else excitation,
+        )
 
     def harmonic(self, amplitude: float = 1.0) -> Harmonic:
         """Return a_g = a0 sin(2 pi f t), f = f1/2. CHOSEN: Fig. 3 prints neither amplitude nor period; a0 = 1 m/s²."""
@@ -137,6 +153,13 @@ def build(wall: Wall, comm: Any, *, weight: bool = False, base_inertia: str = "w
     check_word("base_inertia", base_inertia, list(BASE_INERTIA))
     mesh, tags = build_mesh(wall.mesh(), comm)
     loads = (BodyForce((0.0, -wall.material.rho * STANDARD_GRAVITY)),) if weight else ()
-    system = assemble(mesh, wall.material, section=PlaneStress(wall.thickness), clamped=tags["base"], loads=loads,
-                      damping=wall.damping, base_inertia=base_inertia == "whole")
+    system = assemble(
+        mesh,
+        wall.material,
+        section=PlaneStress(wall.thickness),
+        clamped=tags["base"],
+        loads=loads,
+        damping=wall.damping,
+        base_inertia=base_inertia == "whole",
+    )
     return WallModel(wall, mesh, tags, replace(system, notes=(BASE_INERTIA[base_inertia],)))

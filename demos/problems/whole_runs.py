@@ -76,7 +76,9 @@ class RunComparison:
         """Add one more step. Collective."""
         surface, system, mean = report.problem.surface, report.problem.system, report.balance
         load = surface.reaction_load(mean.r_n, system.rows, mean.r_t)
-        force = 0.0 - surface.comm.sum(system.influence.T @ surface.along_axes(load))  # on the body [N]
+        force = 0.0 - surface.comm.sum(
+            system.influence.T @ surface.along_axes(load)
+        )  # on the body [N]
         if not self.times:
             self._note(surface, report.old, np.zeros_like(force))
         self._note(surface, report.new, self.impulse[-1] + (report.new.t - report.old.t) * force)
@@ -94,28 +96,56 @@ class RunComparison:
         mine, theirs = np.array(self.impulse), np.asarray(reference.impulse, float)
         t = np.asarray(reference.times, float)
         common = (t >= self.times[0]) & (t <= self.times[-1] * (1.0 + 1e-12))
-        if theirs.shape != (len(t), mine.shape[1]) or not common.any() or not np.isfinite(theirs).all():
-            raise InputError(f"{reference.name}: impulses of shape {theirs.shape}, {common.sum()} common times; give "
-                             f"finite ones, {mine.shape[1]} components each, at times of the run")
+        if (
+            theirs.shape != (len(t), mine.shape[1])
+            or not common.any()
+            or not np.isfinite(theirs).all()
+        ):
+            raise InputError(
+                f"{reference.name}: impulses of shape {theirs.shape}, {common.sum()} common times; give "
+                f"finite ones, {mine.shape[1]} components each, at times of the run"
+            )
         at = np.array([np.interp(t[common], self.times, column) for column in mine.T]).T
         off = float(np.linalg.norm(at - theirs[common], axis=1).max())
         size = float(np.linalg.norm(theirs[common], axis=1).max())
-        away = max_abs(np.interp(t[common], self.times, self.towards) - np.asarray(reference.mean_towards)[common])
-        return RunDifference(reference.name, off / (size or 1.0), away / (self.largest or 1.0), bound)
+        away = max_abs(
+            np.interp(t[common], self.times, self.towards)
+            - np.asarray(reference.mean_towards)[common]
+        )
+        return RunDifference(
+            reference.name, off / (size or 1.0), away / (self.largest or 1.0), bound
+        )
 
 
 def compare_runs(
-    problem: vc.ContactProblem, references: Sequence[Reference], *, scheme: Scheme | None = None,
-    solver: Solver | None = None, dt: TimeSteps, steps: int, state: State | None = None, bound: float = 0.02,
+    problem: vc.ContactProblem,
+    references: Sequence[Reference],
+    *,
+    scheme: Scheme | None = None,
+    solver: Solver | None = None,
+    dt: TimeSteps,
+    steps: int,
+    state: State | None = None,
+    bound: float = 0.02,
 ) -> list[RunDifference]:
     """March the problem and return how far each reference is off, for example ``Reference.of`` a ``bem.ContactRun``.
 
     Impulses and mean displacements should agree within ``bound``, relative; the rest as in ``march``.
     """
-    for one in several("compare_runs", "references", references, "give a list of answers of other methods"):
-        instance("compare_runs", "a reference", one, Reference, "give Reference.of(a bem.ContactRun), for example")
+    for one in several(
+        "compare_runs", "references", references, "give a list of answers of other methods"
+    ):
+        instance(
+            "compare_runs",
+            "a reference",
+            one,
+            Reference,
+            "give Reference.of(a bem.ContactRun), for example",
+        )
     number("compare_runs", "bound", bound, positive=True)
     whole = RunComparison()
-    for _, report in vc.march(problem, scheme=scheme, solver=solver, dt=dt, steps=steps, state=state):
+    for _, report in vc.march(
+        problem, scheme=scheme, solver=solver, dt=dt, steps=steps, state=state
+    ):
         whole.add(report)
     return [whole.compare(reference, bound) for reference in references]

@@ -79,7 +79,9 @@ def files(entry: Entry) -> dict[str, str]:
     for name, words in entry.get("blocks", {}).items():
         language, number = words.split()
         text = (ROOT / entry["page"]).read_text(encoding="utf-8")
-        blocks = re.findall(rf"^```{re.escape(language)}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+        blocks = re.findall(
+            rf"^```{re.escape(language)}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL
+        )
         found[name] = blocks[int(number) - 1]
     return found
 
@@ -96,7 +98,9 @@ def imported(path: Path, seen: set[Path]) -> set[Path]:
         elif isinstance(node, ast.ImportFrom):
             base = "." * node.level + (node.module or "")
             if node.level:
-                base = ".".join([*path.relative_to(ROOT).parts[: -node.level], *filter(None, [node.module])])
+                base = ".".join(
+                    [*path.relative_to(ROOT).parts[: -node.level], *filter(None, [node.module])]
+                )
             names = [base, *(f"{base}.{one.name}" for one in node.names)]
         for name in names:
             if name.split(".")[0] in ("demos", "meshes"):
@@ -112,7 +116,11 @@ def key(name: str, entry: Entry) -> str:
     used = imported(ROOT / "demos" / f"{name}.py", set())
     for script in scripts:
         imported(ROOT / script, used)
-    used |= {path for path in (ROOT / "vi_contact").rglob("*") if path.suffix in (".py", ".toml", ".geo", ".csv")}
+    used |= {
+        path
+        for path in (ROOT / "vi_contact").rglob("*")
+        if path.suffix in (".py", ".toml", ".geo", ".csv")
+    }
     given = [entry["commands"], entry["pictures"], *files(entry).items()]
     told = hashlib.sha256(json.dumps(given).encode())
     for path in sorted(used):
@@ -131,19 +139,34 @@ def make(name: str, entry: Entry) -> dict[str, Any]:
     for file, text in files(entry).items():
         (place / "run" / file).write_text(text, encoding="utf-8")
     script = SHELL.format(
-        root=ROOT, commands="\n".join(entry["commands"]), palette=PALETTE,
-        pictures=" ".join(f'"{source}" "{place / picture}"' for picture, source in entry["pictures"].items()),
+        root=ROOT,
+        commands="\n".join(entry["commands"]),
+        palette=PALETTE,
+        pictures=" ".join(
+            f'"{source}" "{place / picture}"' for picture, source in entry["pictures"].items()
+        ),
     )
     start = time.monotonic()
-    with (place / "printed.txt").open("w") as printed, (place / "complaints.txt").open("w") as complaints:
-        started = subprocess.Popen(["bash", "-c", script], cwd=place / "run", stdout=printed, stderr=complaints)
-        _, status, used = os.wait4(started.pid, 0)  # the times of this entry, not of those beside it
+    with (
+        (place / "printed.txt").open("w") as printed,
+        (place / "complaints.txt").open("w") as complaints,
+    ):
+        started = subprocess.Popen(
+            ["bash", "-c", script], cwd=place / "run", stdout=printed, stderr=complaints
+        )
+        _, status, used = os.wait4(
+            started.pid, 0
+        )  # the times of this entry, not of those beside it
         started.returncode = os.waitstatus_to_exitcode(status)
     if started.returncode:
         said = (place / "complaints.txt").read_text(encoding="utf-8", errors="replace")
         raise RuntimeError(f"gallery: {name} failed:\n{said[-2000:].rstrip()}")
     shutil.rmtree(place / "run")
-    told = {"key": now, "processor": used.ru_utime + used.ru_stime, "wall": time.monotonic() - start}
+    told = {
+        "key": now,
+        "processor": used.ru_utime + used.ru_stime,
+        "wall": time.monotonic() - start,
+    }
     note.write_text(json.dumps(told))
     return told | {"cached": False}
 
@@ -153,7 +176,9 @@ def agree(line: str, other: str) -> bool:
     if NUMBER.sub("#", line).split() != NUMBER.sub("#", other).split():
         return False
     pairs = zip(map(float, NUMBER.findall(line)), map(float, NUMBER.findall(other)), strict=True)
-    return all(abs(a - b) <= NEAR * max(abs(a), abs(b)) or residuals(abs(a), abs(b)) for a, b in pairs)
+    return all(
+        abs(a - b) <= NEAR * max(abs(a), abs(b)) or residuals(abs(a), abs(b)) for a, b in pairs
+    )
 
 
 def residuals(size: float, other: float) -> bool:
@@ -175,7 +200,11 @@ def said(entry: Entry) -> list[str]:
 
 def compare(name: str, entry: Entry) -> list[str]:
     """Return a complaint for each line of the page that the run did not print, in that order."""
-    printed, missing, at = (MADE / name / "printed.txt").read_text(encoding="utf-8").splitlines(), [], 0
+    printed, missing, at = (
+        (MADE / name / "printed.txt").read_text(encoding="utf-8").splitlines(),
+        [],
+        0,
+    )
     for line in said(entry):
         found = next((k for k in range(at, len(printed)) if agree(line, printed[k])), None)
         if found is None:
@@ -194,25 +223,35 @@ def index() -> str:
         lines += ["", f"## {group['title']}", "", "| " * COLUMNS + "|", "|---" * COLUMNS + "|"]
         cells = [cell(every[name]) for name in group["entries"]]
         cells += [" "] * (-len(cells) % COLUMNS)
-        lines += [f"| {' | '.join(cells[k : k + COLUMNS])} |" for k in range(0, len(cells), COLUMNS)]
+        lines += [
+            f"| {' | '.join(cells[k : k + COLUMNS])} |" for k in range(0, len(cells), COLUMNS)
+        ]
     pages = dict.fromkeys(entry["page"].partition(".md")[0] for entry in every.values())
-    return "\n".join([*lines, "", raw["foot"].strip(), "", "```{toctree}", ":hidden:", "", *pages, "```", ""])
+    return "\n".join(
+        [*lines, "", raw["foot"].strip(), "", "```{toctree}", ":hidden:", "", *pages, "```", ""]
+    )
 
 
 def cell(entry: Entry) -> str:
     """Return the picture of an entry, its title, its sentence and its first command, in a line."""
     picture, page, (first, *more) = next(iter(entry["pictures"])), entry["page"], entry["commands"]
     others = f" and [{len(more)} more commands]({page})" if more else ""
-    return (f"[![{entry['title']}](../figures/{picture})]({page}) **[{entry['title']}]({page}).** {entry['sentence']} "
-            f"`{first}`{others}")
+    return (
+        f"[![{entry['title']}](../figures/{picture})]({page}) **[{entry['title']}]({page}).** {entry['sentence']} "
+        f"`{first}`{others}"
+    )
 
 
 def main(words: Sequence[str]) -> int:
     """Do what the command line says."""
     options = argparse.ArgumentParser(prog="make.py", description=(__doc__ or "").splitlines()[0])
     options.add_argument("--only", nargs="+", metavar="NAME", help="these entries alone")
-    options.add_argument("--jobs", type=int, default=JOBS, help=f"how many run at the same time; {JOBS} without it")
-    options.add_argument("--into", type=Path, metavar="DIR", help="replace the pictures of the same name there")
+    options.add_argument(
+        "--jobs", type=int, default=JOBS, help=f"how many run at the same time; {JOBS} without it"
+    )
+    options.add_argument(
+        "--into", type=Path, metavar="DIR", help="replace the pictures of the same name there"
+    )
     options.add_argument("--store", action="store_true", help="put the pictures into docs/figures")
     options.add_argument("--index", action="store_true", help="write index.md, and run nothing")
     given = options.parse_args(words)
@@ -223,7 +262,10 @@ def main(words: Sequence[str]) -> int:
     every = gallery | page_entries()
     unknown = sorted(set(given.only or ()) - set(every))
     if unknown:
-        print(f"gallery: no entry {', '.join(unknown)}: choose from {', '.join(every)}", file=sys.stderr)
+        print(
+            f"gallery: no entry {', '.join(unknown)}: choose from {', '.join(every)}",
+            file=sys.stderr,
+        )
         return 2
     names, wrong, total = given.only or list(every), 0, 0.0
     with ThreadPoolExecutor(max(1, given.jobs)) as pool:
@@ -238,7 +280,9 @@ def main(words: Sequence[str]) -> int:
             total += 0.0 if told["cached"] else told["processor"]
             before = ", made before" if told["cached"] else ""
             print(f"{name:<22} {told['processor']:7.1f} s of a processor{before}", flush=True)
-            lines = compare(name, every[name]) if name in gallery else []  # tests compare those of other pages
+            lines = (
+                compare(name, every[name]) if name in gallery else []
+            )  # tests compare those of other pages
             for complaint in (*lines, *keep(name, every[name], given.into, given.store)):
                 wrong += 1
                 print(f"gallery: {complaint}", file=sys.stderr, flush=True)

@@ -17,9 +17,22 @@ from pathlib import Path
 
 FOLDER = Path(__file__).resolve().parent
 ROOT = FOLDER.parents[1]
-NAMES = ("bouncing_bar", "obstacle_membrane", "signorini_square", "shaken_wall", "own_scheme", "bad_mesh")
-SHOWN = {"bouncing_bar": 3, "obstacle_membrane": 1, "signorini_square": 2, "shaken_wall": 2, "own_scheme": 1,
-         "bad_mesh": 1}  # number of the picture in docs/figures
+NAMES = (
+    "bouncing_bar",
+    "obstacle_membrane",
+    "signorini_square",
+    "shaken_wall",
+    "own_scheme",
+    "bad_mesh",
+)
+SHOWN = {
+    "bouncing_bar": 3,
+    "obstacle_membrane": 1,
+    "signorini_square": 2,
+    "shaken_wall": 2,
+    "own_scheme": 1,
+    "bad_mesh": 1,
+}  # number of the picture in docs/figures
 
 
 def cells(name: str) -> list[str]:
@@ -46,7 +59,9 @@ def run(name: str, out: Path) -> None:
     pyplot.show = show
     here, began = Path.cwd(), time.process_time()
     try:
-        exec(compile("\n".join(cells(name)), name, "exec"), {"__name__": "__main__"})  # programs of this clone
+        exec(
+            compile("\n".join(cells(name)), name, "exec"), {"__name__": "__main__"}
+        )  # programs of this clone
     finally:
         os.chdir(here)
     show()
@@ -59,17 +74,31 @@ def show_in(site: Path) -> None:
         page = (site / "docs" / "notebooks" / f"{name}.html").read_text(encoding="utf-8")
         pictures = re.findall(r'src="\.\./\.\./_images/([0-9a-f]+\.png)"', page)
         if len(pictures) < SHOWN[name]:
-            raise SystemExit(f"{name}: its page has {len(pictures)} pictures, and number {SHOWN[name]} is wanted")
-        shutil.copyfile(site / "_images" / pictures[SHOWN[name] - 1], site / "_images" / f"notebook_{name}.png")
+            raise SystemExit(
+                f"{name}: its page has {len(pictures)} pictures, and number {SHOWN[name]} is wanted"
+            )
+        shutil.copyfile(
+            site / "_images" / pictures[SHOWN[name] - 1], site / "_images" / f"notebook_{name}.png"
+        )
 
 
 def main() -> None:
     """Run those that are named, or all."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"one of {', '.join(NAMES)}; all when left out")
-    parser.add_argument("--out", type=Path, default=ROOT / "results" / "notebooks", help="where pictures go")
-    parser.add_argument("--figures", action="store_true", help="one picture of each into docs/figures too")
-    parser.add_argument("--site", type=Path, metavar="DIR", help="a built site: run none, show their pictures there")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "names", nargs="*", metavar="NAME", help=f"one of {', '.join(NAMES)}; all when left out"
+    )
+    parser.add_argument(
+        "--out", type=Path, default=ROOT / "results" / "notebooks", help="where pictures go"
+    )
+    parser.add_argument(
+        "--figures", action="store_true", help="one picture of each into docs/figures too"
+    )
+    parser.add_argument(
+        "--site", type=Path, metavar="DIR", help="a built site: run none, show their pictures there"
+    )
     given = parser.parse_args()
     if given.site:
         return show_in(given.site)
@@ -81,7 +110,10 @@ def main() -> None:
     for name in given.names or NAMES:
         run(name, out)
         if given.figures:
-            shutil.copy(out / f"{name}_{SHOWN[name]}.png", ROOT / "docs" / "figures" / f"notebook_{name}.png")
+            shutil.copy(
+                out / f"{name}_{SHOWN[name]}.png",
+                ROOT / "docs" / "figures" / f"notebook_{name}.png",
+            )
 
 
 if __name__ == "__main__":

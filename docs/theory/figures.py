@@ -72,7 +72,14 @@ def bar(case: Any, n: int, *, damping: float = 0.0, **more: Any) -> vc.ContactPr
 
 def simulated(problem: vc.ContactProblem, scheme: Any, dt: float, t_end: float) -> Any:
     """The history and the facts of a run."""
-    found = vc.simulate(problem, scheme=scheme, dt=dt, t_end=t_end, record=(vc.Energy(), vc.Contact()), progress=False)
+    found = vc.simulate(
+        problem,
+        scheme=scheme,
+        dt=dt,
+        t_end=t_end,
+        record=(vc.Energy(), vc.Contact()),
+        progress=False,
+    )
     return found.history, found.facts
 
 
@@ -103,11 +110,16 @@ def inequality(path: Path) -> list[str]:
                 label=f"slope -{r:g} N = $-r_n$",
             )
     left.set(
-        xlabel="displacement u [m]", ylabel="energy J(u) [J]", ylim=(-0.4, 0.4), title="minimum over $u \\leq g_0$"
+        xlabel="displacement u [m]",
+        ylabel="energy J(u) [J]",
+        ylim=(-0.4, 0.4),
+        title="minimum over $u \\leq g_0$",
     )
     left.legend(fontsize=8, loc="lower left")
     corner = np.array([[0.0, 7.0], [0.0, 0.0], [0.06, 0.0]])
-    right.plot(1e3 * corner[:, 0], corner[:, 1], color=GREY, lw=5, solid_joinstyle="miter", zorder=0)
+    right.plot(
+        1e3 * corner[:, 0], corner[:, 1], color=GREY, lw=5, solid_joinstyle="miter", zorder=0
+    )
     for f in range(0, 11, 2):
         state = vc.static_equilibrium(spring_mass(float(f)))
         gap, r = g0 - float(state.u[0]), float(state.r_n[0])
@@ -133,15 +145,26 @@ def inequality(path: Path) -> list[str]:
 def step(path: Path) -> list[str]:
     """The quadratic program of a midpoint step of two masses, and the energies that schemes leave to an oscillator."""
     dt, figure, axes = 0.05, *pair()
-    ((_, report),) = vc.march(two_masses(), scheme=vc.Midpoint(), solver=vc.Condensed(), dt=dt, steps=1)
+    ((_, report),) = vc.march(
+        two_masses(), scheme=vc.Midpoint(), solver=vc.Condensed(), dt=dt, steps=1
+    )
     one, x, r = report.step, report.result.x, report.result.r_n
     A = np.column_stack([one.A.image(e) for e in np.eye(2)])
     free = np.linalg.solve(A, one.b)
     X, Y = np.meshgrid(np.linspace(0.0, 0.06, 121), np.linspace(-0.01, 0.05, 121))
-    J = 0.5 * (A[0, 0] * X**2 + 2.0 * A[0, 1] * X * Y + A[1, 1] * Y**2) - one.b[0] * X - one.b[1] * Y
+    J = (
+        0.5 * (A[0, 0] * X**2 + 2.0 * A[0, 1] * X * Y + A[1, 1] * Y**2)
+        - one.b[0] * X
+        - one.b[1] * Y
+    )
     left, right = axes
     left.contour(
-        1e3 * X, 1e3 * Y, J - J.min(), levels=np.array([0.02, 0.08, 0.2, 0.4, 0.7, 1.1, 1.6]), colors=GREY, linewidths=1
+        1e3 * X,
+        1e3 * Y,
+        J - J.min(),
+        levels=np.array([0.02, 0.08, 0.2, 0.4, 0.7, 1.1, 1.6]),
+        colors=GREY,
+        linewidths=1,
     )
     for bound, span, line in zip(
         1e3 * one.bound, (left.axvspan, left.axhspan), (left.axvline, left.axhline), strict=True
@@ -152,7 +175,11 @@ def step(path: Path) -> list[str]:
     left.plot(*(1e3 * x), "o", color=BLUE, ms=9, label="x, the answer")
     left.annotate("", 1e3 * x, 1e3 * free, arrowprops={"arrowstyle": "->", "color": "black"})
     left.set(
-        xlabel="$x_1$ [mm]", ylabel="$x_2$ [mm]", xlim=(0, 60), ylim=(-10, 50), title="one step: a quadratic program"
+        xlabel="$x_1$ [mm]",
+        ylabel="$x_2$ [mm]",
+        xlim=(0, 60),
+        ylim=(-10, 50),
+        title="one step: a quadratic program",
     )
     left.legend(fontsize=8, loc="lower right")
     kept = {}
@@ -163,11 +190,16 @@ def step(path: Path) -> list[str]:
     }
     for (name, scheme), look in zip(schemes.items(), ("-", "--", ":"), strict=True):
         h, _ = simulated(released(), scheme, dt, 60 * dt)
-        total = (h["energy_kinetic"] + h["energy_strain"]) / (h["energy_kinetic"] + h["energy_strain"])[0]
+        total = (h["energy_kinetic"] + h["energy_strain"]) / (
+            h["energy_kinetic"] + h["energy_strain"]
+        )[0]
         kept[name] = total[20]
         right.plot(h["t"], total, look, color="black", label=name)
     right.set(
-        xlabel="time [s]", ylabel="energy / energy at the start [-]", ylim=(0, 1.1), title="what φ does, no contact"
+        xlabel="time [s]",
+        ylabel="energy / energy at the start [-]",
+        ylim=(0, 1.1),
+        title="what φ does, no contact",
     )
     right.legend(fontsize=8, loc="center right")
     save(figure, path)
@@ -200,9 +232,13 @@ def blow_up(path: Path) -> list[str]:
     figure, axes = pair(5, 2.1, sharex=True)
     phrases, fine = [], np.linspace(0.0, case.period, 3000)
     top = float(exact(fine).max())
-    for (name, (scheme, mass)), axis, look in zip(schemes.items(), axes, (RED, BLUE, GREEN, "black"), strict=False):
+    for (name, (scheme, mass)), axis, look in zip(
+        schemes.items(), axes, (RED, BLUE, GREEN, "black"), strict=False
+    ):
         h, _ = simulated(bar(case, n, mass=mass), scheme, dt, case.period)
-        change = h["energy_kinetic"] + h["energy_strain"] - h["work_input"]  # weight is in the input
+        change = (
+            h["energy_kinetic"] + h["energy_strain"] - h["work_input"]
+        )  # weight is in the input
         energy = 1.0 + (change - change[0]) / case.energy
         force = h["contact_resultant"]
         axis.plot(fine, exact(fine), color=GREY, lw=3, label="exact")
@@ -244,19 +280,26 @@ def certificate(path: Path) -> list[str]:
     worst = np.array([report.certificate.worst for report in reports])
     spoiled = np.array(
         [
-            kkt_residual(report.step, replace(report.result, r_n=report.result.r_n * (1.0 + 1e-5))).worst
+            kkt_residual(
+                report.step, replace(report.result, r_n=report.result.r_n * (1.0 + 1e-5))
+            ).worst
             for report in reports
         ]
     )
     t, floor = [report.new.t for report in reports], 1e-17
     left, middle, right = axes
-    left.semilogy(t, np.maximum(spoiled, floor), color=RED, lw=1, label="reactions too large by 1e-5")
+    left.semilogy(
+        t, np.maximum(spoiled, floor), color=RED, lw=1, label="reactions too large by 1e-5"
+    )
     left.semilogy(t, np.maximum(worst, floor), color="black", lw=1, label="as solved")
     left.set(xlabel="time [s]", ylabel="certificate [-]", title="every step")
     inside = reports[len(reports) * 2 // 3]
     sizes = 10.0 ** np.arange(-16, 0.5, 0.5)
     for what, look in (("reaction", "o-"), ("foot", "s--")):
-        residuals = [kkt_residual(inside.step, spoil(inside.result, inside.step, what, size)).worst for size in sizes]
+        residuals = [
+            kkt_residual(inside.step, spoil(inside.result, inside.step, what, size)).worst
+            for size in sizes
+        ]
         middle.loglog(
             sizes,
             np.maximum(residuals, floor),
@@ -266,7 +309,9 @@ def certificate(path: Path) -> list[str]:
             color="black" if what == "foot" else RED,
             label={"reaction": "reaction too large", "foot": "foot in the wall"}[what],
         )
-    middle.set(xlabel="relative size of the fault [-]", ylabel="certificate [-]", title="a spoiled step")
+    middle.set(
+        xlabel="relative size of the fault [-]", ylabel="certificate [-]", title="a spoiled step"
+    )
     counts, errors, tops = (10, 20, 40, 80, 160), [], []
     for n in counts:
         error, top = velocity_error(case, n)
@@ -279,12 +324,19 @@ def certificate(path: Path) -> list[str]:
         axis.axhline(1e-9, color=GREEN, ls="--", lw=1.5, label="tolerance")
         axis.set_ylim(1e-17, 10.0)
         axis.legend(
-            fontsize=7.5, loc="lower right" if axis is middle else "upper right" if axis is left else "center right"
+            fontsize=7.5,
+            loc="lower right"
+            if axis is middle
+            else "upper right"
+            if axis is left
+            else "center right",
         )
     save(figure, path)
     assert worst.max() < 1e-13 and max(tops) < 1e-13
     told = spoiled[[report.new.active.any() for report in reports]]
-    largest = 1e-5 * 1e-9 / np.median(told)  # the largest fault of the reaction that the tolerance accepts
+    largest = (
+        1e-5 * 1e-9 / np.median(told)
+    )  # the largest fault of the reaction that the tolerance accepts
     tolerated = f"${1e6 * largest:.0f} \\cdot 10^{{-6}}$"
     slope = np.log(errors[-1] / errors[0]) / np.log(counts[-1] / counts[0])
     return [
@@ -326,7 +378,9 @@ class Careless(vc.ZienkiewiczWoodTaylor):
 
     def finish(self, problem: Any, state: Any, step: Any, result: Any, dt: float) -> Any:
         """Return the state with v1 = (u1 - u0)/dt."""
-        return replace(super().finish(problem, state, step, result, dt), v=(result.x - state.u) / dt)
+        return replace(
+            super().finish(problem, state, step, result, dt), v=(result.x - state.u) / dt
+        )
 
 
 def ledger(path: Path) -> list[str]:
@@ -351,10 +405,20 @@ def ledger(path: Path) -> list[str]:
         labels=list(terms.values()),
         colors=["#9ecae1", "#3182bd", "#fdae6b", "#a1d99b", "#d62728", "0.6"],
     )
-    left.set(xlabel="time [s]", ylabel="share of E(0) [-]", ylim=(0, 1.02), xlim=(0, end), title="a closed ledger")
+    left.set(
+        xlabel="time [s]",
+        ylabel="share of E(0) [-]",
+        ylim=(0, 1.02),
+        xlim=(0, end),
+        title="a closed ledger",
+    )
     left.legend(fontsize=8, loc="lower left", framealpha=0.9)
     right.semilogy(
-        h["t"], np.maximum(np.abs(h["energy_defect"]) / start, 1e-17), color="black", lw=1, label="sound scheme"
+        h["t"],
+        np.maximum(np.abs(h["energy_defect"]) / start, 1e-17),
+        color="black",
+        lw=1,
+        label="sound scheme",
     )
     faulty, wrong = simulated(bar(case, n), Careless(), dt, end)
     scale = (faulty["energy_kinetic"] + faulty["energy_strain"])[0]
@@ -373,7 +437,9 @@ def ledger(path: Path) -> list[str]:
         ls="--",
         label="certificate of the faulty one",
     )
-    right.set(xlabel="time [s]", ylabel="|defect| / E(0) [-]", ylim=(1e-17, 10), title="an open one")
+    right.set(
+        xlabel="time [s]", ylabel="|defect| / E(0) [-]", ylim=(1e-17, 10), title="an open one"
+    )
     right.legend(fontsize=8, loc="center right")
     save(figure, path)
     shares = {name: h[name][-1] / start for name in terms}
@@ -387,19 +453,25 @@ def ledger(path: Path) -> list[str]:
 
 def condensation(path: Path) -> list[str]:
     """The Delassus operator of a block's face: the matrix, and how it decays, step by step longer."""
-    problem = hanging_block((1.0, 0.5), (60, 30), (0.0, -300.0), gap=0.001, mass=vc.ConsistentMass())
+    problem = hanging_block(
+        (1.0, 0.5), (60, 30), (0.0, -300.0), gap=0.001, mass=vc.ConsistentMass()
+    )
     surface, c = problem.surface, np.sqrt(1000.0 * 0.7 / (1.3 * 0.4))
     order = np.argsort(surface.points[:, 0])
     position, flexibility = surface.points[order, 0], {}
     for courant in (1.0, 4.0, 16.0):
         dt = courant / 60.0 / c
         A = vc.Midpoint().effective_matrix(problem, dt)
-        flexibility[courant] = vc.Condensed().prepare(A, surface, 2.0).delassus[np.ix_(order, order)]
+        flexibility[courant] = (
+            vc.Condensed().prepare(A, surface, 2.0).delassus[np.ix_(order, order)]
+        )
     figure, (left, right) = pair(height=4.2, lattice=False)
     G = np.abs(flexibility[16.0])
     image = left.imshow(np.log10(G / G.max()), cmap="viridis", extent=(0, 1, 1, 0), vmin=-4, vmax=0)
     figure.colorbar(image, ax=left, label="$\\log_{10}(|G_{ij}|$ / largest) [-]", shrink=0.85)
-    left.set(xlabel="place of point j [m]", ylabel="place of point i [m]", title="G at Courant number 16")
+    left.set(
+        xlabel="place of point j [m]", ylabel="place of point i [m]", title="G at Courant number 16"
+    )
     middle, phrases = len(order) // 2, []
     far = position[middle:] - position[middle]
     for (courant, G), look in zip(flexibility.items(), ("-", "--", ":"), strict=True):
@@ -408,7 +480,10 @@ def condensation(path: Path) -> list[str]:
         if courant == 4.0:
             tail = (far > 0.15) & (far < 0.4)
             length = -1.0 / np.polyfit(far[tail], np.log(decay[tail]), 1)[0]
-            phrases = [f"$c_P \\Delta t/2 = {1e3 * 0.5 * courant / 60.0:.0f}$ mm", f"${1e3 * length:.0f}$ mm"]
+            phrases = [
+                f"$c_P \\Delta t/2 = {1e3 * 0.5 * courant / 60.0:.0f}$ mm",
+                f"${1e3 * length:.0f}$ mm",
+            ]
     right.set(
         xlabel="distance of the points [m]",
         ylabel="$|G_{ij}|$ / $G_{ii}$ [-]",
@@ -419,7 +494,9 @@ def condensation(path: Path) -> list[str]:
     right.legend(fontsize=8)
     right.grid(alpha=0.3)
     save(figure, path)
-    checked = vc.cross_check(problem, scheme=vc.Midpoint(), solvers=(vc.Condensed(), vc.Volume()), dt=1e-3, steps=40)
+    checked = vc.cross_check(
+        problem, scheme=vc.Midpoint(), solvers=(vc.Condensed(), vc.Volume()), dt=1e-3, steps=40
+    )
     assert checked.worst < 1e-9, checked.worst
     return [f"{problem.system.rows} unknowns", f"{surface.total} contact points", *phrases]
 
@@ -430,9 +507,17 @@ def friction(path: Path) -> list[str]:
     G, none, rates = np.array([[1.0, 0.5], [0.5, 1.0]]), np.zeros(1), []
     method = solvers.FixedPoint()
     for mu, look in zip((0.4, 1.0, 1.6), ("-", "--", ":"), strict=True):
-        found = method.prepare(G, np.zeros(1, dtype=bool)).solve(np.array([[-1.0, -3.0]]), none, np.array([mu]))
+        found = method.prepare(G, np.zeros(1, dtype=bool)).solve(
+            np.array([[-1.0, -3.0]]), none, np.array([mu])
+        )
         history = np.array(found.history)
-        left.semilogy(1 + np.arange(len(history)), history, look, color="black", label=f"one point, μ = {mu:g}")
+        left.semilogy(
+            1 + np.arange(len(history)),
+            history,
+            look,
+            color="black",
+            label=f"one point, μ = {mu:g}",
+        )
         rates.append(float((history[-1] / history[4]) ** (1.0 / (len(history) - 5))))
     problem, dt = rubbing_block(0.6)
     _, report = next(
@@ -447,7 +532,9 @@ def friction(path: Path) -> list[str]:
         )
     )
     history = report.result.history
-    left.semilogy(1 + np.arange(len(history)), history, "o-", ms=4, color=BLUE, label="block, μ = 0.6")
+    left.semilogy(
+        1 + np.arange(len(history)), history, "o-", ms=4, color=BLUE, label="block, μ = 0.6"
+    )
     left.set(
         xlabel="Tresca problems [-]",
         ylabel="relative change of the limits [-]",
@@ -464,7 +551,14 @@ def friction(path: Path) -> list[str]:
     right.fill_between([0.0, top], [0.0, -0.6 * top], [0.0, 0.6 * top], color="0.92", zorder=0)
     right.plot([0.0, top], [0.0, 0.6 * top], color="0.4", lw=1)
     right.plot([0.0, top], [0.0, -0.6 * top], color="0.4", lw=1)
-    right.plot((r_n / weights)[sticks], (r_t / weights)[sticks], "o", mfc="none", color=BLUE, label="sticks")
+    right.plot(
+        (r_n / weights)[sticks],
+        (r_t / weights)[sticks],
+        "o",
+        mfc="none",
+        color=BLUE,
+        label="sticks",
+    )
     right.plot((r_n / weights)[slides], (r_t / weights)[slides], "o", color=RED, label="slips")
     right.set(
         xlabel="pressure $r_n$ / weight [Pa]",
@@ -474,7 +568,9 @@ def friction(path: Path) -> list[str]:
     )
     right.legend(fontsize=8, loc="lower right")
     save(figure, path)
-    assert np.allclose(r_t[slides], 0.6 * r_n[slides] * np.sign(slip[slides]), rtol=1e-9, atol=1e-9 * r_n.max())
+    assert np.allclose(
+        r_t[slides], 0.6 * r_n[slides] * np.sign(slip[slides]), rtol=1e-9, atol=1e-9 * r_n.max()
+    )
     assert np.all(np.abs(r_t[sticks]) <= 0.6 * r_n[sticks] * (1.0 + 1e-9))
     return [
         ", ".join(f"{rate:.2f}" for rate in rates[:2]) + f" and {rates[2]:.2f}",
@@ -488,7 +584,9 @@ def rubbing_block(mu: float) -> tuple[vc.ContactProblem, float]:
     return hanging_block((1.0, 1.0), (24, 24), (110.0, -200.0), friction=vc.Coulomb(mu)), 1.0
 
 
-def hanging_block(lengths: Any, divisions: Any, force: Any, gap: float = 0.0, **more: Any) -> vc.ContactProblem:
+def hanging_block(
+    lengths: Any, divisions: Any, force: Any, gap: float = 0.0, **more: Any
+) -> vc.ContactProblem:
     """A block that hangs from its clamped top over the ground and is moved by body forces."""
     from mpi4py import MPI
 
@@ -504,7 +602,9 @@ def hanging_block(lengths: Any, divisions: Any, force: Any, gap: float = 0.0, **
         loads=fem.BodyForce(force),
     )
     ground = vc.HalfSpace(point=(0.0, -gap), normal=(0.0, 1.0))
-    return vc.ContactProblem(system, fem.contact_surface(system, tags["bottom"], obstacle=ground), **more)
+    return vc.ContactProblem(
+        system, fem.contact_surface(system, tags["bottom"], obstacle=ground), **more
+    )
 
 
 def pair(rows: int = 2, height: float = 3.7, **more: Any) -> tuple[Any, Any]:
@@ -514,7 +614,8 @@ def pair(rows: int = 2, height: float = 3.7, **more: Any) -> tuple[Any, Any]:
 
 
 PAGES: dict[str, Callable[[Path], list[str]]] = {
-    one.__name__: one for one in (inequality, step, blow_up, certificate, ledger, condensation, friction)
+    one.__name__: one
+    for one in (inequality, step, blow_up, certificate, ledger, condensation, friction)
 }
 
 
@@ -530,7 +631,9 @@ def main() -> int:
     parser.add_argument("names", nargs="*", help=f"of {', '.join(PAGES)}; all when none is given")
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "figures")
     options = parser.parse_args()
-    logging.getLogger("vi_contact").setLevel(logging.ERROR)  # some schemes are here because they gain energy
+    logging.getLogger("vi_contact").setLevel(
+        logging.ERROR
+    )  # some schemes are here because they gain energy
     options.out.mkdir(parents=True, exist_ok=True)
     status = 0
     for name in options.names or PAGES:

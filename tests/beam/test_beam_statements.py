@@ -14,7 +14,10 @@ from demos.pictures import beam_statements as pictures
 from demos.problems.beam_statements import FACTORS, HEAD, Row, row, turning_points
 
 pytestmark = pytest.mark.serial
-WHOLE = (("A", 0.001), ("C", 2.0))  # with all forces, as in the table; the others with the whole force alone
+WHOLE = (
+    ("A", 0.001),
+    ("C", 2.0),
+)  # with all forces, as in the table; the others with the whole force alone
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +44,9 @@ def test_the_table_is_what_the_runs_give(printed: dict[tuple[str, float], list[s
             continue
         told = found.line().strip("| ").split(" | ")
         assert told[4:8] == cells[4:8] and told[9] == cells[9]
-        assert found.turning_points == counts(cells[2])[2:3] and found.swings == counts(cells[3])[2:3]
+        assert (
+            found.turning_points == counts(cells[2])[2:3] and found.swings == counts(cells[3])[2:3]
+        )
 
 
 def test_no_reading_has_both(printed: dict[tuple[str, float], list[str]]) -> None:
@@ -56,7 +61,9 @@ def test_no_reading_has_both(printed: dict[tuple[str, float], list[str]]) -> Non
 def test_turning_points() -> None:
     """Of a wave, of one with a small one on top, with and without a least swing."""
     t = np.linspace(0.0, 10.0 * np.pi, 5001)
-    assert turning_points(np.sin(t)) == 10 and turning_points(np.sin(t), 1.9) == 8  # 1 to the first, 1 after the last
+    assert (
+        turning_points(np.sin(t)) == 10 and turning_points(np.sin(t), 1.9) == 8
+    )  # 1 to the first, 1 after the last
     assert turning_points(np.sin(t), 2.1) == turning_points(t) == turning_points(np.zeros(9)) == 0
     rough = np.sin(t) + 0.01 * np.sin(200.0 * t)
     assert turning_points(rough) > 500 and turning_points(rough, 0.05) == 10
@@ -68,8 +75,17 @@ def test_the_demo(capsys: pytest.CaptureFixture[str]) -> None:
     rows = demo("beam_statements").main(quick=True, as_json=True)
     told = json.loads(capsys.readouterr().out)
     assert [(one["reading"], one["a2"]) for one in told] == [(one.reading, one.a2) for one in rows]
-    names = ("turning_points", "swings", "peak_contact_force", "friction_loss", "viscous_loss", "ratio", "statement_1",
-             "statement_2", "factors")
+    names = (
+        "turning_points",
+        "swings",
+        "peak_contact_force",
+        "friction_loss",
+        "viscous_loss",
+        "ratio",
+        "statement_1",
+        "statement_2",
+        "factors",
+    )
     assert all(name in one for one in told for name in names) and len(told) == 6
     assert not any(one["statement_1"] and one["statement_2"] for one in told)
 
@@ -77,7 +93,11 @@ def test_the_demo(capsys: pytest.CaptureFixture[str]) -> None:
 def test_the_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Both panels have labels; a line and a bar for each row."""
     seen = keep_figures(monkeypatch, pictures)
-    rows = [Row(name, a2, (1, 1, 2, 3), (1, 2, 2, 2), 1e5, 1.0, 10.0 * a2) for a2 in (0.001, 2.0) for name in "ABC"]
+    rows = [
+        Row(name, a2, (1, 1, 2, 3), (1, 2, 2, 2), 1e5, 1.0, 10.0 * a2)
+        for a2 in (0.001, 2.0)
+        for name in "ABC"
+    ]
     pictures.plot_statements(rows, tmp_path / "statements.png")
     swings, losses = seen[0].axes
     assert all("[" in axis.get_xlabel() and "[" in axis.get_ylabel() for axis in (swings, losses))

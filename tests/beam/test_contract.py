@@ -26,7 +26,9 @@ BEAM = TimoshenkoBeam(viscosity=0.001)
 ROD = Rod(viscosity=0.002, gap=0.05, body_force=lambda t: 20.0 * (t < 1.5))
 
 
-def histories(problem: vc.ContactProblem, dt: float, steps: int, **more: Any) -> tuple[Array, Array, Array, float]:
+def histories(
+    problem: vc.ContactProblem, dt: float, steps: int, **more: Any
+) -> tuple[Array, Array, Array, float]:
     """Tip deflection, r_n, r_t after every step, and the worst certificate."""
     rows, worst = [], 0.0
     for state, report in vc.march(problem, dt=dt, steps=steps, **more):
@@ -40,15 +42,21 @@ def histories(problem: vc.ContactProblem, dt: float, steps: int, **more: Any) ->
 def algorithm(friction: Any, elements: Elements, dt: float, steps: int, **given: Any) -> BeamRun:
     """Algorithm 10 with the seed's start."""
     given = {"normal_force": lambda t: PUSH, "mu": lambda t, rate: MU} | given
-    return run_beam(BeamStepper(BEAM, elements, dt, friction=friction, **given), published_start(), steps=steps)
+    return run_beam(
+        BeamStepper(BEAM, elements, dt, friction=friction, **given), published_start(), steps=steps
+    )
 
 
-@pytest.mark.parametrize("elements", [Elements(50), Elements(50, reduced_shear=False, published_end=True)])
+@pytest.mark.parametrize(
+    "elements", [Elements(50), Elements(50, reduced_shear=False, published_end=True)]
+)
 def test_exact_law_through_the_contract(elements: Elements) -> None:
     """Given force, Coulomb: Midpoint and the condensed solver do what Algorithm 10 does with the inequality itself;
     the tip slips, sticks and slips back."""
     law = vc.Coulomb(MU)
-    problem = beam_problem(BEAM, elements, normal_force=lambda t: PUSH, friction=law, start=published_start())
+    problem = beam_problem(
+        BEAM, elements, normal_force=lambda t: PUSH, friction=law, start=published_start()
+    )
     tip, r_n, friction, worst = histories(problem, 0.005, 400, scheme=vc.Midpoint())
     found = algorithm(ExactFriction(), elements, 0.005, 400)
     assert np.max(np.abs(tip - found.history["u_tip"][1:])) <= 1e-11
@@ -56,7 +64,10 @@ def test_exact_law_through_the_contract(elements: Elements) -> None:
     assert r_n == pytest.approx(PUSH, rel=1e-12) and worst <= 1e-12
     slip = found.history["slip"][1:]
     assert np.sum(slip == 0.0) > 40 and np.any(slip > 0.0) and np.any(slip < 0.0)
-    assert np.all(np.diff(found.energy) <= 1e-12) and np.max(np.abs(found.history["energy_defect"])) <= 1e-8
+    assert (
+        np.all(np.diff(found.energy) <= 1e-12)
+        and np.max(np.abs(found.history["energy_defect"])) <= 1e-8
+    )
 
 
 def test_convergence_as_eps_vanishes() -> None:
@@ -66,7 +77,9 @@ def test_convergence_as_eps_vanishes() -> None:
     errors = []
     for eps in (1e-4, 1e-5, 1e-6, 1e-7):
         found = algorithm(RegularisedFriction(eps), elements, 0.005, 300).history
-        errors.append([np.max(np.abs(found[name] - exact[name])) for name in ("u_tip", "loss_friction")])
+        errors.append(
+            [np.max(np.abs(found[name] - exact[name])) for name in ("u_tip", "loss_friction")]
+        )
     orders = -np.diff(np.log10(errors), axis=0)
     assert np.all(np.abs(orders - 1.0) < 0.12) and errors[-1][0] < 1e-4
 
@@ -76,7 +89,9 @@ def test_rate_dependent_friction() -> None:
     elements, apart = Elements(50), []
     for steps in (200, 400):
         law = vc.SlipRateCoulomb(lambda rate: published_mu(0.0, 1.0) * rate)
-        problem = beam_problem(BEAM, elements, normal_force=lambda t: PUSH, friction=law, start=published_start())
+        problem = beam_problem(
+            BEAM, elements, normal_force=lambda t: PUSH, friction=law, start=published_start()
+        )
         tip, _, _, worst = histories(problem, 1.0 / steps, steps, scheme=vc.Midpoint())
         found = algorithm(ExactFriction(), elements, 1.0 / steps, steps, mu=published_mu)
         apart.append(np.max(np.abs(tip - found.history["u_tip"][1:])))
@@ -103,8 +118,12 @@ def test_rod_of_period_three() -> None:
 
 def test_rod_ledger() -> None:
     """V9.1: midpoint rule with the inequality at the end of the step never creates energy; with viscosity it closes."""
-    problem = rod_problem(Rod(1.0, 1.0, 1.0, 1.0, viscosity=0.01, gap=0.1), Elements(40), Start(u=lambda x: -0.5 * x))
-    solution = vc.simulate(problem, scheme=vc.Midpoint(), dt=0.0125, steps=400, record=[vc.Energy()], progress=False)
+    problem = rod_problem(
+        Rod(1.0, 1.0, 1.0, 1.0, viscosity=0.01, gap=0.1), Elements(40), Start(u=lambda x: -0.5 * x)
+    )
+    solution = vc.simulate(
+        problem, scheme=vc.Midpoint(), dt=0.0125, steps=400, record=[vc.Energy()], progress=False
+    )
     history = solution.history
     assert np.all(np.diff(history["energy_kinetic"] + history["energy_strain"]) <= 1e-14)
     assert history["loss_contact"][-1] > 0.0 and history["loss_damping"][-1] > 0.0
@@ -117,7 +136,9 @@ def test_rod_comes_to_rest() -> None:
     rod = Rod(viscosity=0.05, gap=0.05, body_force=lambda t: 20.0, end_force=lambda t: 3.0)
     _, ringing, _, _ = histories(rod_problem(rod, Elements(40)), 0.01, 1500, scheme=vc.Midpoint())
     assert 0.5 * (ringing[-1] + ringing[-2]) == pytest.approx(52.0, abs=1e-3)
-    _, quiet, _, _ = histories(rod_problem(rod, Elements(40)), 0.01, 1500)  # default scheme: no mass at the tip
+    _, quiet, _, _ = histories(
+        rod_problem(rod, Elements(40)), 0.01, 1500
+    )  # default scheme: no mass at the tip
     assert quiet[-2:] == pytest.approx(52.0, abs=1e-3)
 
 
@@ -136,7 +157,9 @@ def test_rod_viscosity() -> None:
 @pytest.fixture(scope="module")
 def rubbing() -> tuple[Array, Array, Array, float]:
     """Rod and beam in one problem: touches, rubs, sticks, lets go."""
-    problem = rubbing_problem(ROD, BEAM, Elements(50), friction=vc.Coulomb(MU), start=published_start())
+    problem = rubbing_problem(
+        ROD, BEAM, Elements(50), friction=vc.Coulomb(MU), start=published_start()
+    )
     return histories(problem, 0.005, 400)
 
 
@@ -158,7 +181,9 @@ def test_the_rod_drives_the_friction(rubbing: tuple[Array, Array, Array, float])
 
 def test_schemes_agree(rubbing: tuple[Array, Array, Array, float]) -> None:
     """Impulses on velocities, whose forces do not ring, move the tip alike."""
-    problem = rubbing_problem(ROD, BEAM, Elements(50), friction=vc.Coulomb(MU), start=published_start())
+    problem = rubbing_problem(
+        ROD, BEAM, Elements(50), friction=vc.Coulomb(MU), start=published_start()
+    )
     tip, r_n, _, _ = histories(problem, 0.005, 400, scheme=vc.MoreauJean())
     assert np.max(np.abs(tip - rubbing[0])) < 0.01 * np.max(np.abs(tip))
     assert np.sum(r_n) == pytest.approx(np.sum(rubbing[1]), rel=5e-3)
@@ -166,14 +191,23 @@ def test_schemes_agree(rubbing: tuple[Array, Array, Array, float]) -> None:
 
 def test_records_and_ledger(tmp_path: Any) -> None:
     """``simulate`` with all recorders; the closed ledger includes the friction between rod and beam."""
-    problem = rubbing_problem(ROD, BEAM, Elements(20), friction=vc.Coulomb(MU), start=published_start())
+    problem = rubbing_problem(
+        ROD, BEAM, Elements(20), friction=vc.Coulomb(MU), start=published_start()
+    )
     probe = vc.Probe({"tip": (5.0, 0.0), "middle": (2.5, 0.0)})
     solution = vc.simulate(
-        problem, dt=0.01, steps=200, record=[vc.Energy(), vc.Contact(), probe], out=tmp_path, progress=False
+        problem,
+        dt=0.01,
+        steps=200,
+        record=[vc.Energy(), vc.Contact(), probe],
+        out=tmp_path,
+        progress=False,
     )
     history = solution.history
     assert solution.facts["energy_defect"] <= 1e-10 and history["loss_friction"][-1] > 1.0
-    assert history["u_x_tip"].max() == 0.05 and history["contact_max_slip"] == pytest.approx(np.abs(history["u_y_tip"]))
+    assert history["u_x_tip"].max() == 0.05 and history["contact_max_slip"] == pytest.approx(
+        np.abs(history["u_y_tip"])
+    )
     assert np.min(history["u_y_middle"]) > np.min(history["u_y_tip"])
     assert history["friction_force_y"].max() > 5.0 > -5.0 > history["friction_force_y"].min()
 
@@ -185,7 +219,9 @@ def test_bad_input() -> None:
     problem = rod_problem(Rod(), Elements(4))
     assert problem.system.space.find_nodes(np.array([[5.0], [1.3]])).tolist() == [4, 1]
     for x in (5.3, -0.3, 0.5):
-        with pytest.raises(InputError, match="away from the nearest node: give a point of the body"):
+        with pytest.raises(
+            InputError, match="away from the nearest node: give a point of the body"
+        ):
             problem.system.space.find_nodes(np.array([[x]]))
 
 
@@ -198,7 +234,9 @@ def test_ground_accelerates_the_mass_shared_with_the_clamp(published: bool) -> N
     mass = 3.0 * np.array([0.5, 0.5, 0.5, 0.25])
     assert rod_problem(rod, elements).system.inertia(np.ones(1)) == pytest.approx(mass, rel=1e-14)
     problem = rubbing_problem(rod, beam, elements, friction=vc.Coulomb(MU))
-    load = replace(problem, excitation=vc.FullSine(2.0, 1.0, direction=(1.0, -0.5))).equations.load(0.25)
+    load = replace(problem, excitation=vc.FullSine(2.0, 1.0, direction=(1.0, -0.5))).equations.load(
+        0.25
+    )
     expected = -2.0 * np.concatenate([mass, np.zeros(4), -0.5 * mass])
     assert load == pytest.approx(expected, rel=1e-14, abs=1e-14)
 
@@ -206,5 +244,7 @@ def test_ground_accelerates_the_mass_shared_with_the_clamp(published: bool) -> N
 def test_loads_that_stop_being_numbers() -> None:
     """The function and the time are named."""
     rod = Rod(end_force=lambda t: 1.0 if t < 0.05 else np.nan)
-    with pytest.raises(InputError, match=r"end_force\(0\.05\d* s\) is nan; give a finite number in N"):
+    with pytest.raises(
+        InputError, match=r"end_force\(0\.05\d* s\) is nan; give a finite number in N"
+    ):
         rod_forces(rod, Elements(4), dt=0.01, steps=20)

@@ -66,19 +66,30 @@ def test_exact_integration_locks(slenderness: float) -> None:
 
 def test_exact_integration_converges() -> None:
     """With order 2, from below, once h is small beside the depth; the seed's beam has depth sqrt(12)."""
-    errors = [1.0 - tip(SEED, Elements(n, reduced_shear=False)) / (bending(SEED) + shear(SEED)) for n in (50, 100, 200)]
+    errors = [
+        1.0 - tip(SEED, Elements(n, reduced_shear=False)) / (bending(SEED) + shear(SEED))
+        for n in (50, 100, 200)
+    ]
     assert errors[0] < 1e-3 and np.diff(np.log2(errors)) == pytest.approx([-2.0, -2.0], abs=0.01)
 
 
 def frequencies(beam: TimoshenkoBeam, *, end: str, count: int = 3) -> Array:
     """Angular frequencies [rad/s] of the clamped beam whose tip is free, or "guided": free to slide, not to turn."""
     KAG, EI, rho = beam.shear_stiffness, beam.bending_stiffness, beam.rho
-    free = {"free": (2, 3), "guided": (2, 1)}[end]  # what vanishes at the tip, of (u, theta, shear force, moment)
+    free = {"free": (2, 3), "guided": (2, 1)}[
+        end
+    ]  # what vanishes at the tip, of (u, theta, shear force, moment)
 
     def condition(omega: float) -> float:
         squared = rho * omega**2
-        A = np.array([[0.0, 1.0, 1.0 / KAG, 0.0], [0.0, 0.0, 0.0, 1.0 / EI],
-                      [-beam.area * squared, 0.0, 0.0, 0.0], [0.0, -beam.inertia * squared, -1.0, 0.0]])
+        A = np.array(
+            [
+                [0.0, 1.0, 1.0 / KAG, 0.0],
+                [0.0, 0.0, 0.0, 1.0 / EI],
+                [-beam.area * squared, 0.0, 0.0, 0.0],
+                [0.0, -beam.inertia * squared, -1.0, 0.0],
+            ]
+        )
         return float(np.linalg.det(expm(A * beam.length)[np.ix_(free, (2, 3))]))
 
     grid = np.linspace(1e-3, 15.0, 400)
@@ -101,7 +112,9 @@ def test_frequencies() -> None:
     M, S, load = beam_matrices(SEED, Elements(10))
     for matrix in (M.toarray(), S.toarray()):
         assert np.array_equal(matrix, matrix.T) and np.linalg.eigvalsh(matrix)[0] > 0.0
-    assert load.sum() == pytest.approx(SEED.length * 19.0 / 20.0)  # half an element's share is on the clamp
+    assert load.sum() == pytest.approx(
+        SEED.length * 19.0 / 20.0
+    )  # half an element's share is on the clamp
 
 
 def test_the_published_end_clamps_the_rotation() -> None:
@@ -109,7 +122,9 @@ def test_the_published_end_clamps_the_rotation() -> None:
     frequencies of the clamped-guided beam, first order; the free tip's are l³/3EI + l/KAG and 32 % lower."""
     guided = SEED.length**3 / (12.0 * SEED.bending_stiffness) + shear(SEED)
     errors = [tip(SEED, published_elements(n)) / guided - 1.0 for n in (1000, 2000, 4000)]
-    assert 0.0 < errors[2] < 0.005 and np.diff(np.log2(errors)) == pytest.approx([-1.0, -1.0], abs=0.01)
+    assert 0.0 < errors[2] < 0.005 and np.diff(np.log2(errors)) == pytest.approx(
+        [-1.0, -1.0], abs=0.01
+    )
     exact = frequencies(SEED, end="guided")
     away = [discrete(SEED, published_elements(n)) / exact - 1.0 for n in (500, 1000)]
     assert np.all(np.abs(away[1]) < 6e-3) and away[0] / away[1] == pytest.approx(2.0, rel=0.02)
@@ -117,9 +132,12 @@ def test_the_published_end_clamps_the_rotation() -> None:
     h = SEED.length / 50
     stiffness = beam_matrices(SEED, published_elements(50))[1].toarray()[:50, :50]
     last = SEED.bending_stiffness / h * np.array([[1.0, -1.0], [-1.0, 17.0 / 15.0]])
-    assert last[0, 0] - last[0, 1] ** 2 / last[1, 1] == pytest.approx(2.0 * SEED.bending_stiffness / (17.0 * h))
-    assert stiffness[-2, -1] == pytest.approx(last[0, 1], rel=0.01) and stiffness[-1, -1] == pytest.approx(
-        last[1, 1], rel=0.01)
+    assert last[0, 0] - last[0, 1] ** 2 / last[1, 1] == pytest.approx(
+        2.0 * SEED.bending_stiffness / (17.0 * h)
+    )
+    assert stiffness[-2, -1] == pytest.approx(last[0, 1], rel=0.01) and stiffness[
+        -1, -1
+    ] == pytest.approx(last[1, 1], rel=0.01)
 
 
 def test_rod() -> None:

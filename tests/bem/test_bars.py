@@ -27,10 +27,18 @@ def test_a_rod_on_a_stiffer_rod():
     k, exact = 6, 4.0 / 3.0 + 20.0 / 9.0 + 40.0 / 27.0 + 8.0 / 81.0
     upper = polygon([(0, 0), (1, 0), (1, 1), (0, 1)], 1.0 / k)
     lower = polygon([(0, -1), (1, -1), (1, 0), (0, 0)], 1.0 / k)
-    rollers = [np.stack([mesh.nodes_of(mesh.labels % 2 == 1), np.zeros(len(mesh), bool)]) for mesh in (upper, lower)]
+    rollers = [
+        np.stack([mesh.nodes_of(mesh.labels % 2 == 1), np.zeros(len(mesh), bool)])
+        for mesh in (upper, lower)
+    ]
     rollers[1][1] = lower.nodes_of(lower.labels == 0)
-    made = [steklov(mesh, material, dt=1.0 / k, steps=5 * k) for mesh, material in ((upper, MATERIAL), (lower, STIFF))]
-    above = pressed(made[0], pressure=lambda t: 1.0, top=2, contact=upper.labels == 0, fixed=rollers[0])
+    made = [
+        steklov(mesh, material, dt=1.0 / k, steps=5 * k)
+        for mesh, material in ((upper, MATERIAL), (lower, STIFF))
+    ]
+    above = pressed(
+        made[0], pressure=lambda t: 1.0, top=2, contact=upper.labels == 0, fixed=rollers[0]
+    )
     below = unloaded(made[1], contact=lower.labels == 2, fixed=rollers[1])
     found = march_contact(BoundaryContact(TwoBodies(above, below).condensed()))
     assert found.impulse[-1, 1] == pytest.approx(exact, rel=1e-4)
@@ -55,7 +63,10 @@ def test_the_projection_of_uzawa_projects():
     for dimensions in (1, 2):
         w, limit = random.standard_normal((200, dimensions)), np.abs(random.standard_normal(200))
         once = project(w, limit)
-        assert np.abs(project(once, limit) - once).max() <= 4.0 * np.finfo(float).eps * np.abs(once).max()
+        assert (
+            np.abs(project(once, limit) - once).max()
+            <= 4.0 * np.finfo(float).eps * np.abs(once).max()
+        )
         inside = np.linalg.norm(w, axis=1) <= limit
         assert 20 < inside.sum() < 180 and np.array_equal(once[inside], w[inside])
         assert (np.linalg.norm(once, axis=1) <= limit * (1.0 + 1e-15)).all()

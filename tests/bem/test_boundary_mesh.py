@@ -17,14 +17,19 @@ def test_a_square():
     """Normals point out, tau = (-n_2, n_1), sides are labelled, lengths and area add up."""
     mesh = polygon(SQUARE, 0.2)
     lengths = mesh.node_lengths(np.ones(len(mesh), bool))
-    assert len(mesh) == 20 and mesh.area == pytest.approx(1.0) and lengths.sum() == pytest.approx(4.0)
+    assert (
+        len(mesh) == 20 and mesh.area == pytest.approx(1.0) and lengths.sum() == pytest.approx(4.0)
+    )
     for side, normal in enumerate([(0, -1), (1, 0), (0, 1), (-1, 0)]):
         assert np.allclose(mesh.normals[mesh.labels == side], normal)
     assert np.allclose(mesh.tangents, np.stack([-mesh.normals[:, 1], mesh.normals[:, 0]], axis=1))
     bottom = mesh.elements_where(lambda x: x[:, 1] < -0.49)
     assert (bottom == (mesh.labels == 0)).all() and mesh.nodes_of(bottom).sum() == 6
     assert np.allclose(mesh.node_lengths(bottom)[:6], [0.1, 0.2, 0.2, 0.2, 0.2, 0.1])
-    assert np.allclose(mesh.node_normals(bottom)[:6], (0, -1)) and (mesh.node_normals(bottom)[6:] == 0).all()
+    assert (
+        np.allclose(mesh.node_normals(bottom)[:6], (0, -1))
+        and (mesh.node_normals(bottom)[6:] == 0).all()
+    )
 
 
 def test_mass_integrates_products():
@@ -53,41 +58,67 @@ def test_loose_segments_with_a_hole():
     segments[turned] = segments[turned][:, ::-1]
     mesh = from_segments(np.column_stack([points, np.zeros(len(points))]), segments, labels=tags)
     assert mesh.area == pytest.approx(1.0 - 0.16) and mesh.loop_sizes == (16, 16)
-    assert np.allclose(mesh.normals[mesh.labels == 3], (-1, 0)) and np.allclose(mesh.normals[mesh.labels == 13], (1, 0))
+    assert np.allclose(mesh.normals[mesh.labels == 3], (-1, 0)) and np.allclose(
+        mesh.normals[mesh.labels == 13], (1, 0)
+    )
 
 
 def test_curves_and_outside():
     """Chords of a circle; the outside of a hole has its normals into the hole."""
     disk, hole = circle(0.5, 40), circle(0.5, 40, exterior=True)
-    assert disk.area == pytest.approx(-hole.area) == pytest.approx(10.0 * 0.5 * np.sin(2 * np.pi / 40) * 0.5 * 2)
-    assert ((disk.normals * disk.midpoints).sum(1) > 0).all() and ((hole.normals * hole.midpoints).sum(1) < 0).all()
+    assert (
+        disk.area
+        == pytest.approx(-hole.area)
+        == pytest.approx(10.0 * 0.5 * np.sin(2 * np.pi / 40) * 0.5 * 2)
+    )
+    assert ((disk.normals * disk.midpoints).sum(1) > 0).all() and (
+        (hole.normals * hole.midpoints).sum(1) < 0
+    ).all()
     assert np.allclose(disk.points[0], (0, -0.5))
 
 
-@pytest.mark.parametrize(("bad", "message"), [
-    (lambda: polygon(SQUARE[::-1], 0.5), "wrong orientation"),
-    (lambda: polygon(SQUARE, 0.5, exterior=True), "wrong orientation"),
-    (lambda: from_segments(SQUARE, [(0, 1), (1, 2), (2, 3)]), "open or branches at point 0"),
-    (lambda: from_segments(SQUARE, [(0, 1), (1, 2), (2, 3), (3, 0), (0, 2)]), "branches at point 0"),
-    (lambda: BoundaryMesh(np.array([(0, 0), (2, 0), (0, 1), (2, 2.0)])), "cross"),
-    (lambda: BoundaryMesh(np.array([(0, 0), (1, 0.0)])), "at least 3 points for each loop, and 2 for all"),
-    (lambda: BoundaryMesh(np.array([(0, 0), (1, 0), (1, 0), (0, 1.0)])), "no length"),
-    (lambda: BoundaryMesh(np.array([(0, 0), (1, 0), (np.nan, 1.0)])), "finite"),
-    (lambda: BoundaryMesh(np.array(SQUARE), labels=np.zeros(3, int)), "labels has shape"),
-    (lambda: polygon([(0, 0), (1, 1), (1, 0), (0, 1)], 0.1), "crosses itself near .* cross"),
-    (lambda: polygon([(0, 0), (1, 1), (1, 0), (0, 1)], (2, 1, 2, 1)), r"crosses or touches itself at \(0\.5, 0\.5\)"),
-    (lambda: polygon([(0, 0), (2, 0), (1, 0), (1, 1)], 0.5), "crosses or touches itself"),
-    (lambda: polygon([(0, 0), (1, 0), (2, 0)], 0.5), "leaves no area"),
-    (lambda: circle(-0.5, 20), "radius is -0.5"),
-    (lambda: circle(1e300, 20), "leaves no area to compute with"),
-    (lambda: circle(0.5, 10**9), "1e\\+09 elements"),
-    (lambda: polygon(SQUARE, 1e-9), "4e\\+09 elements"),
-    (lambda: from_segments(SQUARE, [(0, 1), (1, 9), (9, 0)]), "name the points 0 to 9, there are 4"),
-    (lambda: polygon(SQUARE, 0.5).nodes_of([0, 1]), "give a boolean mask"),
-    (lambda: polygon(SQUARE, 0.0), "above zero"),
-    (lambda: polygon(SQUARE, (1, 2, 3)), "of a side has shape"),
-    (lambda: from_segments(SQUARE, [(0, 1), (1, 2), (2, 3), (3, 0)], labels=[1]), "labels has shape"),
-])
+@pytest.mark.parametrize(
+    ("bad", "message"),
+    [
+        (lambda: polygon(SQUARE[::-1], 0.5), "wrong orientation"),
+        (lambda: polygon(SQUARE, 0.5, exterior=True), "wrong orientation"),
+        (lambda: from_segments(SQUARE, [(0, 1), (1, 2), (2, 3)]), "open or branches at point 0"),
+        (
+            lambda: from_segments(SQUARE, [(0, 1), (1, 2), (2, 3), (3, 0), (0, 2)]),
+            "branches at point 0",
+        ),
+        (lambda: BoundaryMesh(np.array([(0, 0), (2, 0), (0, 1), (2, 2.0)])), "cross"),
+        (
+            lambda: BoundaryMesh(np.array([(0, 0), (1, 0.0)])),
+            "at least 3 points for each loop, and 2 for all",
+        ),
+        (lambda: BoundaryMesh(np.array([(0, 0), (1, 0), (1, 0), (0, 1.0)])), "no length"),
+        (lambda: BoundaryMesh(np.array([(0, 0), (1, 0), (np.nan, 1.0)])), "finite"),
+        (lambda: BoundaryMesh(np.array(SQUARE), labels=np.zeros(3, int)), "labels has shape"),
+        (lambda: polygon([(0, 0), (1, 1), (1, 0), (0, 1)], 0.1), "crosses itself near .* cross"),
+        (
+            lambda: polygon([(0, 0), (1, 1), (1, 0), (0, 1)], (2, 1, 2, 1)),
+            r"crosses or touches itself at \(0\.5, 0\.5\)",
+        ),
+        (lambda: polygon([(0, 0), (2, 0), (1, 0), (1, 1)], 0.5), "crosses or touches itself"),
+        (lambda: polygon([(0, 0), (1, 0), (2, 0)], 0.5), "leaves no area"),
+        (lambda: circle(-0.5, 20), "radius is -0.5"),
+        (lambda: circle(1e300, 20), "leaves no area to compute with"),
+        (lambda: circle(0.5, 10**9), "1e\\+09 elements"),
+        (lambda: polygon(SQUARE, 1e-9), "4e\\+09 elements"),
+        (
+            lambda: from_segments(SQUARE, [(0, 1), (1, 9), (9, 0)]),
+            "name the points 0 to 9, there are 4",
+        ),
+        (lambda: polygon(SQUARE, 0.5).nodes_of([0, 1]), "give a boolean mask"),
+        (lambda: polygon(SQUARE, 0.0), "above zero"),
+        (lambda: polygon(SQUARE, (1, 2, 3)), "of a side has shape"),
+        (
+            lambda: from_segments(SQUARE, [(0, 1), (1, 2), (2, 3), (3, 0)], labels=[1]),
+            "labels has shape",
+        ),
+    ],
+)
 def test_what_is_refused(bad, message):
     with pytest.raises(InputError, match=message):
         bad()

@@ -40,7 +40,9 @@ def wave_error(mesh: BoundaryMesh, form: str, *, shear: bool = False) -> float:
     return float(np.linalg.norm(found - exact) / np.linalg.norm(exact))
 
 
-@pytest.mark.parametrize("mesh", [polygon(SQUARE, 0.2), circle(0.5, 24), polygon([(0, 0), (1, 0.1), (0.2, 0.8)], 0.2)])
+@pytest.mark.parametrize(
+    "mesh", [polygon(SQUARE, 0.2), circle(0.5, 24), polygon([(0, 0), (1, 0.1), (0.2, 0.8)], 0.2)]
+)
 def test_symmetry(mesh):
     """B2: V(s), D(s), S_sym(s) are symmetric; so are A and C in time."""
     at_s, time = laplace(mesh, S), in_time(mesh, 0.5)
@@ -96,7 +98,9 @@ def source_traction(x: np.ndarray, normals: np.ndarray) -> np.ndarray:
     return stress_vector(np.stack(steps, axis=-1) / (2.0 * e), normals)
 
 
-@pytest.mark.parametrize("mesh", [polygon(SQUARE, 0.2), polygon([(0, 0), (1, 0.1), (0.2, 0.8)], 0.2)])
+@pytest.mark.parametrize(
+    "mesh", [polygon(SQUARE, 0.2), polygon([(0, 0), (1, 0.1), (0.2, 0.8)], 0.2)]
+)
 @pytest.mark.parametrize("t", [0.13, 0.2, 0.61, 2.5])
 def test_quadrature_split_at_the_fronts(mesh, t):
     """B2: default points against many more, fronts at, inside and past the elements; 5e-5 of the greatest entry."""

@@ -31,13 +31,19 @@ RHO = 2.5
 def with_hole() -> BoundaryMesh:
     """A square with a smaller one cut out: two loops, elements of two lengths."""
     outer, inner = polygon(SQUARE, 0.2), polygon(0.4 * np.array(SQUARE[::-1]), 0.1, exterior=True)
-    return from_segments(np.concatenate([outer.points, inner.points]),
-                         np.concatenate([outer.elements, inner.elements + len(outer)]))
+    return from_segments(
+        np.concatenate([outer.points, inner.points]),
+        np.concatenate([outer.elements, inner.elements + len(outer)]),
+    )
 
 
 SHAPES = {
     "square": (lambda: polygon(SQUARE, 0.125), 0.125, 32),
-    "thin slab": (lambda: polygon([(0.0, 0.0), (1.0, 0.0), (1.0, 0.02), (0.0, 0.02)], [5, 1, 5, 1]), 0.1, 44),
+    "thin slab": (
+        lambda: polygon([(0.0, 0.0), (1.0, 0.0), (1.0, 0.02), (0.0, 0.02)], [5, 1, 5, 1]),
+        0.1,
+        44,
+    ),
     "disk": (lambda: circle(0.5, 25), 0.15, 30),
     "hole": (with_hole, 0.2, 24),
     "outside": (lambda: circle(0.5, 20, exterior=True), 0.15, 30),
@@ -49,15 +55,19 @@ def both(shape: str, threads: int = 1) -> tuple[EnergeticBlocks, CompressedBlock
     """Dense and compressed blocks of a shape."""
     make, dt, steps = SHAPES[shape]
     mesh = make()
-    dense, short = (energetic_blocks(mesh, MATERIAL, dt=dt, steps=steps, compressed=compressed, threads=threads)
-                    for compressed in (False, True))
+    dense, short = (
+        energetic_blocks(mesh, MATERIAL, dt=dt, steps=steps, compressed=compressed, threads=threads)
+        for compressed in (False, True)
+    )
     assert isinstance(dense, EnergeticBlocks) and isinstance(short, CompressedBlocks)
     return dense, short
 
 
 def expanded(short: CompressedBlocks) -> EnergeticBlocks:
     """Dense blocks from compressed ones."""
-    matrices = (np.array(kind).real for kind in zip(*short.combined(np.eye(short.steps)), strict=True))
+    matrices = (
+        np.array(kind).real for kind in zip(*short.combined(np.eye(short.steps)), strict=True)
+    )
     return EnergeticBlocks(short.mesh, short.c_p, short.c_s, short.dt, *matrices)
 
 
@@ -79,7 +89,9 @@ def test_blocks(shape):
 
 def test_tails_are_short():
     """Fifteen steps or so hold any tail; their number hardly grows with the length of the tail."""
-    counts = [{len(part.tail) for part in both(shape)[1].stretches if len(part.tail)} for shape in SHAPES]
+    counts = [
+        {len(part.tail) for part in both(shape)[1].stretches if len(part.tail)} for shape in SHAPES
+    ]
     assert max(map(max, counts)) <= 16
     assert all(len(part.weights) >= len(part.tail) for part in both("square")[1].stretches)
 
@@ -87,8 +99,13 @@ def test_tails_are_short():
 def problem(blocks, *, symmetric: bool, held: bool) -> BoundaryProblem:
     """A pull on the right half of a body, part of it held or moved; contact at the left."""
     mesh, steps, rng = blocks.mesh, blocks.steps - 3, np.random.default_rng(3)
-    forces = traction_forces(mesh, lambda x, n, t: np.sin(t) * n + [0.1, 0.2], dt=blocks.dt, steps=steps,
-                             elements=mesh.midpoints[:, 0] > 0.3)
+    forces = traction_forces(
+        mesh,
+        lambda x, n, t: np.sin(t) * n + [0.1, 0.2],
+        dt=blocks.dt,
+        steps=steps,
+        elements=mesh.midpoints[:, 0] > 0.3,
+    )
     fixed = np.zeros((2, len(mesh)), bool)
     fixed[1] = held & (mesh.points[:, 1] < mesh.points[:, 1].min() + 0.01)
     moved = 0.01 * np.cumsum(rng.standard_normal((steps, 2, len(mesh))), axis=0) if held else None
@@ -97,11 +114,15 @@ def problem(blocks, *, symmetric: bool, held: bool) -> BoundaryProblem:
 
 
 @pytest.mark.parametrize("symmetric", [True, False])
-@pytest.mark.parametrize(("shape", "held"), [("square", True), ("disk", False), ("hole", True), ("thin slab", False)])
+@pytest.mark.parametrize(
+    ("shape", "held"), [("square", True), ("disk", False), ("hole", True), ("thin slab", False)]
+)
 def test_circle_of_frequencies(shape, held, symmetric):
     """Compliances and motions are those of the march with the same blocks; supports, given motions, both forms."""
     short = both(shape)[1]
-    ours, march = (problem(blocks, symmetric=symmetric, held=held) for blocks in (short, expanded(short)))
+    ours, march = (
+        problem(blocks, symmetric=symmetric, held=held) for blocks in (short, expanded(short))
+    )
     one, other = ours.condensed(), march.condensed()
     lost = (1e-8 if symmetric else 1e-5) if shape == "thin slab" else 1e-9
     assert np.abs(one.W - other.W).max() < lost * np.abs(other.W).max()
@@ -123,8 +144,14 @@ def test_everything_held():
     short = both("disk")[1]
     mesh, steps = short.mesh, short.steps
     moved = np.cumsum(np.random.default_rng(1).standard_normal((steps, 2, len(mesh))), axis=0)
-    forces = [BoundaryProblem(PoincareSteklov(blocks, RHO), np.zeros_like(moved), np.ones((2, len(mesh)), bool),
-                              moved).solve().forces for blocks in (short, expanded(short))]
+    forces = [
+        BoundaryProblem(
+            PoincareSteklov(blocks, RHO), np.zeros_like(moved), np.ones((2, len(mesh)), bool), moved
+        )
+        .solve()
+        .forces
+        for blocks in (short, expanded(short))
+    ]
     assert np.abs(forces[0] - forces[1]).max() < 1e-8 * np.abs(forces[1]).max()
 
 
@@ -133,7 +160,9 @@ def test_contact():
     runs = []
     for blocks in both("square"):
         mesh = blocks.mesh
-        push = -traction_forces(mesh, lambda x, n, t: n, dt=blocks.dt, steps=blocks.steps, elements=mesh.labels == 2)
+        push = -traction_forces(
+            mesh, lambda x, n, t: n, dt=blocks.dt, steps=blocks.steps, elements=mesh.labels == 2
+        )
         pressed = BoundaryProblem(PoincareSteklov(blocks, 1.0), push, contact=mesh.labels == 0)
         runs.append(march_contact(BoundaryContact(pressed.condensed())).forces)
     assert np.abs(runs[0] - runs[1]).max() < 1e-7 * np.abs(runs[0]).max()
@@ -151,8 +180,10 @@ def test_threads():
 def test_long_tails_of_a_small_body():
     """Many steps behind the last wave: at most of them nothing new is integrated."""
     mesh = polygon(SQUARE, 0.5)
-    dense, short = (energetic_blocks(mesh, MATERIAL, dt=0.4, steps=100, compressed=compressed)
-                    for compressed in (False, True))
+    dense, short = (
+        energetic_blocks(mesh, MATERIAL, dt=0.4, steps=100, compressed=compressed)
+        for compressed in (False, True)
+    )
     again = expanded(short)
     for name, bound in zip(("single", "double", "hyper"), short.errors, strict=True):
         assert np.abs(getattr(again, name) - getattr(dense, name)).max() < bound, name
@@ -165,10 +196,17 @@ def test_long_runs(symmetric, monkeypatch):
     steps are for the symmetric form: the other is wrong there, and says so."""
     mesh, steps, dt = polygon(SQUARE, 0.5), 200, 2.0 if symmetric else 0.5
     short = energetic_blocks(mesh, MATERIAL, dt=dt, steps=steps, compressed=True)
-    pull = traction_forces(mesh, lambda x, n, t: np.sin(t) * n + [0.1, 0.2], dt=dt, steps=steps,
-                           elements=mesh.labels == 1)
-    ours, march = (BoundaryProblem(PoincareSteklov(blocks, RHO, symmetric), pull, contact=mesh.labels == 0)
-                   for blocks in (short, expanded(short)))
+    pull = traction_forces(
+        mesh,
+        lambda x, n, t: np.sin(t) * n + [0.1, 0.2],
+        dt=dt,
+        steps=steps,
+        elements=mesh.labels == 1,
+    )
+    ours, march = (
+        BoundaryProblem(PoincareSteklov(blocks, RHO, symmetric), pull, contact=mesh.labels == 0)
+        for blocks in (short, expanded(short))
+    )
     one, other = ours.solve().displacement, march.solve().displacement
     assert np.abs(one - other).max() < 1e-8 * np.abs(other).max()
     one, other = ours.condensed().W, march.condensed().W
@@ -177,7 +215,9 @@ def test_long_runs(symmetric, monkeypatch):
         monkeypatch.setattr("vi_contact.bem.compressed.AHEAD", 1)
         monkeypatch.setattr("vi_contact.bem.energetic.AHEAD", 1)
         cut = energetic_blocks(mesh, MATERIAL, dt=dt, steps=steps, compressed=True)
-        with pytest.raises(StepFailure, match="of the motion, which grows behind step 200.* compressed=False"):
+        with pytest.raises(
+            StepFailure, match="of the motion, which grows behind step 200.* compressed=False"
+        ):
             BoundaryProblem(PoincareSteklov(cut, RHO, False), pull).solve()
 
 
@@ -185,11 +225,15 @@ def test_rounding_moves_a_free_body(monkeypatch):
     """Where rounding of second differences outgrows the momentum of a free body, a sentence; held bodies go on."""
     mesh, steps = polygon(SQUARE, 1.0), 300
     short = energetic_blocks(mesh, MATERIAL, dt=4.0, steps=steps, compressed=True)
-    free, held = (BoundaryProblem(PoincareSteklov(short, 1.0), np.ones((steps, 2, len(mesh))), fixed)
-                  for fixed in (None, np.eye(2, len(mesh), dtype=bool)))
+    free, held = (
+        BoundaryProblem(PoincareSteklov(short, 1.0), np.ones((steps, 2, len(mesh))), fixed)
+        for fixed in (None, np.eye(2, len(mesh), dtype=bool))
+    )
     assert np.isfinite(free.solve().displacement).all()
     monkeypatch.setattr("vi_contact.bem.frequency_circle.DRIFT", 1e-12)
-    with pytest.raises(InputError, match="300 steps rounding errors move a free body; take fewer steps"):
+    with pytest.raises(
+        InputError, match="300 steps rounding errors move a free body; take fewer steps"
+    ):
         free.solve()
     assert np.isfinite(held.solve().displacement).all()
 
@@ -197,9 +241,13 @@ def test_rounding_moves_a_free_body(monkeypatch):
 def test_missed_equations(monkeypatch):
     """An answer that misses the equations of the march is refused."""
     free = problem(both("disk")[1], symmetric=True, held=False)
-    monkeypatch.setattr("vi_contact.bem.frequency_circle.CompressedBlocks.applied",
-                        lambda self, p, u, jumps: [0.0 * p[0], p[0], u[0], u[0]])
-    with pytest.raises(StepFailure, match="misses the equations of step 14 of 27 .* take fewer steps"):
+    monkeypatch.setattr(
+        "vi_contact.bem.frequency_circle.CompressedBlocks.applied",
+        lambda self, p, u, jumps: [0.0 * p[0], p[0], u[0], u[0]],
+    )
+    with pytest.raises(
+        StepFailure, match="misses the equations of step 14 of 27 .* take fewer steps"
+    ):
         free.solve()
 
 
@@ -215,9 +263,12 @@ def test_choice_by_size(monkeypatch):
 def test_refusals():
     """Sentences for what cannot be done, before any work."""
     mesh = polygon(SQUARE, 0.5)
-    for options, message in (({"compressed": "yes"}, "compressed is 'yes'"), ({"threads": 0}, "threads is 0"),
-                             ({"steps": 10**9, "compressed": True}, "1000000000 steps of 8 elements asks for"),
-                             ({"steps": 200_000, "compressed": True}, "circle of 200000 steps asks for")):
+    for options, message in (
+        ({"compressed": "yes"}, "compressed is 'yes'"),
+        ({"threads": 0}, "threads is 0"),
+        ({"steps": 10**9, "compressed": True}, "1000000000 steps of 8 elements asks for"),
+        ({"steps": 200_000, "compressed": True}, "circle of 200000 steps asks for"),
+    ):
         with pytest.raises(InputError, match=message):
             energetic_blocks(mesh, MATERIAL, **({"dt": 0.5, "steps": 9} | options))
     short = both("disk")[1]

@@ -28,10 +28,14 @@ from vi_contact.core.errors import InputError, StepFailure
 pytestmark = pytest.mark.serial
 MATERIAL = vc.LinearElastic.from_wave_speeds(1.0, 0.5, 1.0)
 LAWS = {
-    "none": vc.Frictionless(), "Tresca": vc.Tresca(0.05), "Coulomb": vc.Coulomb(0.5), "weak Coulomb": vc.Coulomb(0.1),
+    "none": vc.Frictionless(),
+    "Tresca": vc.Tresca(0.05),
+    "Coulomb": vc.Coulomb(0.5),
+    "weak Coulomb": vc.Coulomb(0.1),
 }
 METHODS = (
-    vc.Condensed(solvers.Hildreth()), vc.Condensed(friction_method=solvers.NSGS()),
+    vc.Condensed(solvers.Hildreth()),
+    vc.Condensed(friction_method=solvers.NSGS()),
     vc.Condensed(friction_method=solvers.FixedPoint()),
 )
 
@@ -64,7 +68,11 @@ def test_every_step_is_certified(law):
     assert len(found.certificates) == 30 and found.worst < 1e-12
     assert found.gap.min() >= 0.0 and found.r_n.min() >= 0.0 and found.r_n.max() > 0.1
     assert np.abs(found.gap * found.r_n).max() < 1e-14
-    limit = LAWS[law].limit(found.r_n.ravel(), np.tile(found.contact.surface.weights, 30), 1.0).reshape(30, -1)
+    limit = (
+        LAWS[law]
+        .limit(found.r_n.ravel(), np.tile(found.contact.surface.weights, 30), 1.0)
+        .reshape(30, -1)
+    )
     assert (np.abs(found.r_t) <= limit * (1.0 + 1e-12) + 1e-15).all()
     assert (np.diff(found.friction_loss, prepend=0.0) >= -1e-14).all()
     assert (found.friction_loss[-1] > 0.05) == (law in ("Tresca", "weak Coulomb"))
@@ -111,14 +119,18 @@ def test_uzawa_in_windows(window):
     contact = BoundaryContact(condensed(), friction=LAWS["weak Coulomb"])
     found = SpaceTimeUzawa(tolerance=1e-10, window=window).solve(contact)
     assert away(found, run("weak Coulomb")) < 1e-6
-    assert len(found.iterations) == -(-30 // window) and found.iterations.sum() == len(found.history)
+    assert len(found.iterations) == -(-30 // window) and found.iterations.sum() == len(
+        found.history
+    )
 
 
 @pytest.mark.parametrize("rho", [1e-6, 1e-300])
 def test_uzawa_does_not_stop_because_its_steps_are_small(rho):
     """B10: the change to stop at is that of the default rho: with a small one nothing moved, and all was wrong."""
     with pytest.raises(StepFailure, match="stopped after 50 iterations"):
-        SpaceTimeUzawa(tolerance=1e-3, rho=rho, max_iterations=50).solve(BoundaryContact(condensed()))
+        SpaceTimeUzawa(tolerance=1e-3, rho=rho, max_iterations=50).solve(
+            BoundaryContact(condensed())
+        )
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -127,8 +139,10 @@ def test_uzawa_is_certified_in_any_unit(law):
     are zero."""
     given = condensed()
     laws = (LAWS[law], vc.Tresca(0.05e-170) if law == "Tresca" else LAWS[law])
-    contacts = [BoundaryContact(replace(given, u_free=size * given.u_free), friction=one)
-                for size, one in zip((1.0, 1e-170), laws, strict=True)]
+    contacts = [
+        BoundaryContact(replace(given, u_free=size * given.u_free), friction=one)
+        for size, one in zip((1.0, 1e-170), laws, strict=True)
+    ]
     runs = [SpaceTimeUzawa(tolerance=1e-8).solve(contact) for contact in contacts]
     assert 0.0 < runs[0].worst < 1e-6 and runs[1].worst < 1e-6 and len(runs[0].certificates) == 30
     assert runs[1].r_n == pytest.approx(1e-170 * runs[0].r_n, rel=1e-6, abs=1e-178)
@@ -138,10 +152,14 @@ def test_conditions_and_supports_that_leave_no_contact_are_refused():
     """Three conditions at a node were answered by two; lengths of zero gave a pressure of NaN; nothing free, an index
     error."""
     for nodes, lengths in (([0, 0, 0], [1.0, 1.0, 1.0]), ([0, 1, 2], [1.0, 0.0, 1.0]), ([], [])):
-        with pytest.raises(InputError, match="one condition or more, at most two at a node, and positive lengths"):
+        with pytest.raises(
+            InputError, match="one condition or more, at most two at a node, and positive lengths"
+        ):
             Conditions(nodes, np.tile([0.0, -1.0], (len(nodes), 1)), lengths)
     held = replace(condensed(), W=0.0 * condensed().W)
-    with pytest.raises(InputError, match="supports hold all contact nodes|a support holds a contact node"):
+    with pytest.raises(
+        InputError, match="supports hold all contact nodes|a support holds a contact node"
+    ):
         march_contact(BoundaryContact(held))
     with pytest.raises(InputError, match="W has no step"):
         replace(held, W=held.W[:0], u_free=held.u_free[:0])
@@ -178,15 +196,23 @@ def rod(elements: int, steps: int, *, load: float = 1.0, pulse: float = 99.0) ->
     fixed = np.zeros((2, len(mesh)), bool)
     fixed[0] = mesh.nodes_of(mesh.labels % 2 == 1)
     operator = steklov(mesh, MATERIAL, dt=1.0 / elements, steps=steps)
-    return pressed(operator, pressure=lambda t: load * (t < pulse), top=2, contact=mesh.labels == 0, fixed=fixed)
+    return pressed(
+        operator,
+        pressure=lambda t: load * (t < pulse),
+        top=2,
+        contact=mesh.labels == 0,
+        fixed=fixed,
+    )
 
 
 def test_impact_with_a_gap():
     """A rod driven by a unit pulse of length 1 crosses a gap of 0.27, rebounds with its speed: impulse 2, order 1."""
     error = []
     for elements in (5, 10):
-        contact = BoundaryContact(rod(elements, 5 * elements, pulse=1.0).condensed(), obstacle=vc.AnalyticGap(
-            lambda points: np.full(len(points), 0.27)))
+        contact = BoundaryContact(
+            rod(elements, 5 * elements, pulse=1.0).condensed(),
+            obstacle=vc.AnalyticGap(lambda points: np.full(len(points), 0.27)),
+        )
         found = march_contact(contact)
         assert found.gap[0] == pytest.approx(0.27, abs=1e-5) and found.resultant[:, 1].max() < 2.05
         error.append(2.0 - found.impulse[-1, 1])
@@ -196,14 +222,21 @@ def test_impact_with_a_gap():
 def test_two_bodies_that_are_mirror_images():
     """B8: a square pressed on its mirror image feels what it feels on a smooth rigid support, whatever the friction."""
     mesh = polygon([(-0.5, -1.5), (0.5, -1.5), (0.5, -0.5), (-0.5, -0.5)], 0.2)
-    below = pressed(steklov(mesh, MATERIAL, dt=0.2, steps=30), pressure=lambda t: 1.0, top=0, contact=mesh.labels == 2)
+    below = pressed(
+        steklov(mesh, MATERIAL, dt=0.2, steps=30),
+        pressure=lambda t: 1.0,
+        top=0,
+        contact=mesh.labels == 2,
+    )
     bodies = TwoBodies(square(), below)
     for law in ("none", "Coulomb"):
         found = march_contact(BoundaryContact(bodies.condensed(), friction=LAWS[law]))
         assert away(found, run("none")) < 1e-4  # quadrature knows left from right
     one, two = bodies.solve(found.forces)
     assert one.work == pytest.approx(two.work, rel=1e-4)
-    assert (one.forces - square().forces).sum() == pytest.approx(-(two.forces - below.forces).sum(), rel=1e-12)
+    assert (one.forces - square().forces).sum() == pytest.approx(
+        -(two.forces - below.forces).sum(), rel=1e-12
+    )
 
 
 def test_a_weld_is_no_cut():
@@ -211,17 +244,34 @@ def test_a_weld_is_no_cut():
     corners = [(0, 0), (1, 0), (1, 0.5), (0, 0.5)]
     lower, upper = polygon(corners, 0.1), polygon([(x, y + 0.5) for x, y in corners], 0.1)
     whole = polygon([(0, 0), (1, 0), (1, 1), (0, 1)], 0.1)
-    top = pressed(steklov(upper, MATERIAL, dt=0.1, steps=30), pressure=lambda t: 1.0, top=2, contact=upper.labels == 0)
+    top = pressed(
+        steklov(upper, MATERIAL, dt=0.1, steps=30),
+        pressure=lambda t: 1.0,
+        top=2,
+        contact=upper.labels == 0,
+    )
     clamped = np.tile(lower.nodes_of(lower.labels == 0), (2, 1))
-    base = unloaded(steklov(lower, MATERIAL, dt=0.1, steps=30), contact=lower.labels == 2, fixed=clamped)
+    base = unloaded(
+        steklov(lower, MATERIAL, dt=0.1, steps=30), contact=lower.labels == 2, fixed=clamped
+    )
     bodies = TwoBodies(top, base, welded=upper.labels == 0)
     one, two = bodies.solve()
-    joint = one.displacement[:, :, top.contact_nodes] - two.displacement[:, :, base.contact_nodes[::-1]]
+    joint = (
+        one.displacement[:, :, top.contact_nodes] - two.displacement[:, :, base.contact_nodes[::-1]]
+    )
     assert np.abs(joint).max() < 1e-12 * np.abs(one.displacement).max()
     held = np.tile(whole.nodes_of(whole.labels == 0), (2, 1))
-    mono = pressed(steklov(whole, MATERIAL, dt=0.1, steps=30), pressure=lambda t: 1.0, top=2,
-                   contact=whole.labels == 2, fixed=held).solve()
-    here, there = one.displacement[:, :, upper.labels == 2], mono.displacement[:, :, whole.labels == 2]
+    mono = pressed(
+        steklov(whole, MATERIAL, dt=0.1, steps=30),
+        pressure=lambda t: 1.0,
+        top=2,
+        contact=whole.labels == 2,
+        fixed=held,
+    ).solve()
+    here, there = (
+        one.displacement[:, :, upper.labels == 2],
+        mono.displacement[:, :, whole.labels == 2],
+    )
     assert np.abs(here - there).max() < 0.01 * np.abs(there).max()
 
 
@@ -229,32 +279,48 @@ def test_part_of_an_interface_is_welded():
     """B8: the right half of the interface welded, the left half in contact: both conditions hold in every step."""
     mesh = polygon([(-0.5, -1.5), (0.5, -1.5), (0.5, -0.5), (-0.5, -0.5)], [4, 4, 4, 4])
     above = square_problem(4, MATERIAL, dt=0.25, steps=20)
-    below = unloaded(steklov(mesh, MATERIAL, dt=0.25, steps=20), contact=mesh.labels == 2,
-                     fixed=np.tile(mesh.nodes_of(mesh.labels == 0), (2, 1)))
+    below = unloaded(
+        steklov(mesh, MATERIAL, dt=0.25, steps=20),
+        contact=mesh.labels == 2,
+        fixed=np.tile(mesh.nodes_of(mesh.labels == 0), (2, 1)),
+    )
     welded = above.contact & (above.operator.mesh.midpoints[:, 0] > 0.0)
     bodies = TwoBodies(above, below, welded=welded)
     found = march_contact(BoundaryContact(bodies.condensed(), friction=vc.Coulomb(0.3)))
     assert found.r_n.shape[1] == 2 and found.worst < 1e-12
     one, two = bodies.solve(found.forces)
-    apart = one.displacement[:, :, above.contact_nodes] - two.displacement[:, :, below.contact_nodes[::-1]]
+    apart = (
+        one.displacement[:, :, above.contact_nodes]
+        - two.displacement[:, :, below.contact_nodes[::-1]]
+    )
     scale = np.abs(one.displacement).max()
     assert np.abs(apart[:, :, 2:]).max() < 1e-12 * scale and apart[:, 1].min() > -1e-12 * scale
-    assert apart.transpose(0, 1, 2)[:, :, :2].reshape(20, -1) == pytest.approx(found.displacement, abs=1e-12 * scale)
+    assert apart.transpose(0, 1, 2)[:, :, :2].reshape(20, -1) == pytest.approx(
+        found.displacement, abs=1e-12 * scale
+    )
 
 
 def test_bad_input():
     """One sentence that names the thing and the remedy."""
     problem = square()
-    for first, words in ((np.ones((12, 12)), "not positive definite"), (np.tril(np.ones((12, 1)) * np.ones(12)), None),
-                         (np.ones((12, 1)) * np.arange(1.0, 13.0), "one step is singular")):
-        wrong = BoundaryContact(replace(condensed(), W=np.concatenate([first[None], condensed().W[1:]])))
+    for first, words in (
+        (np.ones((12, 12)), "not positive definite"),
+        (np.tril(np.ones((12, 1)) * np.ones(12)), None),
+        (np.ones((12, 1)) * np.arange(1.0, 13.0), "one step is singular"),
+    ):
+        wrong = BoundaryContact(
+            replace(condensed(), W=np.concatenate([first[None], condensed().W[1:]]))
+        )
         if words is None:
             assert wrong.matrix.algebra.symmetric is wrong.symmetric is False
             continue
         with pytest.raises(InputError, match=words):
             march_contact(wrong)
     nodes = problem.operator.mesh.nodes_of(problem.contact)
-    for fixed, words in ((np.stack([0 * nodes, nodes]), "in its contact direction"), (None, "penetrates")):
+    for fixed, words in (
+        (np.stack([0 * nodes, nodes]), "in its contact direction"),
+        (None, "penetrates"),
+    ):
         held = replace(problem, fixed=None if fixed is None else fixed.astype(bool)).condensed()
         obstacle = vc.HalfSpace(point=(0.0, -0.5 if fixed is not None else -0.4), normal=(0.0, 1.0))
         with pytest.raises(InputError, match=words):
@@ -265,12 +331,17 @@ def test_bad_input():
     coarse = square_problem(2, MATERIAL, dt=0.5, steps=2)
     sides = [coarse.operator.mesh.labels == k for k in (0, 1)]
     bent = replace(coarse, contact=sides[0] | sides[1]).condensed()
-    with pytest.raises(InputError, match=r"turns by 90 degrees at \(0.5, -0.5\): give conditions=conditions_on"):
+    with pytest.raises(
+        InputError, match=r"turns by 90 degrees at \(0.5, -0.5\): give conditions=conditions_on"
+    ):
         BoundaryContact(bent)
     BoundaryContact(bent, conditions=conditions_on(coarse.operator.mesh, bent, *sides))
     BoundaryContact(bent, obstacle=vc.HalfSpace(point=(0.0, -0.5), normal=(0.0, 1.0)))
     moved = polygon(mesh.points[[0, 5, 10, 15]] - [0.05, 1.0], 0.2)
-    below = unloaded(PoincareSteklov(replace(problem.operator.blocks, mesh=moved), 1.0), contact=moved.labels == 2)
+    below = unloaded(
+        PoincareSteklov(replace(problem.operator.blocks, mesh=moved), 1.0),
+        contact=moved.labels == 2,
+    )
     with pytest.raises(InputError, match="no partner on the other body"):
         TwoBodies(problem, below).condensed()
     with pytest.raises(InputError, match="welded"):
@@ -287,7 +358,9 @@ def test_a_third_opinion(law):
 
     problem = build(Square(cells=20, pressure=1.0), MPI.COMM_WORLD).problem(friction=LAWS[law])
     references = [Reference.of(run(law)), Reference.of(run("Coulomb"))]
-    mine, other = compare_runs(problem, references, solver=vc.Condensed(), dt=0.05, steps=100, bound=0.02)
+    mine, other = compare_runs(
+        problem, references, solver=vc.Condensed(), dt=0.05, steps=100, bound=0.02
+    )
     assert 0.0 < mine.impulse < 0.02 and 0.0 < mine.towards < 0.02 and mine.agrees
     assert not other.agrees and other.impulse > 2.0 * mine.impulse
     assert mine.name == "boundary elements"

@@ -35,7 +35,8 @@ pytestmark = pytest.mark.serial
 def operators() -> dict[int, ConvolutionOperator]:
     """Squares of 5 and 10 elements a side, c_P dt = h, six crossings of the square."""
     return {
-        k: convolution_operator(polygon(SQUARE, 1.0 / k), MATERIAL, dt=1.0 / k, steps=6 * k) for k in (5, 10)
+        k: convolution_operator(polygon(SQUARE, 1.0 / k), MATERIAL, dt=1.0 / k, steps=6 * k)
+        for k in (5, 10)
     }
 
 
@@ -45,11 +46,15 @@ def smooth_load(t: float) -> float:
 
 def top_of_rod(t: np.ndarray, integral) -> np.ndarray:
     """The load's integral and its echoes from the fixed base."""
-    return integral(t) + 2.0 * sum((-1) ** j * integral(t - 2.0 * j) for j in range(1, int(t.max() / 2) + 1))
+    return integral(t) + 2.0 * sum(
+        (-1) ** j * integral(t - 2.0 * j) for j in range(1, int(t.max() / 2) + 1)
+    )
 
 
 def smooth_integral(t: np.ndarray) -> np.ndarray:
-    return np.where(t <= 0.0, 0.0, np.where(t < 2.0, 0.5 * t - np.sin(np.pi * t) / (2.0 * np.pi), 1.0))
+    return np.where(
+        t <= 0.0, 0.0, np.where(t < 2.0, 0.5 * t - np.sin(np.pi * t) / (2.0 * np.pi), 1.0)
+    )
 
 
 def rod(operator: ConvolutionOperator, load) -> BoundaryProblem:
@@ -60,7 +65,9 @@ def rod(operator: ConvolutionOperator, load) -> BoundaryProblem:
     fixed[0] = mesh.nodes_of(np.isin(mesh.labels, (1, 3)))
 
     def forces(dt: float, steps: int) -> np.ndarray:
-        return traction_forces(mesh, lambda x, n, t: n * load(t), dt=dt, steps=steps, elements=mesh.labels == 2)
+        return traction_forces(
+            mesh, lambda x, n, t: n * load(t), dt=dt, steps=steps, elements=mesh.labels == 2
+        )
 
     means = operator.frequencies.substep_means(forces)
     return BoundaryProblem(operator, means, fixed, contact=mesh.labels == 0)
@@ -89,7 +96,10 @@ def test_weights_of_an_oscillator():
         exact = oscillator(w2, damping, dt * np.arange(1, steps + 1))
         table = Frequencies(dt, steps)
         weights = table.backward((table.held_factors * transfer(table.s)).sum(axis=1))
-        held.append(np.abs(np.convolve(weights, means(dt, steps))[:steps] - exact).max() / np.abs(exact).max())
+        held.append(
+            np.abs(np.convolve(weights, means(dt, steps))[:steps] - exact).max()
+            / np.abs(exact).max()
+        )
         modes = table.s * transfer(table.s) * table.impulses(table.substep_means(means))
         errors.append(np.abs(table.at_ends(modes) - exact).max() / np.abs(exact).max())
     assert errors[1] < 6e-3 and np.log2(errors[0] / errors[1]) > 2.9
@@ -137,9 +147,13 @@ def test_rod_under_a_step(operators):
     exact = np.where((middle > 1.0) & (np.mod(middle - 1.0, 4.0) < 2.0), 2.0, 0.0)
     assert np.linalg.norm(base - exact) < 0.25 * np.linalg.norm(exact) and base.max() < 2.25
     elements = mesh.labels == 0
-    by_traction = -(motion.traction[:, 1, elements].mean(axis=2) * mesh.lengths[elements]).sum(axis=1)
+    by_traction = -(motion.traction[:, 1, elements].mean(axis=2) * mesh.lengths[elements]).sum(
+        axis=1
+    )
     assert np.abs(by_traction - base).max() < 0.225
-    assert motion.work.min() > 0.0 and 1.8 < motion.work[19] < 2.02  # exactly 2; numerical damping takes up to 7 %
+    assert (
+        motion.work.min() > 0.0 and 1.8 < motion.work[19] < 2.02
+    )  # exactly 2; numerical damping takes up to 7 %
 
 
 def test_small_steps_stay_bounded():
@@ -155,8 +169,12 @@ def test_plane_pulses(operators, shear):
     wave, errors = pulse(shear=shear), []
     for k in (5, 10):
         operator = operators[k]
-        forces = traction_forces(operator.mesh, wave.traction, dt=operator.dt, steps=operator.frequencies.steps)
-        exact = np.array([wave.displacement(operator.mesh.points, operator.dt * (j + 1)).T for j in range(4 * k)])
+        forces = traction_forces(
+            operator.mesh, wave.traction, dt=operator.dt, steps=operator.frequencies.steps
+        )
+        exact = np.array(
+            [wave.displacement(operator.mesh.points, operator.dt * (j + 1)).T for j in range(4 * k)]
+        )
         found = BoundaryProblem(operator, forces).solve().displacement[: 4 * k]
         errors.append(np.linalg.norm(found - exact) / np.linalg.norm(exact))
     assert errors[1] < 0.03 and np.log2(errors[0] / errors[1]) > 2.0
@@ -227,7 +245,10 @@ def test_prescribed_motion(operators):
         fixed[1] |= mesh.nodes_of(mesh.labels == 2)
         still = np.zeros_like(loaded.forces)
         moved = replace(loaded, forces=still, fixed=fixed, prescribed=motion.displacement).solve()
-        errors.append(np.linalg.norm(moved.displacement - motion.displacement) / np.linalg.norm(motion.displacement))
+        errors.append(
+            np.linalg.norm(moved.displacement - motion.displacement)
+            / np.linalg.norm(motion.displacement)
+        )
         forces.append(np.linalg.norm(moved.forces - motion.forces) / np.linalg.norm(motion.forces))
     assert errors[1] < 5e-3 and np.log2(errors[0] / errors[1]) > 1.7
     assert forces[1] < 1.6e-2 and np.log2(forces[0] / forces[1]) > 1.3

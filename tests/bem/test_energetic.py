@@ -32,7 +32,10 @@ pytestmark = pytest.mark.serial
 @pytest.fixture(scope="module")
 def blocks() -> dict[int, EnergeticBlocks]:
     """Squares of 5 and 10 elements a side, c_P dt = h, six crossings of the square."""
-    return {k: energetic_blocks(polygon(SQUARE, 1.0 / k), MATERIAL, dt=1.0 / k, steps=6 * k) for k in (5, 10)}
+    return {
+        k: energetic_blocks(polygon(SQUARE, 1.0 / k), MATERIAL, dt=1.0 / k, steps=6 * k)
+        for k in (5, 10)
+    }
 
 
 @pytest.mark.parametrize("symmetric", [True, False])
@@ -50,9 +53,14 @@ def test_plane_pulses(blocks, symmetric, shear, fine):
 
 def with_hole(k: int) -> BoundaryMesh:
     """The square less one of 0.4 a side in its middle."""
-    outer, inner = polygon(SQUARE, 1.0 / k), polygon(0.4 * np.array(SQUARE[::-1]), 1.0 / k, exterior=True)
-    return from_segments(np.concatenate([outer.points, inner.points]),
-                         np.concatenate([outer.elements, inner.elements + len(outer)]))
+    outer, inner = (
+        polygon(SQUARE, 1.0 / k),
+        polygon(0.4 * np.array(SQUARE[::-1]), 1.0 / k, exterior=True),
+    )
+    return from_segments(
+        np.concatenate([outer.points, inner.points]),
+        np.concatenate([outer.elements, inner.elements + len(outer)]),
+    )
 
 
 def triangle(k: int) -> BoundaryMesh:
@@ -76,7 +84,9 @@ def test_plane_pulses_in_other_shapes(shape, fine):
 
 def echoes(t: np.ndarray, integral) -> np.ndarray:
     """Displacement of the top: the load's integral and its echoes from the fixed base."""
-    return integral(t) + 2.0 * sum((-1) ** j * integral(t - 2.0 * j) for j in range(1, int(t.max() / 2) + 1))
+    return integral(t) + 2.0 * sum(
+        (-1) ** j * integral(t - 2.0 * j) for j in range(1, int(t.max() / 2) + 1)
+    )
 
 
 @pytest.mark.parametrize("symmetric", [True, False])
@@ -87,7 +97,9 @@ def test_rod_under_a_step(blocks, symmetric):
     exact = echoes(motion.times, lambda t: np.maximum(t, 0.0))
     top = motion.displacement[:, 1][:, mesh.nodes_of(mesh.labels == 2)]
     base = -motion.forces[:, 1][:, mesh.nodes_of(mesh.labels == 0)].sum(axis=1)
-    assert np.linalg.norm(top - exact[:, None]) < 1e-2 * np.linalg.norm(np.repeat(exact[:, None], top.shape[1], 1))
+    assert np.linalg.norm(top - exact[:, None]) < 1e-2 * np.linalg.norm(
+        np.repeat(exact[:, None], top.shape[1], 1)
+    )
     assert 2.0 < base.max() < 2.05 and np.abs(base[:9]).max() < 0.01
     assert motion.work[19] == pytest.approx(2.0, abs=0.02) and abs(motion.work[39]) < 0.04
 
@@ -100,10 +112,16 @@ def test_rod_under_a_smooth_load(blocks, symmetric):
         motion = rod(b, smooth_load, symmetric=symmetric).solve()
         exact = echoes(motion.times, smooth_integral)[:, None]
         top = motion.displacement[:, 1][:, b.mesh.nodes_of(b.mesh.labels == 2)]
-        errors.append(np.linalg.norm(top - exact) / np.linalg.norm(np.broadcast_to(exact, top.shape)))
+        errors.append(
+            np.linalg.norm(top - exact) / np.linalg.norm(np.broadcast_to(exact, top.shape))
+        )
     assert errors[1] < 7e-3 and np.log2(errors[0] / errors[1]) > 1.9
     increments = np.diff(motion.displacement, axis=0, prepend=0.0)
-    top_work = (motion.forces * increments)[:, :, b.mesh.nodes_of(b.mesh.labels == 2)].sum(axis=(1, 2)).cumsum()
+    top_work = (
+        (motion.forces * increments)[:, :, b.mesh.nodes_of(b.mesh.labels == 2)]
+        .sum(axis=(1, 2))
+        .cumsum()
+    )
     assert motion.work == pytest.approx(top_work, abs=1e-12)
 
 
@@ -115,8 +133,12 @@ def test_both_forms_give_the_same_impulse(blocks):
         base = mesh.labels == 0
         impulses[symmetric] = -blocks[10].dt * motion.forces[:40, 1][:, mesh.nodes_of(base)].sum()
         pressure = -(motion.traction[:40, 1, base].mean(axis=2) * mesh.lengths[base]).sum(axis=1)
-        assert np.abs(-blocks[10].dt * pressure.sum()) == pytest.approx(impulses[symmetric], rel=0.01)
-    assert impulses[True] == pytest.approx(impulses[False], rel=5e-3) == pytest.approx(4.0, rel=1e-2)
+        assert np.abs(-blocks[10].dt * pressure.sum()) == pytest.approx(
+            impulses[symmetric], rel=0.01
+        )
+    assert (
+        impulses[True] == pytest.approx(impulses[False], rel=5e-3) == pytest.approx(4.0, rel=1e-2)
+    )
 
 
 def test_compliance_is_the_inverse_seen_from_the_contact(blocks):
@@ -130,7 +152,9 @@ def test_compliance_is_the_inverse_seen_from_the_contact(blocks):
     first = 3.0 * compliance.W[0]
     assert np.abs(first - first.T).max() < 1e-12
     assert np.linalg.eigvalsh(first)[[0, -1]] == pytest.approx([1.05, 5.30], 1e-2)
-    assert np.allclose(compliance.normals, (0, -1)) and compliance.lengths.sum() == pytest.approx(1.0)
+    assert np.allclose(compliance.normals, (0, -1)) and compliance.lengths.sum() == pytest.approx(
+        1.0
+    )
 
 
 def test_motion_everywhere_gives_the_forces_back(blocks):
@@ -198,7 +222,9 @@ def test_prescribed_motion(blocks):
     motion = loaded.solve()
     fixed = loaded.fixed.copy()
     fixed[1] |= blocks[5].mesh.nodes_of(blocks[5].mesh.labels == 2)
-    moved = replace(loaded, forces=np.zeros_like(loaded.forces), fixed=fixed, prescribed=motion.displacement).solve()
+    moved = replace(
+        loaded, forces=np.zeros_like(loaded.forces), fixed=fixed, prescribed=motion.displacement
+    ).solve()
     assert np.abs(moved.displacement - motion.displacement).max() < 1e-12
     assert np.abs(moved.forces - motion.forces).max() < 1e-11 * np.abs(motion.forces).max()
 
@@ -222,10 +248,15 @@ def test_saved_blocks(tmp_path):
         with pytest.raises(InputError, match=f"another problem.*{message}"):
             stored_blocks(path, body, material, **options)
     for damage in (
-        lambda f: f.__delitem__("single"), lambda f: f.attrs.__delitem__("c_p"), lambda f: changed(f, "hyper"),
-        lambda f: f.attrs.__setitem__("dt", "fast"), lambda f: f.attrs.__setitem__("c_s", np.nan),
-        lambda f: f["double"].write_direct(b.double * np.nan), lambda f: f["points"].write_direct(np.nan * mesh.points),
-        lambda f: f.attrs.__setitem__("format", "1"), lambda f: f.attrs.__delitem__("format"),
+        lambda f: f.__delitem__("single"),
+        lambda f: f.attrs.__delitem__("c_p"),
+        lambda f: changed(f, "hyper"),
+        lambda f: f.attrs.__setitem__("dt", "fast"),
+        lambda f: f.attrs.__setitem__("c_s", np.nan),
+        lambda f: f["double"].write_direct(b.double * np.nan),
+        lambda f: f["points"].write_direct(np.nan * mesh.points),
+        lambda f: f.attrs.__setitem__("format", "1"),
+        lambda f: f.attrs.__delitem__("format"),
     ):
         path.write_bytes(whole)
         with h5py.File(path, "r+") as file:
@@ -248,13 +279,16 @@ def changed(file: h5py.File, name: str) -> None:
     file[name] = np.zeros((30, 3))
 
 
-@pytest.mark.parametrize(("options", "message"), [
-    ({"dt": 3.0, "steps": 2}, "reduce the time step"),
-    ({"dt": 0.004, "steps": 2}, "enlarge the time step"),
-    ({"dt": -1.0, "steps": 2}, "above zero"),
-    ({"dt": 0.2, "steps": 0}, "steps is 0; give a whole number of at least 1"),
-    ({"dt": 0.2, "steps": 2.5}, "steps is 2.5"),
-])
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"dt": 3.0, "steps": 2}, "reduce the time step"),
+        ({"dt": 0.004, "steps": 2}, "enlarge the time step"),
+        ({"dt": -1.0, "steps": 2}, "above zero"),
+        ({"dt": 0.2, "steps": 0}, "steps is 0; give a whole number of at least 1"),
+        ({"dt": 0.2, "steps": 2.5}, "steps is 2.5"),
+    ],
+)
 def test_time_steps_that_are_refused(options, message):
     with pytest.raises(InputError, match=message):
         energetic_blocks(polygon(SQUARE, 0.2), MATERIAL, **options)

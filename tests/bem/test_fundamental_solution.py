@@ -47,8 +47,13 @@ def laplace_transform(r: float, s: float, operator: str, field: str) -> float:
     ends = [r / C_P, r / C_S, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0]
     total = 0.0
     for low, high in zip(ends[:-1], ends[1:], strict=True):
-        t, weight = low + (high - low) * x**2 * (3.0 - 2.0 * x), (high - low) * w * 6.0 * x * (1.0 - x)
-        values = [float(kernel(TimeKernels(ti, C_P, C_S)(np.array([r])), operator, field)[0]) for ti in t]
+        t, weight = (
+            low + (high - low) * x**2 * (3.0 - 2.0 * x),
+            (high - low) * w * 6.0 * x * (1.0 - x),
+        )
+        values = [
+            float(kernel(TimeKernels(ti, C_P, C_S)(np.array([r])), operator, field)[0]) for ti in t
+        ]
         total += float(np.sum(weight * np.exp(-s * t) * values))
     return total
 
@@ -60,7 +65,9 @@ def test_transforms_of_time_kernels_are_the_laplace_kernels(operator):
     exact = LaplaceKernels(s, C_P, C_S)(np.array([r]))
     for field in FIELDS[operator]:
         expected = complex(kernel(exact, operator, field)[0]) / s ** ORDERS[operator]
-        assert laplace_transform(r, s, operator, field) == pytest.approx(expected.real, rel=1e-12), field
+        assert laplace_transform(r, s, operator, field) == pytest.approx(
+            expected.real, rel=1e-12
+        ), field
 
 
 @pytest.mark.parametrize("t", [0.3, 0.44, 0.5, 1.7])
@@ -92,7 +99,9 @@ def many_digits(r: float, t: float) -> dict[tuple[str, str], float]:
             f[wave, 1] = ((time + root2.sqrt()) * speed / distance).ln()
             f[wave, 2] = time * f[wave, 1] - root2.sqrt()
             for n in (3, 4, 5):
-                f[wave, n] = ((2 * n - 3) * time * f[wave, n - 1] - root2 * f[wave, n - 2]) / (n - 1) ** 2
+                f[wave, n] = ((2 * n - 3) * time * f[wave, n - 1] - root2 * f[wave, n - 2]) / (
+                    n - 1
+                ) ** 2
             for n in (2, 3, 4, 5):
                 q[wave, n] = ((n - 1) * f[wave, n] - time * f[wave, n - 1]) / distance**2
         values = {}

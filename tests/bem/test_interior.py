@@ -8,7 +8,14 @@ from bem_rod import rod, smooth_integral, smooth_load
 from plane_waves import MATERIAL, SQUARE, pulse
 
 from demos.problems.interior import interior_displacement
-from vi_contact.bem import BoundaryProblem, PoincareSteklov, circle, energetic_blocks, polygon, traction_forces
+from vi_contact.bem import (
+    BoundaryProblem,
+    PoincareSteklov,
+    circle,
+    energetic_blocks,
+    polygon,
+    traction_forces,
+)
 from vi_contact.core.errors import InputError
 
 pytestmark = pytest.mark.serial
@@ -22,7 +29,9 @@ def test_pulse_crosses_the_square():
         mesh, steps = polygon(SQUARE, 1.0 / k), 3 * k
         blocks = energetic_blocks(mesh, MATERIAL, dt=1.0 / k, steps=steps)
         operator = PoincareSteklov(blocks, 1.0)
-        motion = BoundaryProblem(operator, traction_forces(mesh, wave.traction, dt=blocks.dt, steps=steps)).solve()
+        motion = BoundaryProblem(
+            operator, traction_forces(mesh, wave.traction, dt=blocks.dt, steps=steps)
+        ).solve()
         found = interior_displacement(operator, motion, POINTS)
         exact = np.array([wave.displacement(POINTS, t) for t in motion.times])
         errors.append(np.linalg.norm(found - exact) / np.linalg.norm(exact))
@@ -38,7 +47,10 @@ def test_rod_inside_and_density():
     for k, step in enumerate(steps):
         t, y = 0.1 * (step + 1), POINTS[:, 1]
         exact = smooth_integral(t - (0.5 - y)) - smooth_integral(t - (1.5 + y))
-        assert found[k, :, 1] == pytest.approx(0.5 * exact, abs=1.5e-2) and np.abs(found[k, :, 0]).max() < 5e-3
+        assert (
+            found[k, :, 1] == pytest.approx(0.5 * exact, abs=1.5e-2)
+            and np.abs(found[k, :, 0]).max() < 5e-3
+        )
 
 
 def test_points_that_are_refused():
@@ -48,7 +60,9 @@ def test_points_that_are_refused():
     for point in ((0.5, 0.1), (0.7, 0.0)):
         with pytest.raises(InputError, match="on the boundary or outside"):
             interior_displacement(problem.operator, motion, point)
-    hole = PoincareSteklov(energetic_blocks(circle(0.5, 8, exterior=True), MATERIAL, dt=0.3, steps=2), 1.0)
+    hole = PoincareSteklov(
+        energetic_blocks(circle(0.5, 8, exterior=True), MATERIAL, dt=0.3, steps=2), 1.0
+    )
     pushed = BoundaryProblem(hole, np.ones((2, 2, 8))).solve()
     assert interior_displacement(hole, pushed, (0.8, 0.0)).shape == (2, 1, 2)
     with pytest.raises(InputError, match="outside"):

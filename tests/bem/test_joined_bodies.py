@@ -35,12 +35,21 @@ JUMP, PUSH = 0.01, 0.3  # [m], [Pa]
 @cache
 def rods(component: int = 1) -> tuple[BoundaryProblem, BoundaryProblem]:
     """A soft rod of length 1 on a stiff one, ends free, sides held across ``component``."""
-    upper, lower = polygon([(0, 0), (1, 0), (1, 1), (0, 1)], 1 / K), polygon([(0, -1), (1, -1), (1, 0), (0, 0)], 1 / K)
+    upper, lower = (
+        polygon([(0, 0), (1, 0), (1, 1), (0, 1)], 1 / K),
+        polygon([(0, -1), (1, -1), (1, 0), (0, 0)], 1 / K),
+    )
     bodies = []
     for mesh, material, face in ((upper, UPPER, 0), (lower, LOWER, 2)):
         fixed = np.zeros((2, len(mesh)), bool)
         fixed[1 - component] = mesh.nodes_of(mesh.labels % 2 == 1)
-        bodies.append(unloaded(steklov(mesh, material, dt=DT, steps=STEPS), contact=mesh.labels == face, fixed=fixed))
+        bodies.append(
+            unloaded(
+                steklov(mesh, material, dt=DT, steps=STEPS),
+                contact=mesh.labels == face,
+                fixed=fixed,
+            )
+        )
     return bodies[0], bodies[1]
 
 
@@ -52,10 +61,14 @@ def joined(*, welded: bool = True, component: int = 1, **more) -> TwoBodies:
 def faces(bodies: TwoBodies, forces=None, component: int = 1):
     """Displacements (steps, nodes) of both faces, body 2 in the order of body 1, and the forces on them (steps,)."""
     motions = bodies.solve(forces)
-    u = [motion.displacement[:, component][:, body.contact_nodes]
-         for motion, body in zip(motions, (bodies.one, bodies.two), strict=True)]
-    force = [motion.forces[:, component][:, body.contact_nodes].sum(axis=1)
-             for motion, body in zip(motions, (bodies.one, bodies.two), strict=True)]
+    u = [
+        motion.displacement[:, component][:, body.contact_nodes]
+        for motion, body in zip(motions, (bodies.one, bodies.two), strict=True)
+    ]
+    force = [
+        motion.forces[:, component][:, body.contact_nodes].sum(axis=1)
+        for motion, body in zip(motions, (bodies.one, bodies.two), strict=True)
+    ]
     return u[0], u[1][:, ::-1], force[0], force[1]
 
 
@@ -64,12 +77,19 @@ def along(component: int, size: float):
     return lambda points, t: np.eye(2)[[component]] * np.full((len(points), 1), size * (t > 0.0))
 
 
-@pytest.mark.parametrize(("component", "z", "ringing"), [(1, (1.0, 2.0), 0.05), (0, (0.5, 1.0), 0.15)])
+@pytest.mark.parametrize(
+    ("component", "z", "ringing"), [(1, (1.0, 2.0), 0.05), (0, (0.5, 1.0), 0.15)]
+)
 def test_a_jump_of_displacements_across_a_weld(component, z, ringing):
     """B14: faces part in the first step and stay, by impedances, the force is a pulse of impulse G Z_1 Z_2/(Z_1 + Z_2);
     the jump itself is exact. Tension and shear waves; single nodes ring, c_S dt being h/4."""
-    above, below, on_one, on_two = faces(joined(component=component, jump=along(component, JUMP)), component=component)
-    assert np.abs(above - below - JUMP).max() < 1e-12 * JUMP and np.abs(on_one + on_two).max() < 1e-12 * on_one[0]
+    above, below, on_one, on_two = faces(
+        joined(component=component, jump=along(component, JUMP)), component=component
+    )
+    assert (
+        np.abs(above - below - JUMP).max() < 1e-12 * JUMP
+        and np.abs(on_one + on_two).max() < 1e-12 * on_one[0]
+    )
     exact = JUMP * z[1] / sum(z)
     assert above.mean(axis=1) == pytest.approx(np.full(STEPS, exact), rel=ringing)
     assert above == pytest.approx(np.full(above.shape, exact), rel=3.0 * ringing)
@@ -92,10 +112,17 @@ def test_a_jump_of_tractions_across_a_weld():
 
 def test_welds_of_the_unsymmetric_form():
     """B14: bodies whose W[0] is 2 % off symmetry are held as well as others: by a given jump, and beside rubbing."""
-    one, two = (replace(body, operator=PoincareSteklov(body.operator.blocks, body.operator.rho, symmetric=False))
-                for body in rods())
+    one, two = (
+        replace(
+            body, operator=PoincareSteklov(body.operator.blocks, body.operator.rho, symmetric=False)
+        )
+        for body in rods()
+    )
     motions = TwoBodies(one, two, welded=one.contact, jump=along(1, JUMP)).solve()
-    u = [motion.displacement[:, :, body.contact_nodes] for motion, body in zip(motions, (one, two), strict=True)]
+    u = [
+        motion.displacement[:, :, body.contact_nodes]
+        for motion, body in zip(motions, (one, two), strict=True)
+    ]
     assert np.abs(u[0] - u[1][:, :, ::-1] - JUMP * np.array([[0.0], [1.0]])).max() < 1e-12 * JUMP
     welded = np.zeros(len(one.contact), bool)
     welded[np.flatnonzero(one.contact)[:2]] = True
@@ -117,14 +144,22 @@ def test_jumps_where_bodies_only_touch():
         run = march_contact(bodies.contact())
         found, weld = faces(bodies, run.forces), faces(joined(**more))
         away = np.abs(found[0] - weld[0]).mean(axis=1)
-        assert run.r_n.min() >= 0.0 and away.max() < bound * weld[0].max()  # where a pulse rings, it opens for a while
+        assert (
+            run.r_n.min() >= 0.0 and away.max() < bound * weld[0].max()
+        )  # where a pulse rings, it opens for a while
     bodies = joined(welded=False, jump=along(1, -JUMP))
     run = march_contact(bodies.contact())
-    assert run.gap == pytest.approx(np.full(run.gap.shape, JUMP), rel=1e-12) and not run.forces.any()
+    assert (
+        run.gap == pytest.approx(np.full(run.gap.shape, JUMP), rel=1e-12) and not run.forces.any()
+    )
     bodies = joined(welded=False, traction=along(1, -PUSH))
     run = march_contact(bodies.contact())
     above, below, on_one, on_two = faces(bodies, run.forces)
-    assert not above.any() and not on_one.any() and on_two == pytest.approx(np.full(STEPS, -PUSH), rel=1e-12)
+    assert (
+        not above.any()
+        and not on_one.any()
+        and on_two == pytest.approx(np.full(STEPS, -PUSH), rel=1e-12)
+    )
     assert below.mean(axis=1) == pytest.approx(-PUSH * t / 2.0, rel=0.03)
     assert run.gap == pytest.approx(-below, rel=1e-9)
 
@@ -135,7 +170,9 @@ def test_sliding_against_a_given_jump():
     one, two = (replace(body, fixed=None) for body in rods())
 
     def jump(points, t):
-        return JUMP * t * np.stack([1.0 + points[:, 0], points[:, 0] * (1.0 - points[:, 0])], axis=1)
+        return (
+            JUMP * t * np.stack([1.0 + points[:, 0], points[:, 0] * (1.0 - points[:, 0])], axis=1)
+        )
 
     welded = TwoBodies(one, two, welded=one.contact, jump=jump)
     bodies = TwoBodies(one, two, jump=jump)
@@ -143,10 +180,14 @@ def test_sliding_against_a_given_jump():
     u = [motion.displacement for motion in welded.solve()]
     v = [motion.displacement for motion in bodies.solve(stuck.forces)]
     assert all(np.abs(a - b).max() < 1e-12 * np.abs(a).max() for a, b in zip(u, v, strict=True))
-    history = np.array([jump(one.operator.mesh.points[one.contact_nodes], DT * (k + 1)).T for k in range(STEPS)])
+    history = np.array(
+        [jump(one.operator.mesh.points[one.contact_nodes], DT * (k + 1)).T for k in range(STEPS)]
+    )
     limit = 1e-3
     for given in (jump, history):
-        run = march_contact(TwoBodies(one, two, jump=given).contact(vc.Tresca(limit), bilateral=True))
+        run = march_contact(
+            TwoBodies(one, two, jump=given).contact(vc.Tresca(limit), bilateral=True)
+        )
         slid = np.diff(run.displacement[:, : K + 1] - history[:, 0], axis=0, prepend=0.0)
         assert np.abs(run.slip - slid).max() < 1e-12 * JUMP
         rubbing = np.abs(run.slip) > 1e-9 * JUMP
@@ -161,13 +202,17 @@ def test_traction_given_on_a_rigid_support():
     fixed[0] = mesh.nodes_of(mesh.labels % 2 == 1)
     operator = steklov(mesh, UPPER, dt=DT, steps=19)
     rod = pressed(operator, pressure=lambda t: 1.0, top=2, contact=mesh.labels == 0, fixed=fixed)
-    lift = traction_forces(mesh, lambda x, n, t: -0.5 * n, dt=DT, steps=19, elements=mesh.labels == 0)
+    lift = traction_forces(
+        mesh, lambda x, n, t: -0.5 * n, dt=DT, steps=19, elements=mesh.labels == 0
+    )
     rod = replace(rod, forces=rod.forces + lift)
     run = march_contact(BoundaryContact(rod.condensed()))
     total = rod.solve(run.forces).forces[:, 1][:, rod.contact_nodes].sum(axis=1)
     t, back = run.times, 4.0 / 3.0
     assert total.min() == pytest.approx(0.5, rel=1e-12)
-    assert total[t < back] == pytest.approx(0.5, rel=1e-12) and total[t > back + DT] == pytest.approx(2.0, rel=0.05)
+    assert total[t < back] == pytest.approx(0.5, rel=1e-12) and total[
+        t > back + DT
+    ] == pytest.approx(2.0, rel=0.05)
     exact = np.maximum(0.5 * t - 2.0 * np.maximum(t - 1.0, 0.0), 0.0)
     assert run.gap.mean(axis=1) == pytest.approx(exact, abs=0.02)
 

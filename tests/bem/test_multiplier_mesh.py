@@ -45,8 +45,14 @@ def condensed():
 
 def own(**choice) -> MultiplierMesh:
     """Patches on the bottom of the square."""
-    return MultiplierMesh(**{"mesh": square().operator.mesh, "elements": square().contact, "compliance": condensed(),
-                             **choice})
+    return MultiplierMesh(
+        **{
+            "mesh": square().operator.mesh,
+            "elements": square().contact,
+            "compliance": condensed(),
+            **choice,
+        }
+    )
 
 
 @pytest.mark.parametrize("degree", [0, 1])
@@ -54,12 +60,16 @@ def test_the_pairing(degree):
     """B15: B R are the nodal forces of lambda: they do its work on linear displacements, exactly; Bᵀ u are means."""
     mesh = square().operator.mesh
     patches = own(patch=4, degree=degree)  # 6 elements: one patch of six
-    assert [len(patch) for patch in patches.patches] == [6] and [len(p) for p in own(patch=2).patches] == [2, 2, 2]
+    assert [len(patch) for patch in patches.patches] == [6] and [
+        len(p) for p in own(patch=2).patches
+    ] == [2, 2, 2]
     x, coarse = condensed().points[:, 0], patches.condensed()
     lam = np.array([3.0, 5.0])[: degree + 1]  # at the left and at the right end
     forces = patches.pairing @ (lam * coarse.lengths)
     work = 4.0 * 1.0 + 2.0 / 12.0 if degree else 3.0  # ∫ (4 + 2 x)(1 + x), or of 3
-    assert forces @ (1.0 + x) == pytest.approx(work, rel=1e-14) and coarse.lengths.sum() == pytest.approx(1.0)
+    assert forces @ (1.0 + x) == pytest.approx(
+        work, rel=1e-14
+    ) and coarse.lengths.sum() == pytest.approx(1.0)
     assert coarse.points[:, 0] == pytest.approx([[0.0], [-1.0 / 6.0, 1.0 / 6.0]][degree], abs=1e-15)
     assert np.array_equal(patches.pairing.shape, (len(x), degree + 1)) and mesh.labels.max() == 3
 
@@ -71,9 +81,13 @@ def test_patches_end_at_corners_and_close_circles():
     problem = BoundaryProblem(problem.operator, problem.forces, contact=sides)
     patches = MultiplierMesh(mesh, sides, problem.condensed(), patch=2, interval=1)
     runs = [mesh.labels[patch] for patch in patches.patches]
-    assert sorted(int(run[0]) for run in runs) == [0, 0, 1, 1, 3, 3] and all(len(set(run)) == 1 for run in runs)
+    assert sorted(int(run[0]) for run in runs) == [0, 0, 1, 1, 3, 3] and all(
+        len(set(run)) == 1 for run in runs
+    )
     normals = patches.condensed().normals
-    assert normals == pytest.approx(mesh.normals[[patch[0] for patch in patches.patches]], abs=1e-15)
+    assert normals == pytest.approx(
+        mesh.normals[[patch[0] for patch in patches.patches]], abs=1e-15
+    )
     ring, whole = circle(1.0, 40), np.ones(40, bool)
     disk = nothing(ring, whole, steps=2)
     around = MultiplierMesh(ring, whole, disk, patch=3, interval=2)
@@ -85,8 +99,15 @@ def test_patches_end_at_corners_and_close_circles():
 def nothing(mesh, elements, *, steps: int) -> CondensedCompliance:
     """The compliance of a body that does not move."""
     m = len(nodes := np.flatnonzero(mesh.nodes_of(elements)))
-    return CondensedCompliance(np.zeros((steps, 2 * m, 2 * m)), np.zeros((steps, 2 * m)), nodes, mesh.points[nodes],
-                               mesh.node_normals(elements)[nodes], mesh.node_lengths(elements)[nodes], 1.0)
+    return CondensedCompliance(
+        np.zeros((steps, 2 * m, 2 * m)),
+        np.zeros((steps, 2 * m)),
+        nodes,
+        mesh.points[nodes],
+        mesh.node_normals(elements)[nodes],
+        mesh.node_lengths(elements)[nodes],
+        1.0,
+    )
 
 
 def test_a_mean_normal_stands_for_30_degrees():
@@ -94,17 +115,24 @@ def test_a_mean_normal_stands_for_30_degrees():
     a circle the mean normal misses more than half of the pressure; two elements of 16, 22.5 degrees, miss 4 %."""
     ring, whole, steps = circle(1.0, 16), np.ones(16, bool), 2
     loads = np.tile(ring.node_normals(whole).T, (steps, 1, 1))
-    disk = BoundaryProblem(steklov(ring, MATERIAL, dt=0.4, steps=steps), loads, contact=whole).condensed()
+    disk = BoundaryProblem(
+        steklov(ring, MATERIAL, dt=0.4, steps=steps), loads, contact=whole
+    ).condensed()
     around = MultiplierMesh(ring, whole, disk, patch=2, interval=1)
     pressed_on = march_contact(BoundaryContact(around.condensed())).r_n.sum(axis=1)
     assert pressed_on == pytest.approx(np.full(steps, 16.0), rel=0.12)
     for patch, turn in ((3, "67.5"), (8, "15[78]"), (16, "180")):
-        with pytest.raises(InputError, match=f"one turns by {turn} degrees, more than 30, under one mean normal; give"):
+        with pytest.raises(
+            InputError,
+            match=f"one turns by {turn} degrees, more than 30, under one mean normal; give",
+        ):
             MultiplierMesh(ring, whole, disk, patch=patch, interval=1)
 
 
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("choice", [(1, 1, 0, "end"), (2, 2, 0, "end"), (3, 4, 1, "end"), (2, 3, 0, "mean")])
+@pytest.mark.parametrize(
+    "choice", [(1, 1, 0, "end"), (2, 2, 0, "end"), (3, 4, 1, "end"), (2, 3, 0, "mean")]
+)
 def test_the_second_line_holds_in_the_body(law, choice):
     """B15: the displacements of the body under B lambda, from the whole boundary, satisfy what is tested: means over
     patches, ends or means of intervals, increments of tangents; every interval is certified."""
@@ -112,7 +140,10 @@ def test_the_second_line_holds_in_the_body(law, choice):
     patches = own(patch=patch, interval=interval, degree=degree, testing=testing)
     run = march_contact(BoundaryContact(patches.condensed(), friction=LAWS[law]))
     assert run.worst < 1e-12 and run.r_n.max() > 0.1
-    u = square().solve(patches.forces(run.forces)).displacement[:, :, condensed().nodes] @ patches.pairing
+    u = (
+        square().solve(patches.forces(run.forces)).displacement[:, :, condensed().nodes]
+        @ patches.pairing
+    )
     history = np.concatenate([np.zeros_like(u[:1]), u])
     size, pushed = np.abs(u).max(), run.r_n / run.r_n.max()
     ends = history[interval::interval]
@@ -148,7 +179,9 @@ def rod() -> BoundaryProblem:
 
 def base_force(**choice) -> np.ndarray:
     """Pressure on the base of the rod in intervals of 3 steps, the front coming after two thirds of the third."""
-    patches = MultiplierMesh(rod().operator.mesh, rod().contact, rod().condensed(), patch=2, interval=3, **choice)
+    patches = MultiplierMesh(
+        rod().operator.mesh, rod().contact, rod().condensed(), patch=2, interval=3, **choice
+    )
     run = march_contact(BoundaryContact(patches.condensed()))
     return np.asarray(run.resultant[:, 1] / 0.5)
 
@@ -168,17 +201,31 @@ def test_the_weight():
     """B15: sigma = 0 are the means, digit for digit; the answer moves by O(sigma DT); with the weight the swing of the
     rod grows by (1 - theta)/theta an interval, theta the weighted middle, which is less than exp(2 sigma DT)."""
     patches = own(patch=2, interval=4, testing="mean", sigma=0.0)
-    assert patches.weights[0].tolist() == [0.125, 0.25, 0.25, 0.25, 0.125] and patches.weights[1].tolist() == [1.0] * 4
+    assert (
+        patches.weights[0].tolist() == [0.125, 0.25, 0.25, 0.25, 0.125]
+        and patches.weights[1].tolist() == [1.0] * 4
+    )
     start = own(patch=2, interval=4, testing="mean", sigma=1e4).weights[0]
-    assert start[0] > 0.999 and start.sum() == pytest.approx(1.0, abs=1e-15)  # a great one tests the start of intervals
+    assert start[0] > 0.999 and start.sum() == pytest.approx(
+        1.0, abs=1e-15
+    )  # a great one tests the start of intervals
     means = march_contact(BoundaryContact(patches.condensed())).r_n
     moved = []
     for sigma in (0.04, 0.02, 0.01):  # DT = 2/3
         other = own(patch=2, interval=4, testing="mean", sigma=sigma)
-        assert other.weights[0].sum() == pytest.approx(1.0, abs=1e-15) and (np.diff(other.weights[1]) < 0.0).all()
-        moved.append(np.abs(march_contact(BoundaryContact(other.condensed())).r_n - means).max() / means.max())
+        assert (
+            other.weights[0].sum() == pytest.approx(1.0, abs=1e-15)
+            and (np.diff(other.weights[1]) < 0.0).all()
+        )
+        moved.append(
+            np.abs(march_contact(BoundaryContact(other.condensed())).r_n - means).max()
+            / means.max()
+        )
     assert moved[:2] == pytest.approx([2.0 * moved[1], 2.0 * moved[2]], rel=0.1) and moved[0] < 0.1
-    swing, grown = base_force(testing="mean")[3:7] - 2.0, base_force(testing="mean", sigma=0.3)[3:7] - 2.0
+    swing, grown = (
+        base_force(testing="mean")[3:7] - 2.0,
+        base_force(testing="mean", sigma=0.3)[3:7] - 2.0,
+    )
     z = 2.0 * 0.3 * 0.375
     theta = 1.0 / z - 1.0 / np.expm1(z)
     growth = (grown[1:] / grown[:-1]) / (swing[1:] / swing[:-1])
@@ -189,7 +236,9 @@ def test_the_weight():
 def test_a_weight_that_lets_the_means_swing_without_bounds_is_refused():
     """The resultant was a thousand times that of the load, without a word."""
     for sigma in (1e3, 1e6):
-        with pytest.raises(InputError, match="the means swing .* times as far in each of 6 intervals; reduce sigma"):
+        with pytest.raises(
+            InputError, match="the means swing .* times as far in each of 6 intervals; reduce sigma"
+        ):
             own(patch=2, interval=4, testing="mean", sigma=sigma).condensed()
 
 
@@ -197,18 +246,26 @@ def test_inf_sup_constants():
     """B15: with H = h and, for means, DT = dt the constants vanish with the mesh: zig-zags of lambda are not seen. With
     patches of two elements and intervals of two steps they stay, sqrt(3)/2 in time; linear lambda takes four."""
     meshes = [polygon(SIDES, 1.0 / k) for k in (4, 12)]
-    one, two, linear, three = (np.array([space_constant(mesh, mesh.labels == 0, patch, degree) for mesh in meshes])
-                               for patch, degree in ((1, 0), (2, 0), (2, 1), (4, 1)))
+    one, two, linear, three = (
+        np.array([space_constant(mesh, mesh.labels == 0, patch, degree) for mesh in meshes])
+        for patch, degree in ((1, 0), (2, 0), (2, 1), (4, 1))
+    )
     assert one[1] < 0.5 * one[0] and linear[1] < 0.6 * linear[0]
     assert two.min() > 0.85 and three.min() > 0.8
     steps = [time_constant(n, 1, "mean") for n in (24, 48)]
     assert steps[1] == pytest.approx(0.5 * steps[0], rel=0.05)
-    assert time_constant(48, 2, "mean") == pytest.approx(np.sqrt(0.75), rel=1e-3) and time_constant(48, 1, "end") == 1.0
+    assert (
+        time_constant(48, 2, "mean") == pytest.approx(np.sqrt(0.75), rel=1e-3)
+        and time_constant(48, 1, "end") == 1.0
+    )
 
 
 def test_an_obstacle_that_moves():
     """B15: the mean of a motion over an interval: of a constant speed the place at its middle; at the end the place."""
-    middle, end = own(interval=3, testing="mean").averaged(lambda t: 2.0 * t), own(interval=3).averaged(lambda t: t**2)
+    middle, end = (
+        own(interval=3, testing="mean").averaged(lambda t: 2.0 * t),
+        own(interval=3).averaged(lambda t: t**2),
+    )
     assert middle(1.0) == pytest.approx(2.0 * (1.0 - 1.5 / K), rel=1e-14) and end(0.7) == 0.7**2
 
 
@@ -217,28 +274,49 @@ def test_the_benchmark(tmp_path):
     Uzawa's method more iterations; its picture."""
     spec = spec_from_file_location("bem_multiplier", ROOT / "benchmarks" / "bem_multiplier.py")
     assert spec and spec.loader
-    benchmark = sys.modules["bem_multiplier"] = module_from_spec(spec)  # its dataclasses look for their module
+    benchmark = sys.modules["bem_multiplier"] = module_from_spec(
+        spec
+    )  # its dataclasses look for their module
     spec.loader.exec_module(benchmark)
     square, fine = benchmark.Square(6), benchmark.Square(8).finest("none")
-    end, mean, thin, both = (square.row("none", fine, patch=patch, interval=interval, testing=testing) for
-                             patch, interval, testing in ((2, 2, "end"), (2, 2, "mean"), (1, 1, "end"), (4, 4, "mean")))
-    assert mean["oscillation"] > 3.0 * end["oscillation"] and mean["energy_error"] > 5.0 * end["energy_error"]
+    end, mean, thin, both = (
+        square.row("none", fine, patch=patch, interval=interval, testing=testing)
+        for patch, interval, testing in (
+            (2, 2, "end"),
+            (2, 2, "mean"),
+            (1, 1, "end"),
+            (4, 4, "mean"),
+        )
+    )
+    assert (
+        mean["oscillation"] > 3.0 * end["oscillation"]
+        and mean["energy_error"] > 5.0 * end["energy_error"]
+    )
     assert min(end["inf_sup"], mean["inf_sup"]) > 0.75 and thin["inf_sup"] < 0.5
-    assert thin["uzawa"] > 1.3 * end["uzawa"] and set(benchmark.KEYS) <= set(thin) and end["impulse_error"] < 0.03
+    assert (
+        thin["uzawa"] > 1.3 * end["uzawa"]
+        and set(benchmark.KEYS) <= set(thin)
+        and end["impulse_error"] < 0.03
+    )
     drawn = benchmark.plot_multiplier([end, mean, thin, both], tmp_path / "ratio.png")
     assert drawn.stat().st_size > 20_000
 
 
 def test_bad_input():
-    for wrong, words in (({"patch": 7}, "a side has 6 elements"), ({"interval": 5}, "5 does not divide"),
-                         ({"sigma": 1.0}, "sigma is for means"),
-                         ({"sigma": 1e300, "testing": "mean"}, "gives ends of steps no weight"),
-                         ({"mesh": polygon(2.0 * np.array(SIDES), 2.0 / K)}, "other nodes than mesh"),
-                         ({"mesh": polygon(SIDES, 1.0), "elements": np.ones(4, bool)}, "other nodes than mesh")):
+    for wrong, words in (
+        ({"patch": 7}, "a side has 6 elements"),
+        ({"interval": 5}, "5 does not divide"),
+        ({"sigma": 1.0}, "sigma is for means"),
+        ({"sigma": 1e300, "testing": "mean"}, "gives ends of steps no weight"),
+        ({"mesh": polygon(2.0 * np.array(SIDES), 2.0 / K)}, "other nodes than mesh"),
+        ({"mesh": polygon(SIDES, 1.0), "elements": np.ones(4, bool)}, "other nodes than mesh"),
+    ):
         with pytest.raises(InputError, match=words):
             own(**wrong)
     mesh = square().operator.mesh
     with pytest.raises(InputError, match="all their nodes in the compliance"):
         MultiplierMesh(mesh, mesh.labels == 1, condensed())
     with pytest.raises(InputError, match="not positive definite"):
-        march_contact(BoundaryContact(own(patch=1, degree=1).condensed()))  # more multipliers than nodes
+        march_contact(
+            BoundaryContact(own(patch=1, degree=1).condensed())
+        )  # more multipliers than nodes

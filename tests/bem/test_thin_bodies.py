@@ -39,12 +39,19 @@ def wedge(height: float) -> BoundaryMesh:
 
 SHAPES = {
     "slab of h/20": slab(H / 20),
-    "no node faces another": polygon([(-0.01, -0.5), (0.01, -0.5), (0.01, 0.5), (-0.01, 0.5)], (1, 9, 1, 7)),
+    "no node faces another": polygon(
+        [(-0.01, -0.5), (0.01, -0.5), (0.01, 0.5), (-0.01, 0.5)], (1, 9, 1, 7)
+    ),
     "7 degrees": wedge(0.12),
     "3 degrees": wedge(0.06),
-    "crack": polygon([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (0.03, 0.5), (0.0, 0.0), (-0.03, 0.5), (-0.5, 0.5)], H),
+    "crack": polygon(
+        [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (0.03, 0.5), (0.0, 0.0), (-0.03, 0.5), (-0.5, 0.5)],
+        H,
+    ),
     "slot": polygon([(-0.01, -0.5), (-0.01, 0.5), (0.01, 0.5), (0.01, -0.5)], H, exterior=True),
-    "short among long": polygon([(-0.5, -0.5), (-0.00625, -0.5), (0, -0.5), (0.5, -0.5), (0, 0.5)], (4, 1, 4, 9, 9)),
+    "short among long": polygon(
+        [(-0.5, -0.5), (-0.00625, -0.5), (0, -0.5), (0.5, -0.5), (0, 0.5)], (4, 1, 4, 9, 9)
+    ),
 }
 
 
@@ -55,7 +62,10 @@ def test_points_of_thin_bodies(name):
         found, exact = in_time(SHAPES[name], t), in_time(SHAPES[name], t, MANY)
         for kind in ("single", "double", "hyper"):
             size = np.abs(getattr(exact, kind)).max()
-            assert np.abs(getattr(found, kind) - getattr(exact, kind)).max() < 5e-5 * size, (kind, t)
+            assert np.abs(getattr(found, kind) - getattr(exact, kind)).max() < 5e-5 * size, (
+                kind,
+                t,
+            )
 
 
 @pytest.mark.parametrize("fronts", [(), (0.05, 0.1)])
@@ -70,17 +80,25 @@ def test_elements_that_face_each_other(fronts):
     fine = (np.arange(300)[:, None] + 0.5 * (x + 1.0)).ravel() / 300
     weight = np.tile(0.5 * w, 300) / 300
     for pair in close[:6]:
-        d = (pairs.offset[:, pair, None, None] + pairs.a[:, pair, None, None] * fine[:, None]
-             - pairs.b[:, pair, None, None] * fine)
+        d = (
+            pairs.offset[:, pair, None, None]
+            + pairs.a[:, pair, None, None] * fine[:, None]
+            - pairs.b[:, pair, None, None] * fine
+        )
         shapes = np.stack([1.0 - fine, fine]) * weight
         plain = np.einsum("ax,kxy,by->kab", shapes, peaks(d, fronts), shapes).reshape(3, 4)
-        assert np.abs(total[:, pair] - plain).max() < (1e-6 if not fronts else 2e-4) * np.abs(plain).max()
+        assert (
+            np.abs(total[:, pair] - plain).max()
+            < (1e-6 if not fronts else 2e-4) * np.abs(plain).max()
+        )
 
 
 def peaks(d: np.ndarray, fronts: tuple[float, ...]) -> np.ndarray:
     """(3, ...) integrands with the singularities of the kernels, zero beyond the greatest front."""
     r = np.hypot(*d)
-    kinks = sum((np.sqrt(np.maximum(front**2 - r**2, 0.0)) for front in fronts), start=np.ones_like(r))
+    kinks = sum(
+        (np.sqrt(np.maximum(front**2 - r**2, 0.0)) for front in fronts), start=np.ones_like(r)
+    )
     reached = r < max(fronts, default=np.inf)
     return np.stack([np.log(r), d[0] / r**2 * 0.01, kinks]) * reached
 
@@ -89,7 +107,9 @@ def pulled(mesh: BoundaryMesh, dt: float, steps: int) -> tuple[np.ndarray, np.nd
     """Loads of the top, (sin pi t/2)² until t = 2, and rollers at the sides on a fixed base: the rod of c = 1."""
     fixed = np.stack([mesh.nodes_of(np.isin(mesh.labels, (1, 3))), mesh.nodes_of(mesh.labels == 0)])
     top = mesh.labels == 2
-    return traction_forces(mesh, lambda x, n, t: n * load(t), dt=dt, steps=steps, elements=top), fixed
+    return traction_forces(
+        mesh, lambda x, n, t: n * load(t), dt=dt, steps=steps, elements=top
+    ), fixed
 
 
 def load(t: float) -> float:
@@ -98,7 +118,9 @@ def load(t: float) -> float:
 
 def exact_top(t: np.ndarray) -> np.ndarray:
     def way(s: np.ndarray) -> np.ndarray:
-        return np.where(s <= 0.0, 0.0, np.where(s < 2.0, 0.5 * s - np.sin(np.pi * s) / (2.0 * np.pi), 1.0))
+        return np.where(
+            s <= 0.0, 0.0, np.where(s < 2.0, 0.5 * s - np.sin(np.pi * s) / (2.0 * np.pi), 1.0)
+        )
 
     return way(t) - 2.0 * way(t - 2.0)
 
@@ -125,7 +147,9 @@ def test_thin_rod(share):
     assert errors[1] < 0.12 and errors[1] < 0.6 * errors[0]
     inside = interior_displacement(operator, motion, [(0.0, 0.25)], steps=[15, 47])[:, 0, 1]
     sides = np.flatnonzero(np.isclose(mesh.points[:, 1], 0.25))
-    assert inside == pytest.approx(motion.displacement[[15, 47]][:, 1, sides].mean(axis=1), abs=0.01)
+    assert inside == pytest.approx(
+        motion.displacement[[15, 47]][:, 1, sides].mean(axis=1), abs=0.01
+    )
 
 
 @pytest.mark.parametrize("ratio", [1.0, 0.1])
@@ -158,16 +182,33 @@ def test_symmetric_form_is_positive_on_thin_bodies(name):
 def test_ordinary_bodies_keep_their_points():
     """Nothing is close on squares, disks and notches, so that their matrices stay what they were."""
     notched = [(-3, -4), (3, -4), (3, 0), (1, 0), (1, -2), (-1, -2), (-1, 0), (-3, 0)]
-    for mesh in (polygon(SQUARE, 0.2), circle(0.5, 40), circle(0.5, 24, exterior=True), polygon(notched, 0.5)):
+    for mesh in (
+        polygon(SQUARE, 0.2),
+        circle(0.5, 40),
+        circle(0.5, 24, exterior=True),
+        polygon(notched, 0.5),
+    ):
         assert not ElementPairs(mesh).close.any()
 
 
-@pytest.mark.parametrize(("mesh", "words"), [
-    (slab(H / 21), r"comes near itself at \(-0\.00297619, .* 1/20 of the 0\.125 m .* at most 0\.119 m"),
-    (wedge(0.04), "comes near itself .* widen the angle"),
-    (polygon([(0, 0), (1, 0), (1, 0.04)], (1, 1, 1)), r"sharp or uneven corner at \(1, 0\.04\).* more equal"),
-    (polygon(SQUARE, (50, 50, 2, 2)), "elements .* are 0.02 m apart, less than 1/20 of the 0.5 m"),
-])
+@pytest.mark.parametrize(
+    ("mesh", "words"),
+    [
+        (
+            slab(H / 21),
+            r"comes near itself at \(-0\.00297619, .* 1/20 of the 0\.125 m .* at most 0\.119 m",
+        ),
+        (wedge(0.04), "comes near itself .* widen the angle"),
+        (
+            polygon([(0, 0), (1, 0), (1, 0.04)], (1, 1, 1)),
+            r"sharp or uneven corner at \(1, 0\.04\).* more equal",
+        ),
+        (
+            polygon(SQUARE, (50, 50, 2, 2)),
+            "elements .* are 0.02 m apart, less than 1/20 of the 0.5 m",
+        ),
+    ],
+)
 def test_what_is_too_thin(mesh, words):
     with pytest.raises(InputError, match=words):
         energetic_blocks(mesh, MATERIAL, dt=H, steps=1)

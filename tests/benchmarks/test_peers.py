@@ -19,8 +19,11 @@ from vi_contact import __version__
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[2]
 PEERS = ROOT / "benchmarks" / "peers"
-OURS = [("signorini", "best"), ("signorini", "default"), *((one, way) for one in ("thrown", "bar")
-                                                           for way in ("best", "never gains"))]
+OURS = [
+    ("signorini", "best"),
+    ("signorini", "default"),
+    *((one, way) for one in ("thrown", "bar") for way in ("best", "never gains")),
+]
 ROUND_OFF = 1e-10  # errors and penetrations below are zero
 
 
@@ -94,13 +97,24 @@ def test_bar_measures_of_the_exact_solution(problems: Any) -> None:
     """The exact solution at the middles of steps has no error; shifted by a step it has one."""
     exact, dt = problems.bar_reference(), problems.BAR["dt"]
     t = dt * np.arange(1, problems.BAR["steps"] + 1)
-    answer = {"t": t, "force": exact.force(t - 0.5 * dt), "foot": exact.foot(t),
-              "energy": np.full(len(t), exact.energy), "u": exact.displacement(np.linspace(0.0, 10.0, 101), t[-1])}
+    answer = {
+        "t": t,
+        "force": exact.force(t - 0.5 * dt),
+        "foot": exact.foot(t),
+        "energy": np.full(len(t), exact.energy),
+        "u": exact.displacement(np.linspace(0.0, 10.0, 101), t[-1]),
+    }
     found = problems.measure("bar", answer, 0)
     assert found["force_error"] == 0.0 and found["energy_end"] == 1.0
     assert found["displacement_error"] < 1e-9 and found["penetration"] < 1e-9
-    assert len(exact.contacts(t[-1])) == problems.BAR["bounces"] and t[-1] == pytest.approx(5.0 * exact.period)
-    assert 0.0 < problems.measure("bar", answer | {"force": exact.force(t - 1.5 * dt)}, 0)["force_error"] < 0.2
+    assert len(exact.contacts(t[-1])) == problems.BAR["bounces"] and t[-1] == pytest.approx(
+        5.0 * exact.period
+    )
+    assert (
+        0.0
+        < problems.measure("bar", answer | {"force": exact.force(t - 1.5 * dt)}, 0)["force_error"]
+        < 0.2
+    )
 
 
 def test_thrown_reference_is_its_command_s(problems: Any) -> None:
@@ -113,7 +127,9 @@ def test_thrown_reference_is_its_command_s(problems: Any) -> None:
     stored = json.loads((PEERS / "thrown_reference.json").read_text(encoding="utf-8"))
     fine = stored["runs"][-1]
     assert stored["impulse"] == fine["impulse"] and stored["impulse_uncertainty"] < 1e-3
-    assert stored["largest_force"] == pytest.approx(1000.0 * np.sqrt(1.0e7 * 0.7 / (1.3 * 0.4) / 1000.0), rel=1e-12)
+    assert stored["largest_force"] == pytest.approx(
+        1000.0 * np.sqrt(1.0e7 * 0.7 / (1.3 * 0.4) / 1000.0), rel=1e-12
+    )
     assert fine["largest_mean_of_2_ms"] == pytest.approx(stored["largest_force"], rel=0.015)
     assert thrown_reference.run(16)["impulse"] == pytest.approx(stored["impulse"], rel=0.01)
 
@@ -134,10 +150,16 @@ def test_page_says_what_was_measured(compare: Any) -> None:
     """Tables, ways, machine and versions of the page are those of the stored run, in which every peer has its rows."""
     page = (PEERS.parents[1] / "docs" / "reference" / "comparison.md").read_text(encoding="utf-8")
     stored = json.loads((PEERS / "results.json").read_text(encoding="utf-8"))
-    assert compare.renewed(page, compare.parts_of(stored)) == page  # else: compare.py --page with the page's path
+    assert (
+        compare.renewed(page, compare.parts_of(stored)) == page
+    )  # else: compare.py --page with the page's path
     rows = stored["rows"]
-    assert {(row["name"], row["problem"]) for row in rows} == set(product(compare.names(), compare.PROBLEMS))
-    uncertain = json.loads((PEERS / "thrown_reference.json").read_text(encoding="utf-8"))["impulse_uncertainty"]
+    assert {(row["name"], row["problem"]) for row in rows} == set(
+        product(compare.names(), compare.PROBLEMS)
+    )
+    uncertain = json.loads((PEERS / "thrown_reference.json").read_text(encoding="utf-8"))[
+        "impulse_uncertainty"
+    ]
     assert f"by {100.0 * uncertain:.2f} %" in page
     told = " ".join(page.split())
     for words in claims(rows):
@@ -151,7 +173,9 @@ def stored_rows() -> list[dict[str, Any]]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("problem, way", OURS)
-def test_our_rows_are_measured(problems: Any, monkeypatch: pytest.MonkeyPatch, problem: str, way: str) -> None:
+def test_our_rows_are_measured(
+    problems: Any, monkeypatch: pytest.MonkeyPatch, problem: str, way: str
+) -> None:
     """What the program of this project answers today is what its stored rows say; of the bar the first bounce."""
     pytest.importorskip("dolfinx")
     monkeypatch.syspath_prepend(str(PEERS))
@@ -159,14 +183,20 @@ def test_our_rows_are_measured(problems: Any, monkeypatch: pytest.MonkeyPatch, p
 
     told, n = ("force_error", "penetration", "energy_error"), 16
     if problem == "thrown":
-        told, n = ("energy_end", "energy_largest", "impulse", "largest_force", "penetration"), problems.THROWN["n"]
+        told, n = (
+            ("energy_end", "energy_largest", "impulse", "largest_force", "penetration"),
+            problems.THROWN["n"],
+        )
     if problem == "bar":
         told, n = ("force_error_first",), 0
         monkeypatch.setitem(problems.BAR, "steps", 800)
     answer = peer.signorini(n, way) if problem == "signorini" else getattr(peer, problem)(way)
     found = problems.measure(problem, answer, n)
-    (row,) = (one for one in stored_rows() if (one["name"], one["problem"], one["way"], one["n"]) == (
-        "vi_contact", problem, way, n))
+    (row,) = (
+        one
+        for one in stored_rows()
+        if (one["name"], one["problem"], one["way"], one["n"]) == ("vi_contact", problem, way, n)
+    )
     for name in told:
         assert found[name] == pytest.approx(row[name], rel=1e-4, abs=ROUND_OFF), name
 
@@ -175,21 +205,30 @@ def test_our_rows_are_measured(problems: Any, monkeypatch: pytest.MonkeyPatch, p
 def test_a_row_is_a_process(compare: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """A row has its times and its measures, or says why it has none."""
     pytest.importorskip("dolfinx")
-    assert [(one, way) for one, ways in compare.words_of("vi_contact")["WAYS"].items() for way in ways] == OURS
+    assert [
+        (one, way) for one, ways in compare.words_of("vi_contact")["WAYS"].items() for way in ways
+    ] == OURS
     monkeypatch.setattr(compare, "LONG", 0.0)  # once
     monkeypatch.setenv("PYTHONPATH", str(ROOT), prepend=os.pathsep)
     row = compare.one("vi_contact", "signorini", 16, "default")
     assert "failed" not in row, row
-    assert row["process"] > row["solve"] > 0.0 and max(row["force_error"], row["energy_error"]) < ROUND_OFF
+    assert (
+        row["process"] > row["solve"] > 0.0
+        and max(row["force_error"], row["energy_error"]) < ROUND_OFF
+    )
     assert "no_way" in compare.one("vi_contact", "no_way", 16, "default")["failed"]
 
 
 def test_rows_of_this_program_are_those_of_its_version() -> None:
     """After a new version: bash benchmarks/peers/run.sh --json benchmarks/peers/results.json, and the page."""
-    assert {row["version"].split(",")[0] for row in stored_rows() if row["name"] == "vi_contact"} == {__version__}
+    assert {
+        row["version"].split(",")[0] for row in stored_rows() if row["name"] == "vi_contact"
+    } == {__version__}
 
 
-def test_the_figure_is_drawn_from_the_stored_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_figure_is_drawn_from_the_stored_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """What benchmarks/peers/figure.py draws has a curve or a mark for each program."""
     monkeypatch.syspath_prepend(str(PEERS))
     import figure
@@ -212,32 +251,61 @@ if __name__ == "__main__":
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("pip, why", [("echo ERROR: No matching distribution found for absent; exit 1",
-                                       "not installed: ERROR: No matching distribution found for absent"),
-                                      ("exit 0", "KeyError: 'version'")])
-def test_a_peer_that_is_not_there_becomes_rows_that_say_so(tmp_path: Path, pip: str, why: str) -> None:
+@pytest.mark.parametrize(
+    "pip, why",
+    [
+        (
+            "echo ERROR: No matching distribution found for absent; exit 1",
+            "not installed: ERROR: No matching distribution found for absent",
+        ),
+        ("exit 0", "KeyError: 'version'"),
+    ],
+)
+def test_a_peer_that_is_not_there_becomes_rows_that_say_so(
+    tmp_path: Path, pip: str, why: str
+) -> None:
     """The script goes on: a program that cannot be installed, or does not start, has a row for each problem."""
     folder = tmp_path / "benchmarks" / "peers"
-    shutil.copytree(PEERS, folder, ignore=shutil.ignore_patterns("peer_*", "__pycache__", "results.json"))
+    shutil.copytree(
+        PEERS, folder, ignore=shutil.ignore_patterns("peer_*", "__pycache__", "results.json")
+    )
     shutil.copytree(ROOT / "install", tmp_path / "install")
     (folder / "peer_absent.py").write_text(PEER, encoding="utf-8")
     python = tmp_path / ".venv" / "peers" / "absent" / "bin" / "python"
     python.parent.mkdir(parents=True)
-    python.write_text(f'#!/bin/bash\n[ "$1" != -m ] || {{ {pip}; }}\nexec {sys.executable} "$@"\n', encoding="utf-8")
+    python.write_text(
+        f'#!/bin/bash\n[ "$1" != -m ] || {{ {pip}; }}\nexec {sys.executable} "$@"\n',
+        encoding="utf-8",
+    )
     python.chmod(0o755)
-    done = subprocess.run(["bash", str(folder / "run.sh"), "--json", "rows.json", "absent"], cwd=tmp_path,
-                          capture_output=True, encoding="utf-8", env=dict(os.environ), timeout=600, check=False)
+    done = subprocess.run(
+        ["bash", str(folder / "run.sh"), "--json", "rows.json", "absent"],
+        cwd=tmp_path,
+        capture_output=True,
+        encoding="utf-8",
+        env=dict(os.environ),
+        timeout=600,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     rows = json.loads((tmp_path / "rows.json").read_text(encoding="utf-8"))["rows"]
-    assert [(row["problem"], row["failed"]) for row in rows] == [(one, why) for one in ("signorini", "thrown", "bar")]
-    assert "- Absent not installed" in done.stdout and done.stdout.count(f"| Absent |  | {why} |") == 3
+    assert [(row["problem"], row["failed"]) for row in rows] == [
+        (one, why) for one in ("signorini", "thrown", "bar")
+    ]
+    assert (
+        "- Absent not installed" in done.stdout and done.stdout.count(f"| Absent |  | {why} |") == 3
+    )
 
 
 def claims(rows: list[dict[str, Any]]) -> list[str]:
     """What the sentences of the page say with numbers, made from the rows."""
 
     def of(name: str, problem: str, way: str, key: str) -> float:
-        return next(row[key] for row in rows if (row["name"], row["problem"], row["way"]) == (name, problem, way))
+        return next(
+            row[key]
+            for row in rows
+            if (row["name"], row["problem"], row["way"]) == (name, problem, way)
+        )
 
     def percent(name: str, problem: str, way: str, digits: int = 0) -> str:
         return f"{100.0 * abs(of(name, problem, way, 'energy_end') - 1.0):.{digits}f} %"
@@ -248,19 +316,36 @@ def claims(rows: list[dict[str, Any]]) -> list[str]:
 
     blown = {one: [row["energy_end"] for row in rows if row["problem"] == one and row.get("energy_end", 0.0) > 2.0]
              for one in ("thrown", "bar")}  # fmt: skip
-    peaks = [row["largest_force_error"] for row in rows if row["problem"] == "thrown" and row["energy_end"] > 2.0]
-    ways = (("getfem", "best"), ("calculix", "default"), ("scikit_fem", "best"), ("vi_contact", "best"))
+    peaks = [
+        row["largest_force_error"]
+        for row in rows
+        if row["problem"] == "thrown" and row["energy_end"] > 2.0
+    ]
+    ways = (
+        ("getfem", "best"),
+        ("calculix", "default"),
+        ("scikit_fem", "best"),
+        ("vi_contact", "best"),
+    )
     over = [f"{of(name, 'thrown', way, 'largest_force_error'):.3f}" for name, way in ways]
     order = sorted(row["largest_force_error"] for row in rows if row["problem"] == "thrown")
     assert over == [f"{one:.3f}" for one in order[:4]]
     names = ("getfem", "siconos", "vi_contact")
     first = {name: f"({of(name, 'bar', 'best', 'force_error_first'):.3f})" for name in names}
     never = of("vi_contact", "bar", "never gains", "force_error_first")
-    fast = [of("scikit_fem", one, "best", "solve") / of("vi_contact", one, "best", "solve") for one in blown]
-    close = {name: of(name, "bar", "best", "force_error") for name in ("ngsolve", "calculix", "getfem", "vi_contact")}
+    fast = [
+        of("scikit_fem", one, "best", "solve") / of("vi_contact", one, "best", "solve")
+        for one in blown
+    ]
+    close = {
+        name: of(name, "bar", "best", "force_error")
+        for name in ("ngsolve", "calculix", "getfem", "vi_contact")
+    }
     assert list(close.values()) == sorted(close.values())
     assert close["ngsolve"] == min(row["force_error"] for row in rows if row["problem"] == "bar")
-    assert of("scikit_fem", "bar", "best", "force_error_first") < of("vi_contact", "bar", "best", "force_error_first")
+    assert of("scikit_fem", "bar", "best", "force_error_first") < of(
+        "vi_contact", "bar", "best", "force_error_first"
+    )
     return [
         f"{min(blown['thrown']):.1f} to {max(blown['thrown']):.1f} times its energy",
         f"{min(blown['bar']):.0f} to {max(blown['bar']):.0f} times its own",

@@ -27,7 +27,9 @@ def first_step(benchmark: Any) -> Any:
 
     def start_up(rounds: int) -> tuple[float, list[float]]:
         command = [sys.executable, "-c", benchmark.FIRST_STEP, "run"]
-        return float(subprocess.run(command, capture_output=True, text=True, check=True).stdout), [1.0]
+        return float(subprocess.run(command, capture_output=True, text=True, check=True).stdout), [
+            1.0
+        ]
 
     return start_up
 
@@ -35,39 +37,87 @@ def first_step(benchmark: Any) -> Any:
 def at_most(measured: Any, size: float) -> Any:
     """The function with no larger box than this: it is computed once."""
     small = cache(measured)
-    return lambda *given: small(*(min(one, size) if isinstance(one, float) else one for one in given))
+    return lambda *given: small(
+        *(min(one, size) if isinstance(one, float) else one for one in given)
+    )
 
 
-SMALL: Mapping[str, tuple[str, str, Mapping[str, Any]]] = {  # name -> its words, what it prints, smaller parts of it
+SMALL: Mapping[
+    str, tuple[str, str, Mapping[str, Any]]
+] = {  # name -> its words, what it prints, smaller parts of it
     "beam_steps": ("--elements 20 --repeat 1", r"^ +20( +\d\.\d{3}){4}$", {"STEPS": 20}),
     "bem": ("--one 3 18 1", r'"pulse P": 0\.1.*"step": 0\.0.*"march": ', {}),
     "bem_convolution": ("--one convolution 3", r'"pulse P": 0\.0.*"Uzawa": \d', {}),
-    "bem_error_of_forms": ("--levels 2 4 8 --examples square --supports rollers",
-                           r"^square, rollers +unsymmetric +4 .*\n.* 8 ", {}),
-    "bem_forms": ("--sides 3 --laws none", r"form unsymmetric, impulse 4\.7.*negative_eigenvalues 0", {}),
+    "bem_error_of_forms": (
+        "--levels 2 4 8 --examples square --supports rollers",
+        r"^square, rollers +unsymmetric +4 .*\n.* 8 ",
+        {},
+    ),
+    "bem_forms": (
+        "--sides 3 --laws none",
+        r"form unsymmetric, impulse 4\.7.*negative_eigenvalues 0",
+        {},
+    ),
     "bem_tractions": ("--elements 4 --cells 8", r"^ +4 +8 Coulomb 0.5  shear ", {}),
-    "contact_in_space": ("--hertz 2 --mindlin --torsion", r"^plane +2 ", {"PROBLEMS": lambda one: {
-        "hertz": one.PROBLEMS["hertz"][:1]}}),
+    "contact_in_space": (
+        "--hertz 2 --mindlin --torsion",
+        r"^plane +2 ",
+        {"PROBLEMS": lambda one: {"hertz": one.PROBLEMS["hertz"][:1]}},
+    ),
     "friction_cost": ("--sizes 5e2 --steps 2", r"^ +560 +20 FixedPoint, Anderson ", {}),
     "ida": ("--records 1 --scales 1 --duration 0.1 --mesh 2 3", r"^worst_difference +0$", {}),
-    "ledger": ("--steps 3 --only Midpoint() --json", r'^ +"defect, thrown": \d', {"DIVISIONS": (4, 2)}),
-    "raft": ("--sizes 2e4 --steps 2 --no-gravity", r"^  steps +2\n  worst +\d", {
-        "raft.SIZES": lambda one: {"2e4": 2.0}}),
-    "raft --halving": ("--halving", r"^  worst certificate ", {
-        "HALVED": [(2.0, 1e-2)], "raft.T_END": 0.05}),
-    "schemes": ("--elements 8 --bounces 1 --blocks 50 --only GeneralisedAlpha", r"^\| GeneralisedAlpha, rho 0.8 \| 50 ",
-                {}),
-    "second_order": ("--bending 2 --hertz 2 --impact 4", r"^bending, plane stress +2 P2 (?s:.*)^impact +4 P2 ", {
-        "SECTIONS": lambda one: {"plane stress": one.SECTIONS["plane stress"]},
-        "ELEMENTS": lambda one: {name: one.ELEMENTS[name] for name in ("Q2", "P2")}}),
-    "small_systems": ("--steps 5 --rounds 1", r"^ +216 +11  simulate (?s:.*)^start-up: \d", {"start_up": first_step}),
+    "ledger": (
+        "--steps 3 --only Midpoint() --json",
+        r'^ +"defect, thrown": \d',
+        {"DIVISIONS": (4, 2)},
+    ),
+    "raft": (
+        "--sizes 2e4 --steps 2 --no-gravity",
+        r"^  steps +2\n  worst +\d",
+        {"raft.SIZES": lambda one: {"2e4": 2.0}},
+    ),
+    "raft --halving": (
+        "--halving",
+        r"^  worst certificate ",
+        {"HALVED": [(2.0, 1e-2)], "raft.T_END": 0.05},
+    ),
+    "schemes": (
+        "--elements 8 --bounces 1 --blocks 50 --only GeneralisedAlpha",
+        r"^\| GeneralisedAlpha, rho 0.8 \| 50 ",
+        {},
+    ),
+    "second_order": (
+        "--bending 2 --hertz 2 --impact 4",
+        r"^bending, plane stress +2 P2 (?s:.*)^impact +4 P2 ",
+        {
+            "SECTIONS": lambda one: {"plane stress": one.SECTIONS["plane stress"]},
+            "ELEMENTS": lambda one: {name: one.ELEMENTS[name] for name in ("Q2", "P2")},
+        },
+    ),
+    "small_systems": (
+        "--steps 5 --rounds 1",
+        r"^ +216 +11  simulate (?s:.*)^start-up: \d",
+        {"start_up": first_step},
+    ),
     "soil_boundaries": ("--only dashpots --angles 45 --cells 6", r"^\| 45° \| 0\.00394 \|", {}),
-    "soil_boundaries --only boxes": ("--only boxes", r"^tied sides 3 depths away: 0 %$(?s:.*) 4 depths wide, free: ", {
-        "shaken_box_in_space": lambda one: at_most(one.shaken_box_in_space, 4.0),
-        "level_box": lambda one: at_most(one.level_box, 4.0)}),
-    "soil_boundaries --only sides": ("--only sides", r"^\| free field \|( \S+ % \|){4} 0 % \|$", {
-        "STEPS": 3, "shaken_box": lambda one: at_most(one.shaken_box, 5.0 * one.DEPTH)}),
-    "step_cost": ("--problems wall --sizes 5e2 --steps 2", r"^ +560 +20 +\d+ +wall Coulomb\(mu=0.4\)", {}),
+    "soil_boundaries --only boxes": (
+        "--only boxes",
+        r"^tied sides 3 depths away: 0 %$(?s:.*) 4 depths wide, free: ",
+        {
+            "shaken_box_in_space": lambda one: at_most(one.shaken_box_in_space, 4.0),
+            "level_box": lambda one: at_most(one.level_box, 4.0),
+        },
+    ),
+    "soil_boundaries --only sides": (
+        "--only sides",
+        r"^\| free field \|( \S+ % \|){4} 0 % \|$",
+        {"STEPS": 3, "shaken_box": lambda one: at_most(one.shaken_box, 5.0 * one.DEPTH)},
+    ),
+    "step_cost": (
+        "--problems wall --sizes 5e2 --steps 2",
+        r"^ +560 +20 +\d+ +wall Coulomb\(mu=0.4\)",
+        {},
+    ),
 }
 
 
@@ -81,8 +131,9 @@ def loud() -> Iterator[None]:
 
 
 @pytest.mark.parametrize("name", SMALL)
-def test_a_benchmark_runs_with_small_sizes(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                                           capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_benchmark_runs_with_small_sizes(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """From its command line to its last row."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(FOLDER))

@@ -18,7 +18,9 @@ from demos.boundary_layer.trajectory import LayerContact, Trajectory, layer_moti
 from vi_contact.core.errors import InputError, StepFailure
 
 pytestmark = pytest.mark.serial
-PLANE = ConstrainedSystem(np.eye(2), lambda q: q[0], lambda q: np.array([1.0, 0.0]))  # a unit mass before x = 0
+PLANE = ConstrainedSystem(
+    np.eye(2), lambda q: q[0], lambda q: np.array([1.0, 0.0])
+)  # a unit mass before x = 0
 
 
 def normal_mass(M: np.ndarray, A: np.ndarray) -> float:
@@ -56,8 +58,13 @@ def test_particle():
 
 def test_cut_off_changes_duration_not_restitution():
     """V5.1: x(0) = b, k = c = b = 1; a/b from 0.8 to 1."""
-    expected = {0.8: (1.88108, 0.66174), 0.9: (1.73233, 0.69887), 0.95: (1.66183, 0.71734), 0.99: (1.60709, 0.73208),
-                1.0: (1.59362, 0.73576)}
+    expected = {
+        0.8: (1.88108, 0.66174),
+        0.9: (1.73233, 0.69887),
+        0.95: (1.66183, 0.71734),
+        0.99: (1.60709, 0.73208),
+        1.0: (1.59362, 0.73576),
+    }
     for start, (duration, deepest) in expected.items():
         found = collide(Layer(1.0, k=1.0, c=1.0, start=start))
         assert found.restitution == pytest.approx(0.593624260040, abs=1e-8)
@@ -67,19 +74,26 @@ def test_cut_off_changes_duration_not_restitution():
 def test_full_metric():
     """V5.1: g_11 + ĝ_11 in the place of the dominant term; the blended reading is its limit a -> b."""
     full = collide(Layer(1.0, k=1.0, c=1.0), metric=Metric.FULL)
-    assert (full.duration, full.restitution, full.deepest) == pytest.approx((2.70353, 0.56918, 0.55461), abs=5.1e-6)
-    assert collide(Layer(1.0, k=1.0, c=1.0), metric=Metric.BLENDED).restitution == pytest.approx(full.restitution)
+    assert (full.duration, full.restitution, full.deepest) == pytest.approx(
+        (2.70353, 0.56918, 0.55461), abs=5.1e-6
+    )
+    assert collide(Layer(1.0, k=1.0, c=1.0), metric=Metric.BLENDED).restitution == pytest.approx(
+        full.restitution
+    )
     near = collide(Layer(1.0, k=1.0, c=1.0, start=0.99), metric=Metric.BLENDED)
     assert near.restitution == pytest.approx(full.restitution, abs=2e-3)
     assert near.restitution < full.restitution - 5e-4
     for metric in (Metric.FULL, Metric.BLENDED):  # nothing is lost without c
-        assert collide(Layer(1.0, k=1.0, start=0.8), metric=metric).restitution == pytest.approx(1.0, abs=1e-9)
+        assert collide(Layer(1.0, k=1.0, start=0.8), metric=metric).restitution == pytest.approx(
+            1.0, abs=1e-9
+        )
 
 
 def test_any_coordinates_any_mass_matrix():
     """(27), (28): the same particle in polar coordinates, M(q) = diag(1, r²), affinities by differences."""
     polar = ConstrainedSystem(
-        lambda q: np.diag([1.0, q[0] ** 2]), lambda q: q[0] * np.cos(q[1]),
+        lambda q: np.diag([1.0, q[0] ** 2]),
+        lambda q: q[0] * np.cos(q[1]),
         lambda q: np.array([np.cos(q[1]), -q[0] * np.sin(q[1])]),
     )
 
@@ -97,7 +111,10 @@ def test_events_flight_and_several_contacts():
     """A ball falls from 1 m on a thin layer of e = ½ and bounces: times and speeds of the point mass, less O(b)."""
     g, b = 9.81, 1e-6
     ball = ConstrainedSystem(
-        np.array([[2.0]]), lambda q: q[0], lambda q: np.ones(1), force=lambda t, q, v: np.array([-2.0 * g])
+        np.array([[2.0]]),
+        lambda q: q[0],
+        lambda q: np.ones(1),
+        force=lambda t, q, v: np.array([-2.0 * g]),
     )
     speed = np.sqrt(2.0 * g)
     layer = layer_for(0.5, mass=2.0, speed=speed, width=b)  # V known: the damper is linear
@@ -108,11 +125,19 @@ def test_events_flight_and_several_contacts():
     assert motion.contacts[1].start - first.end == pytest.approx(2.0 * first.rate_out / g, abs=1e-8)
     again = layer_motion(ball, Layer(b, k=layer.k, c=layer.c), q0=[1.0 + b], v0=[0.0], t_end=1.2)
     second = [one.contacts[1].restitution for one in (motion, again)]
-    slower = restitution(0.5 * damping_ratio(0.5))  # c/V fixed: half the speed halves s; V of each impact: s stays
+    slower = restitution(
+        0.5 * damping_ratio(0.5)
+    )  # c/V fixed: half the speed halves s; V of each impact: s stays
     assert second == pytest.approx([slower, 0.5], abs=1e-5)
-    assert np.all(motion.rho > 0.0) and np.all(np.diff(motion.t) >= 0.0) and motion.t[-1] == pytest.approx(1.2)
+    assert (
+        np.all(motion.rho > 0.0)
+        and np.all(np.diff(motion.t) >= 0.0)
+        and motion.t[-1] == pytest.approx(1.2)
+    )
     fine = layer_motion(ball, layer, q0=[1.0 + b], v0=[0.0], t_end=0.4, refine=5)
-    assert fine.rho == pytest.approx(1.0 + b - 0.5 * g * fine.t**2, abs=1e-12) and len(fine.t) % 5 == 1
+    assert (
+        fine.rho == pytest.approx(1.0 + b - 0.5 * g * fine.t**2, abs=1e-12) and len(fine.t) % 5 == 1
+    )
 
 
 # Rigid body ----------------------------------------------------------------------------------------------------------
@@ -132,7 +157,11 @@ def test_rigid_body_impact_map():
     """V5.2: A, g_11, the velocities after the impact, the loss."""
     q = np.array([0.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0])
     assert BODY.gradient(q) == pytest.approx([0.0, 0.0, 1.0, -0.2, -0.3, 0.0], abs=1e-15)
-    assert BODY.normal_mass(q) == pytest.approx(1.0, abs=1e-15) == normal_mass(BODY.matrix, BODY.gradient(q))
+    assert (
+        BODY.normal_mass(q)
+        == pytest.approx(1.0, abs=1e-15)
+        == normal_mass(BODY.matrix, BODY.gradient(q))
+    )
     assert BODY.gradient(q) @ BEFORE == pytest.approx(-0.98, abs=1e-15)
     after = BODY.after_impact(q, BEFORE, 0.593624260040)
     assert after == pytest.approx(AFTER, abs=5.1e-9)
@@ -155,13 +184,18 @@ def test_rigid_body_through_the_layer():
 def test_an_ellipsoid_turns_and_bounces():
     """Support point, gradient and its rate of an ellipsoid: A is d rho along the motion; energy in flight."""
     body = RigidBody(2.0, (0.2, 0.3, 0.4), Ellipsoid((0.5, 0.4, 0.3)), gravity=(0.0, 0.0, -9.81))
-    q0, v0 = np.array([0.0, 0.0, 1.5, 1.0, 0.2, -0.1, 0.3]), np.array([0.3, 0.0, 0.0, 0.5, -0.4, 3.0])
+    q0, v0 = (
+        np.array([0.0, 0.0, 1.5, 1.0, 0.2, -0.1, 0.3]),
+        np.array([0.3, 0.0, 0.0, 0.5, -0.4, 3.0]),
+    )
     q0[3:] /= np.linalg.norm(q0[3:])
     system, h = body.system(), 1e-5
     rate = system.velocity(q0, v0)
     ahead, behind = body.rho(q0 + h * rate), body.rho(q0 - h * rate)
     assert (ahead - behind) / (2.0 * h) == pytest.approx(body.gradient(q0) @ v0, abs=1e-9)
-    curvature = (ahead + behind - 2.0 * body.rho(q0)) / h**2  # p moves along a straight line: the same turn to O(h³)
+    curvature = (
+        ahead + behind - 2.0 * body.rho(q0)
+    ) / h**2  # p moves along a straight line: the same turn to O(h³)
     assert curvature == pytest.approx(system.turning(q0, v0), abs=1e-4 * abs(curvature))
     layer = layer_for(0.6, mass=1.0, speed=5.0, width=1e-4)
     motion = layer_motion(system, Layer(1e-4, k=layer.k, c=layer.c), q0=q0, v0=v0, t_end=0.9)
@@ -190,8 +224,12 @@ def test_metric_and_affinities():
     hat = b_metric(M, A, rho, b) - M
     assert hat == pytest.approx(g * (b / rho) ** 2 * np.outer(A, A), abs=1e-12)
     turned = -np.einsum("k,i,j->kij", g * np.linalg.solve(M, A), A, A) / rho  # the affinities (21)
-    assert np.einsum("k,kij,i,j->", A, turned, v, v) == pytest.approx(-((A @ v) ** 2) / rho, rel=1e-12)
-    orthogonal = M @ np.linalg.svd(A[None, :])[2][1:].T  # momenta of directions with A v = 0 get nothing
+    assert np.einsum("k,kij,i,j->", A, turned, v, v) == pytest.approx(
+        -((A @ v) ** 2) / rho, rel=1e-12
+    )
+    orthogonal = (
+        M @ np.linalg.svd(A[None, :])[2][1:].T
+    )  # momenta of directions with A v = 0 get nothing
     assert np.einsum("ks,kij->sij", orthogonal, turned) == pytest.approx(0.0, abs=1e-10)
 
 
@@ -200,13 +238,17 @@ def test_pendulum():
     """(29) to (34): a rod of length 1 m from 1 rad: period, tension below, and the constraint without drift."""
     m, g, angle = 2.0, 9.81, 1.0
     rod = ConstrainedSystem(
-        m * np.eye(2), lambda q: np.hypot(*q) - 1.0, lambda q: q / np.hypot(*q),
+        m * np.eye(2),
+        lambda q: np.hypot(*q) - 1.0,
+        lambda q: q / np.hypot(*q),
         force=lambda t, q, v: np.array([0.0, -m * g]),
     )
     period = 4.0 / np.sqrt(g) * ellipk(np.sin(0.5 * angle) ** 2)
     q0 = np.array([np.sin(angle), -np.cos(angle)])
     motion = bilateral_motion([rod], q0=q0, v0=np.zeros(2), times=np.linspace(0.0, period, 5))
-    assert motion.q[-1] == pytest.approx(q0, abs=1e-8) and motion.q[1] == pytest.approx([0.0, -1.0], abs=1e-8)
+    assert motion.q[-1] == pytest.approx(q0, abs=1e-8) and motion.q[1] == pytest.approx(
+        [0.0, -1.0], abs=1e-8
+    )
     assert -motion.reaction[1, 0] == pytest.approx(m * g * (3.0 - 2.0 * np.cos(angle)), rel=1e-8)
     assert np.max(np.abs(motion.phi)) < 1e-9
 
@@ -233,15 +275,21 @@ def test_a_string_in_the_layer_tends_to_the_rod():
     """The same pendulum on a string, rho = L - |q| >= 0: its tension differs from the rod's by O(b)."""
     m, g, angle = 2.0, 9.81, 1.0
     string = ConstrainedSystem(
-        m * np.eye(2), lambda q: 1.0 - np.hypot(*q), lambda q: -q / np.hypot(*q),
+        m * np.eye(2),
+        lambda q: 1.0 - np.hypot(*q),
+        lambda q: -q / np.hypot(*q),
         force=lambda t, q, v: np.array([0.0, -m * g]),
     )
     quarter = 1.0 / np.sqrt(g) * ellipk(np.sin(0.5 * angle) ** 2)
     errors = []
     for b in (1e-2, 1e-3):
         layer = Layer(b, k=4.0 * m * g / b, c=4.0 * m * g, speed=np.sqrt(g * b), start=0.5 * b)
-        q0 = (1.0 - 0.8548632868746187 * b) * np.array([np.sin(angle), -np.cos(angle)])  # in equilibrium along it
-        motion = layer_motion(string, layer, q0=q0, v0=np.zeros(2), t_end=quarter, metric=Metric.FULL, rtol=1e-9)
+        q0 = (1.0 - 0.8548632868746187 * b) * np.array(
+            [np.sin(angle), -np.cos(angle)]
+        )  # in equilibrium along it
+        motion = layer_motion(
+            string, layer, q0=q0, v0=np.zeros(2), t_end=quarter, metric=Metric.FULL, rtol=1e-9
+        )
         errors.append(motion.reaction[-1] / (m * g) - (3.0 - 2.0 * np.cos(angle)))
         assert motion.rho.min() > 0.0 and motion.rho.max() < b
     assert 0.0 < errors[1] == pytest.approx(0.127 * errors[0], rel=0.01) and errors[0] < 3e-4
@@ -254,7 +302,9 @@ def test_starts_and_systems_that_cannot_be():
         layer_motion(PLANE, layer, q0=[-0.1, 0.0], v0=[-1.0, 0.0], t_end=1.0)
     with pytest.raises(InputError, match="t_end is 0.0"):
         layer_motion(PLANE, layer, q0=[1.0, 0.0], v0=[-1.0, 0.0], t_end=0.0)
-    with pytest.raises(InputError, match="layer speed V is 0.0"):  # in the layer, at rest, V unknown
+    with pytest.raises(
+        InputError, match="layer speed V is 0.0"
+    ):  # in the layer, at rest, V unknown
         layer_motion(PLANE, layer, q0=[0.5, 0.0], v0=[0.0, 0.0], t_end=1.0)
     with pytest.raises(InputError, match="mass matrix is not symmetric positive definite"):
         ConstrainedSystem(np.diag([1.0, -1.0]), PLANE.rho, PLANE.gradient)
@@ -272,7 +322,9 @@ def test_starts_and_systems_that_cannot_be():
 
 def test_a_motion_that_cannot_be_integrated_names_its_time():
     wild = ConstrainedSystem(
-        np.eye(2), PLANE.rho, PLANE.gradient,
+        np.eye(2),
+        PLANE.rho,
+        PLANE.gradient,
         force=lambda t, q, v: np.array([-1.0, np.nan if t > 0.25 else 0.0]),
     )
     with pytest.raises(StepFailure, match=r"beyond t = 0\.2"):
@@ -285,25 +337,60 @@ ENDLESS = {
     "place": (lambda: pushed(q0=[INF, 0.0]), InputError, "q0 is inf"),
     "time": (lambda: pushed(t_end=INF), InputError, "t_end is inf"),
     "force": (lambda: pushed(lambda t: NAN), InputError, "force.* at the start is nan"),
-    "force on the way": (lambda: pushed(lambda t: INF if t > 0.25 else 0.0), StepFailure, r"beyond t = 0\.25"),
-    "force in the layer": (lambda: pushed(lambda t: -INF if t > 0.95 else 0.0), StepFailure, r"beyond t = 0\.9"),
+    "force on the way": (
+        lambda: pushed(lambda t: INF if t > 0.25 else 0.0),
+        StepFailure,
+        r"beyond t = 0\.25",
+    ),
+    "force in the layer": (
+        lambda: pushed(lambda t: -INF if t > 0.95 else 0.0),
+        StepFailure,
+        r"beyond t = 0\.9",
+    ),
     "distance": (lambda: pushed(rho=lambda q: NAN), InputError, r"rho\(q\) at the start is nan"),
-    "distance on the way": (lambda: pushed(rho=lambda q: q[0] if q[0] > 0.5 else NAN), StepFailure, "rho.* nan"),
+    "distance on the way": (
+        lambda: pushed(rho=lambda q: q[0] if q[0] > 0.5 else NAN),
+        StepFailure,
+        "rho.* nan",
+    ),
     "great numbers": (lambda: pushed(v0=[-1e300, 0.0]), StepFailure, "beyond t = 0 s"),
-    "held": (lambda: bilateral_motion([system()], q0=[0.0, 0.0], v0=[0.0, NAN], times=[0.0, 1.0]), InputError, "v0"),
-    "held, force": (lambda: bilateral_motion([system(lambda t: INF if t > 0.5 else 1.0)], q0=[0.0, 0.0], v0=[0.0, 1.0],
-                                             times=[0.0, 1.0]), StepFailure, r"t = 0\.5"),
-    "held twice": (lambda: bilateral_motion([system(), system()], q0=[0.0, 0.0], v0=[0.0, 1.0], times=[0.0, 1.0]),
-                   StepFailure, "Singular matrix"),
+    "held": (
+        lambda: bilateral_motion([system()], q0=[0.0, 0.0], v0=[0.0, NAN], times=[0.0, 1.0]),
+        InputError,
+        "v0",
+    ),
+    "held, force": (
+        lambda: bilateral_motion(
+            [system(lambda t: INF if t > 0.5 else 1.0)],
+            q0=[0.0, 0.0],
+            v0=[0.0, 1.0],
+            times=[0.0, 1.0],
+        ),
+        StepFailure,
+        r"t = 0\.5",
+    ),
+    "held twice": (
+        lambda: bilateral_motion(
+            [system(), system()], q0=[0.0, 0.0], v0=[0.0, 1.0], times=[0.0, 1.0]
+        ),
+        StepFailure,
+        "Singular matrix",
+    ),
 }
 
 
 def system(force=lambda t: 0.0, rho=lambda q: float(q[0])):
-    return ConstrainedSystem(np.eye(2), rho, lambda q: np.array([1.0, 0.0]),
-                             force=lambda t, q, v: np.array([force(t), 0.0]))
+    return ConstrainedSystem(
+        np.eye(2),
+        rho,
+        lambda q: np.array([1.0, 0.0]),
+        force=lambda t, q, v: np.array([force(t), 0.0]),
+    )
 
 
-def pushed(force=lambda t: 0.0, *, rho=lambda q: float(q[0]), q0=(1.0, 0.0), v0=(-1.0, 0.0), t_end=3.0):
+def pushed(
+    force=lambda t: 0.0, *, rho=lambda q: float(q[0]), q0=(1.0, 0.0), v0=(-1.0, 0.0), t_end=3.0
+):
     return layer_motion(system(force, rho), Layer(0.1, k=1.0), q0=q0, v0=v0, t_end=t_end)
 
 

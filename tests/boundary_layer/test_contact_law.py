@@ -44,7 +44,9 @@ def stiff(e: float, metric: Metric, *, dt: float, elements: int = 1, E: float = 
     problem = bar(elements, E=E, gap=0.2, v0=lambda x: np.full_like(x, -10.0))
     for report in run(problem, BoundaryLayer(law=law_of(e, metric)), dt=dt, steps=round(0.12 / dt)):
         assert report.certificate.worst < 1e-9
-    assert problem.surface.gap0[0] - problem.surface.normal_values(report.new.u)[0] > 0.1  # it has left
+    assert (
+        problem.surface.gap0[0] - problem.surface.normal_values(report.new.u)[0] > 0.1
+    )  # it has left
     momentum = float(np.sum(problem.system.M @ problem.cartesian(report.new.v)))
     return momentum / (10.0 * 10.0 * e)
 
@@ -68,11 +70,22 @@ def test_order_two():
         assert errors[2] < errors[0] / 10.0, errors
 
 
-def layered_bar(b: float, *, e: float = 0.5, make: Any = thrown, elements: int = 50, metric: Metric = Metric.FLAT):
+def layered_bar(
+    b: float,
+    *,
+    e: float = 0.5,
+    make: Any = thrown,
+    elements: int = 50,
+    metric: Metric = Metric.FLAT,
+):
     """(problem, reports) of the bar of V1.1 with a layer whose mass is what a wave passes while the layer is passed."""
     problem = make(elements)
     law = contact_layer(e, mass=IMPEDANCE * b / 10.0, speed=10.0, width=b, metric=metric)
-    return problem, law, run(problem, BoundaryLayer(law=law), dt=b / 150.0, steps=round(1.4 * 150.0 / b))
+    return (
+        problem,
+        law,
+        run(problem, BoundaryLayer(law=law), dt=b / 150.0, steps=round(1.4 * 150.0 / b)),
+    )
 
 
 @serial
@@ -81,8 +94,15 @@ def test_bar_tends_to_the_exact_inequality():
     errors = []
     for b in (1.0, 0.5):
         problem, law, reports = layered_bar(b)
-        rows = [(one.new.t, problem.surface.gap0[0] - problem.surface.normal_values(one.new.u)[0], one.new.r_n[0],
-                 one.certificate.worst) for one in reports]
+        rows = [
+            (
+                one.new.t,
+                problem.surface.gap0[0] - problem.surface.normal_values(one.new.u)[0],
+                one.new.r_n[0],
+                one.certificate.worst,
+            )
+            for one in reports
+        ]
         t, gap, force, worst = np.array(rows).T
         assert gap.min() > 0.0 and worst.max() < 1e-12
         assert force.min() > -3.0  # the damper pulls a little when the gap opens
@@ -133,15 +153,26 @@ def test_mean_pressure():
     x, v, a, dt = 0.07, -1.5, 40.0, 1e-6  # a body on its way
     end = np.array([x + v * dt + 0.5 * a * dt**2])
     found = law.mean_pressure(end, np.array([x]), np.array([v / x]), dt)[0][0]
-    exact = 0.01 * float(law.layer.cut_off(x)) / x * (300.0 - 10.0 * v / x - 3.0 * (a / x - (v / x) ** 2))
+    exact = (
+        0.01
+        * float(law.layer.cut_off(x))
+        / x
+        * (300.0 - 10.0 * v / x - 3.0 * (a / x - (v / x) ** 2))
+    )
     assert found == pytest.approx(exact, rel=1e-4)
     conservative = ContactLayer(Layer(0.1, k=300.0, speed=2.0, start=0.05))
     work = conservative.mean_pressure(rho, old, rate, 1e-3)[0] * (rho - old)
-    assert work == pytest.approx(3.0 * (conservative.potential(rho) - conservative.potential(old)), abs=1e-12)
+    assert work == pytest.approx(
+        3.0 * (conservative.potential(rho) - conservative.potential(old)), abs=1e-12
+    )
     assert conservative.potential(np.array([0.1, 0.3])).tolist() == [0.0, 0.0]
-    assert conservative.mean_pressure(np.array([0.2]), np.array([0.3]), np.array([-1.0]), 0.1)[0].tolist() == [0.0]
+    assert conservative.mean_pressure(np.array([0.2]), np.array([0.3]), np.array([-1.0]), 0.1)[
+        0
+    ].tolist() == [0.0]
     at_rest = np.array([0.02])
-    assert conservative.mean_pressure(at_rest, at_rest, np.zeros(1), 1.0)[0] == pytest.approx([3.0 / 0.02], rel=1e-12)
+    assert conservative.mean_pressure(at_rest, at_rest, np.zeros(1), 1.0)[0] == pytest.approx(
+        [3.0 / 0.02], rel=1e-12
+    )
 
 
 @serial
@@ -163,8 +194,12 @@ def test_restart_and_change_of_step(tmp_path):
     scheme = BoundaryLayer(law=law_of(0.5))
     straight = simulate(problem, scheme=scheme, dt=5e-4, steps=30, progress=False)
     simulate(problem, scheme=scheme, dt=5e-4, steps=13, out=tmp_path, progress=False)
-    again = simulate(problem, scheme=scheme, dt=5e-4, steps=30, out=tmp_path, restart=True, progress=False)
-    assert np.array_equal(again.state.u, straight.state.u) and np.array_equal(again.state.v, straight.state.v)
+    again = simulate(
+        problem, scheme=scheme, dt=5e-4, steps=30, out=tmp_path, restart=True, progress=False
+    )
+    assert np.array_equal(again.state.u, straight.state.u) and np.array_equal(
+        again.state.v, straight.state.v
+    )
     assert straight.facts["energy_defect"] < 1e-10 and straight.history["contact_active"].max() == 1
     plan = Schedule(((5e-4, 5e-3), (2.5e-4, np.inf)))
     finer = simulate(problem, scheme=scheme, dt=plan, t_end=0.015, progress=False)
@@ -175,19 +210,40 @@ def test_restart_and_change_of_step(tmp_path):
 @pytest.mark.parametrize(
     ("make", "word"),
     [
-        (lambda law: ContactLayer(Layer(0.1, k=1.0, speed=1.0, start=0.05), mass=-1.0), "mass per area is -1.0"),
+        (
+            lambda law: ContactLayer(Layer(0.1, k=1.0, speed=1.0, start=0.05), mass=-1.0),
+            "mass per area is -1.0",
+        ),
         (lambda law: ContactLayer(Layer(0.1, k=1.0, start=0.05)), "needs the layer's speed V"),
         (lambda law: ContactLayer(Layer(0.1, k=1.0, speed=1.0)), "force that fades out"),
-        (lambda law: contact_layer(0.5, mass=0.0, speed=1.0, width=0.1), "the mass per area is 0.0"),
+        (
+            lambda law: contact_layer(0.5, mass=0.0, speed=1.0, width=0.1),
+            "the mass per area is 0.0",
+        ),
         (lambda law: contact_layer(1.5, mass=1.0, speed=1.0, width=0.1), "coefficient e is 1.5"),
-        (lambda law: contact_layer(0.5, mass=1.0, speed=1.0, width=0.1, metric=Metric.FULL), "have <Metric.FULL"),
+        (
+            lambda law: contact_layer(0.5, mass=1.0, speed=1.0, width=0.1, metric=Metric.FULL),
+            "have <Metric.FULL",
+        ),
         (lambda law: law.rebound(3.0, 1.0), "metric is that of 1.0 kg/m²"),
         (lambda law: _check(law, friction=Coulomb(0.3)), "without friction"),
         (lambda law: _check(law, impact=Inelastic()), "makes the rebound itself"),
-        (lambda law: _check(law, surface=lambda s: s.bilateral_everywhere()), "unilateral contact on rigid supports"),
-        (lambda law: _check(law, surface=lambda s: s.on_springs(1.0)), "unilateral contact on rigid supports"),
-        (lambda law: _check(law, surface=lambda s: s.moving(towards=lambda t: t)), "obstacle at rest"),
-        (lambda law: _check(law, surface=_crowded), r"10001 contact unknowns .* take an impact law .*Newton\(e\)"),
+        (
+            lambda law: _check(law, surface=lambda s: s.bilateral_everywhere()),
+            "unilateral contact on rigid supports",
+        ),
+        (
+            lambda law: _check(law, surface=lambda s: s.on_springs(1.0)),
+            "unilateral contact on rigid supports",
+        ),
+        (
+            lambda law: _check(law, surface=lambda s: s.moving(towards=lambda t: t)),
+            "obstacle at rest",
+        ),
+        (
+            lambda law: _check(law, surface=_crowded),
+            r"10001 contact unknowns .* take an impact law .*Newton\(e\)",
+        ),
     ],
 )
 def test_what_the_law_refuses(make, word):
@@ -204,7 +260,9 @@ def _crowded(surface: Any) -> Any:
 
 def _check(law: ContactLayer, surface: Any = None, **more: Any) -> None:
     problem = replace(chain_problem(2, gap=1.0), **more)
-    BoundaryLayer(law=law).check(problem if surface is None else replace(problem, surface=surface(problem.surface)))
+    BoundaryLayer(law=law).check(
+        problem if surface is None else replace(problem, surface=surface(problem.surface))
+    )
 
 
 @serial
@@ -212,7 +270,9 @@ def test_starts_outside_the_admissible_set():
     """A closed gap has no layer: the message says what to do, and set_back does it."""
     problem = chain_problem(2, excitation=Harmonic(1.0, 2.0, direction=(1.0,)))
     law = contact_layer(1.0, mass=1.0, speed=1.0, width=0.1)
-    with pytest.raises(InputError, match="contact point 0 starts with gap 0 m, outside the admissible set"):
+    with pytest.raises(
+        InputError, match="contact point 0 starts with gap 0 m, outside the admissible set"
+    ):
         next(march(problem, scheme=BoundaryLayer(law=law), dt=1e-3, steps=1))
     behind = replace(problem, surface=law.set_back(problem.surface))
     state, _ = next(march(behind, scheme=BoundaryLayer(law=law), dt=1e-3, steps=1))
@@ -224,7 +284,9 @@ def test_a_step_that_does_not_converge_is_named(monkeypatch):
     monkeypatch.setattr(layered, "NEWTON_STEPS", 1)
     law = law_of(0.5)
     problem = bar(1, E=1e9, gap=0.2, v0=lambda x: np.full_like(x, -10.0))
-    with pytest.raises(StepFailure, match=r"reactions of step 2 at t = 0\.02 s were not found in 1 Newton steps"):
+    with pytest.raises(
+        StepFailure, match=r"reactions of step 2 at t = 0\.02 s were not found in 1 Newton steps"
+    ):
         for _ in run(problem, BoundaryLayer(law=law), dt=1e-2, steps=5):
             pass
 
@@ -234,8 +296,15 @@ def test_a_gap_lost_to_rounding_is_named():
     """A layer that is thinner than the last digit of the displacements."""
     problem = thrown(2)
     scheme, state = BoundaryLayer(law=law_of(0.5)), initial_state(problem)
-    with pytest.raises(StepFailure, match=r"step 1 at t = 0\.001 s begins with a gap of .* make the layer wider"):
-        scheme.step(problem, replace(state, u=np.r_[5.0, -5.0, -5.0]), scheme.effective_matrix(problem, 1e-3), 1e-3)
+    with pytest.raises(
+        StepFailure, match=r"step 1 at t = 0\.001 s begins with a gap of .* make the layer wider"
+    ):
+        scheme.step(
+            problem,
+            replace(state, u=np.r_[5.0, -5.0, -5.0]),
+            scheme.effective_matrix(problem, 1e-3),
+            1e-3,
+        )
 
 
 # Finite elements -----------------------------------------------------------------------------------------------------
@@ -275,7 +344,9 @@ def test_wall_tends_to_the_exact_inequality(comm):
         concrete = model.wall.material
         impedance = np.sqrt(concrete.E * concrete.rho)
         law = contact_layer(0.5, mass=impedance * b / 1e-2, speed=1e-2, width=b, metric=Metric.FLAT)
-        found = displacements(replace(exact, surface=law.set_back(exact.surface)), BoundaryLayer(law=law))
+        found = displacements(
+            replace(exact, surface=law.set_back(exact.surface)), BoundaryLayer(law=law)
+        )
         assert 0.0 < found.max() < b
         errors.append(float(np.sqrt(np.mean((found - reference) ** 2))))
     assert errors[0] < 0.05 * np.max(np.abs(reference))
@@ -298,7 +369,9 @@ def test_two_stiff_blocks(comm):
     pair = contact_pair(system, *(tags[side] for side in mesh.interface))
     problem = ContactProblem(system, pair, mass=ConsistentMass())
     law = contact_layer(0.5, mass=0.5 * 1000.0, speed=10.0, width=0.01)
-    states = [state for state, _ in march(problem, scheme=BoundaryLayer(law=law), dt=5e-5, steps=140)]
+    states = [
+        state for state, _ in march(problem, scheme=BoundaryLayer(law=law), dt=5e-5, steps=140)
+    ]
     before, after = (momenta(problem, v)[:, 1] for v in (problem.equations.v0, states[-1].v))
     assert (after[1] - after[0]) / (before[1] - before[0]) == pytest.approx(-0.5, rel=1e-2)
     assert after.sum() == pytest.approx(before.sum(), rel=1e-11)

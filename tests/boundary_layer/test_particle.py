@@ -29,7 +29,9 @@ def test_restitution_and_duration_of_all_fifty_pairs():
             assert impact.position(impact.duration) == pytest.approx(1.0, abs=1e-12)
             assert impact.velocity(impact.duration) == pytest.approx(impact.restitution, abs=1e-12)
             assert impact.velocity(impact.compression_time) == pytest.approx(0.0, abs=1e-12)
-            assert impact.position(impact.compression_time) == pytest.approx(impact.deepest, abs=1e-12)
+            assert impact.position(impact.compression_time) == pytest.approx(
+                impact.deepest, abs=1e-12
+            )
             tau = s * (1.0 + impact.restitution)
             assert tau == pytest.approx((1.0 + s) * -np.expm1(-tau), abs=1e-12)
 
@@ -49,7 +51,10 @@ def test_closed_form_is_that_of_the_source():
         if c:
             decay = np.exp(-c * t / (m * V))
             beta = (V / c) ** 2 * ((k + c / a) * m * (decay - 1.0) + c * k * t / V)
-            x, v = a * np.exp(beta), V * ((1.0 / decay - 1.0) * a * k / c - 1.0) * np.exp(beta) * decay
+            x, v = (
+                a * np.exp(beta),
+                V * ((1.0 / decay - 1.0) * a * k / c - 1.0) * np.exp(beta) * decay,
+            )
         else:
             x = a * np.exp(-V * t / a + k * t**2 / (2.0 * m))
             v = x * (-V / a + k * t / m)
@@ -66,13 +71,21 @@ def test_closed_form_satisfies_the_equation_of_motion():
         return float(impact.velocity(t) / impact.position(t) ** 2)
 
     x, v = float(impact.position(t)), float(impact.velocity(t))
-    residual = (momentum(t + h) - momentum(t - h)) / (2.0 * h) + v**2 / x**3 - float(impact.boundary_force(t))
+    residual = (
+        (momentum(t + h) - momentum(t - h)) / (2.0 * h)
+        + v**2 / x**3
+        - float(impact.boundary_force(t))
+    )
     assert abs(residual) < 1e-8
 
 
 def test_newton_and_poisson():
     """(37), (38), V5.1: equal for the force on the particle, virtually indistinguishable for the covector force."""
-    for (k, c), expected in {(1.0, 1.0): 0.609461, (1.0, 5.0): 0.204157, (10.0, 1.0): 0.937947}.items():
+    for (k, c), expected in {
+        (1.0, 1.0): 0.609461,
+        (1.0, 5.0): 0.204157,
+        (10.0, 1.0): 0.937947,
+    }.items():
         impact = unit(k, c)
         assert impact.poisson == pytest.approx(impact.restitution, abs=1e-12)
         assert impact.poisson_covector == pytest.approx(expected, abs=5.001e-7)
@@ -83,12 +96,20 @@ def test_newton_and_poisson():
 def test_statements_of_the_figures():
     """Figs. 1 and 2 (V5.1): x_min grows with k and c, t_f falls with both, e grows with k and falls with c; symmetry
     about t_c without dissipation."""
-    table = {name: np.array([[getattr(unit(k, c), name) for c in C] for k in K])
-             for name in ("deepest", "duration", "restitution")}
-    assert np.all(np.diff(table["deepest"], axis=0) > 0.0) and np.all(np.diff(table["deepest"], axis=1) > 0.0)
-    assert np.all(np.diff(table["duration"], axis=0) < 0.0) and np.all(np.diff(table["duration"], axis=1) < 0.0)
+    table = {
+        name: np.array([[getattr(unit(k, c), name) for c in C] for k in K])
+        for name in ("deepest", "duration", "restitution")
+    }
+    assert np.all(np.diff(table["deepest"], axis=0) > 0.0) and np.all(
+        np.diff(table["deepest"], axis=1) > 0.0
+    )
+    assert np.all(np.diff(table["duration"], axis=0) < 0.0) and np.all(
+        np.diff(table["duration"], axis=1) < 0.0
+    )
     assert np.all(np.diff(table["restitution"][:, 1:], axis=0) > 0.0)
-    assert np.all(np.diff(table["restitution"], axis=1) < 0.0) and np.all(table["restitution"][:, 0] == 1.0)
+    assert np.all(np.diff(table["restitution"], axis=1) < 0.0) and np.all(
+        table["restitution"][:, 0] == 1.0
+    )
     for k in K:
         impact = unit(k, 0.0)
         t = np.linspace(0.0, impact.compression_time, 7)
@@ -122,7 +143,9 @@ def test_only_the_ratio_of_the_speeds_counts():
     """A particle of another speed than the law's V: c is that many times as large; k = c = b = m = V = 1, U = 2."""
     layer = Layer(1.0, k=1.0, c=1.0, speed=1.0)
     assert ParticleImpact(layer, 1.0, 2.0).restitution == pytest.approx(restitution(2.0), abs=1e-15)
-    assert ParticleImpact(Layer(1.0, k=1.0, c=1.0), 1.0, 2.0).restitution == pytest.approx(restitution(1.0), abs=1e-15)
+    assert ParticleImpact(Layer(1.0, k=1.0, c=1.0), 1.0, 2.0).restitution == pytest.approx(
+        restitution(1.0), abs=1e-15
+    )
 
 
 def test_cut_off():
@@ -130,9 +153,14 @@ def test_cut_off():
     layer = Layer(2.0, k=1.0, start=1.0)
     x = np.array([0.5, 1.0, 1.25, 1.5, 1.75, 2.0, 3.0])
     f = np.exp(-1.0 / np.array([0.25, 0.75]))
-    assert layer.cut_off(x) == pytest.approx([1.0, 1.0, f[1] / f.sum(), 0.5, f[0] / f.sum(), 0.0, 0.0], abs=1e-15)
+    assert layer.cut_off(x) == pytest.approx(
+        [1.0, 1.0, f[1] / f.sum(), 0.5, f[0] / f.sum(), 0.0, 0.0], abs=1e-15
+    )
     assert quad(lambda x: float(layer.cut_off(x)), 1.0, 2.0)[0] == pytest.approx(0.5, abs=1e-12)
-    assert layer.at(1.0).force(0.5, 0.0) == pytest.approx(8.0) and layer.at(1.0).force(2.5, -1.0) == 0.0
+    assert (
+        layer.at(1.0).force(0.5, 0.0) == pytest.approx(8.0)
+        and layer.at(1.0).force(2.5, -1.0) == 0.0
+    )
     assert Layer(2.0, k=1.0).cut_off(np.array([2.0, 2.001])).tolist() == [1.0, 0.0]
 
 

@@ -30,11 +30,20 @@ from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 pytest.importorskip("dolfinx")
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[2]
-MEMORY: list[Exception] = [MemoryError(), OSError(errno.ENOMEM, "Cannot allocate memory"),
-                           RuntimeError("Unable to allocate 3.0 GiB for an array"),
-                           OSError("Can't read: out of memory")]
-MODEL = {"title": "x", "dimension": 2, "unknowns": 3, "supports": [], "contact": [],
-         "outline": [{"group": "", "lines": [[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [1.0, 1.0]]]}]}
+MEMORY: list[Exception] = [
+    MemoryError(),
+    OSError(errno.ENOMEM, "Cannot allocate memory"),
+    RuntimeError("Unable to allocate 3.0 GiB for an array"),
+    OSError("Can't read: out of memory"),
+]
+MODEL = {
+    "title": "x",
+    "dimension": 2,
+    "unknowns": 3,
+    "supports": [],
+    "contact": [],
+    "outline": [{"group": "", "lines": [[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [1.0, 1.0]]]}],
+}
 NO_MEMORY = "vi-contact: out of memory: take a coarser mesh"
 
 
@@ -57,19 +66,33 @@ def raising(error: BaseException) -> Callable[..., Any]:
     return call
 
 
-WHERE = ("vi_contact.run.files.reading.read_bytes", "vi_contact.run.files.reading.open_hdf5",
-         "vi_contact.run.files.reading.numbers_of", "vi_contact.plots.deformed.open_hdf5",
-         "vi_contact.core.hdf5.StoredGroup.__getitem__", "vi_contact.studies.report.sketch",
-         "matplotlib.figure.Figure.savefig")
+WHERE = (
+    "vi_contact.run.files.reading.read_bytes",
+    "vi_contact.run.files.reading.open_hdf5",
+    "vi_contact.run.files.reading.numbers_of",
+    "vi_contact.plots.deformed.open_hdf5",
+    "vi_contact.core.hdf5.StoredGroup.__getitem__",
+    "vi_contact.studies.report.sketch",
+    "matplotlib.figure.Figure.savefig",
+)
 
 
-@pytest.mark.parametrize(("place", "error"), [(place, MEMORY[k % len(MEMORY)]) for k, place in enumerate(WHERE)])
-def test_no_memory_is_no_damage(folder: Path, place: str, error: Exception, monkeypatch: pytest.MonkeyPatch,
-                                capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    ("place", "error"), [(place, MEMORY[k % len(MEMORY)]) for k, place in enumerate(WHERE)]
+)
+def test_no_memory_is_no_damage(
+    folder: Path,
+    place: str,
+    error: Exception,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     """Wherever a report has no memory, it says so, and not that a file is damaged."""
     (folder / "run" / "model.json").write_text(json.dumps(MODEL))
     module, _, name = place.rpartition(".")
-    owner = sys.modules.get(module) or pkgutil.resolve_name(module)  # the room has a function of the module's name
+    owner = sys.modules.get(module) or pkgutil.resolve_name(
+        module
+    )  # the room has a function of the module's name
     monkeypatch.setattr(owner, name, raising(error))
     assert main(["report", str(folder / "run")]) == 1
     assert capsys.readouterr().err.startswith(NO_MEMORY)
@@ -77,8 +100,9 @@ def test_no_memory_is_no_damage(folder: Path, place: str, error: Exception, monk
 
 @pytest.mark.parametrize("error", MEMORY, ids=repr)
 @pytest.mark.parametrize("place", ["open_to_read", "np.load", "checksum"])
-def test_a_checkpoint_that_does_not_fit_is_not_damaged(tmp_path: Path, place: str, error: Exception,
-                                                       monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_checkpoint_that_does_not_fit_is_not_damaged(
+    tmp_path: Path, place: str, error: Exception, monkeypatch: pytest.MonkeyPatch
+) -> None:
     run(tmp_path, 3)
     monkeypatch.setattr(f"vi_contact.run.files.checkpoint.{place}", raising(error))
     with pytest.raises((type(error), ViContactError)) as caught:
@@ -87,29 +111,43 @@ def test_a_checkpoint_that_does_not_fit_is_not_damaged(tmp_path: Path, place: st
 
 
 @pytest.mark.parametrize("number", [errno.EACCES, errno.EMFILE])
-def test_permissions_and_limits_are_no_damage(tmp_path: Path, number: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_permissions_and_limits_are_no_damage(
+    tmp_path: Path, number: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     run(tmp_path, 3)
     error = OSError(number, os.strerror(number), str(tmp_path / "history.h5"))
     monkeypatch.setattr("vi_contact.run.files.reading.open_hdf5", raising(error))
     with pytest.raises(OSError, match=os.strerror(number)) as caught:
         read_run(tmp_path)
     words = {errno.EACCES: "change its permissions", errno.EMFILE: "raise the limit of open files"}
-    assert f"history.h5' cannot be opened ({os.strerror(number)}): {words[number]}" in sentence(caught.value)
+    assert f"history.h5' cannot be opened ({os.strerror(number)}): {words[number]}" in sentence(
+        caught.value
+    )
 
 
 def test_sentences_of_the_system_name_only_what_it_names() -> None:
-    assert sentence(OSError(errno.ENOSPC, "No space left on device")).startswith("the disk is full: a file could not")
+    assert sentence(OSError(errno.ENOSPC, "No space left on device")).startswith(
+        "the disk is full: a file could not"
+    )
     assert "output folder cannot" not in sentence(OSError("something else"))
-    assert sentence(BrokenPipeError(errno.EPIPE, "Broken pipe", "/dev/stdout")).startswith("what reads '/dev/stdout'")
-    assert not of_machine(OSError("Unable to open file (file signature not found)")) and not of_machine(ValueError("x"))
+    assert sentence(BrokenPipeError(errno.EPIPE, "Broken pipe", "/dev/stdout")).startswith(
+        "what reads '/dev/stdout'"
+    )
+    assert not of_machine(
+        OSError("Unable to open file (file signature not found)")
+    ) and not of_machine(ValueError("x"))
 
 
 def test_a_function_of_the_user_s_without_memory() -> None:
     """It is told as what it is; the error that it came from is kept."""
-    with pytest.raises(InputError, match="a load ended in MemoryError: .*: the machine refused it") as caught:
+    with pytest.raises(
+        InputError, match="a load ended in MemoryError: .*: the machine refused it"
+    ) as caught:
         on_all(SerialComm(), "a load", raising(MemoryError("no room")))
     assert of_memory(caught.value)
-    with pytest.raises(InputError, match="a load ended in ZeroDivisionError: .*: correct its function") as other:
+    with pytest.raises(
+        InputError, match="a load ended in ZeroDivisionError: .*: correct its function"
+    ) as other:
         on_all(SerialComm(), "a load", lambda: 1 / 0)
     assert not of_memory(other.value)
 
@@ -119,8 +157,12 @@ def test_a_function_of_the_user_s_without_memory() -> None:
 
 def shell(line: str, **more: str) -> tuple[int, str, str]:
     """(status, standard output, standard error) of a line of bash; V is vi-contact."""
-    environment = dict(os.environ) | {"PYTHONPATH": str(ROOT), "V": f"{sys.executable} -m vi_contact"} | more
-    done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=False, env=environment)
+    environment = (
+        dict(os.environ) | {"PYTHONPATH": str(ROOT), "V": f"{sys.executable} -m vi_contact"} | more
+    )
+    done = subprocess.run(
+        ["bash", "-c", line], capture_output=True, text=True, check=False, env=environment
+    )
     return done.returncode, done.stdout, done.stderr
 
 
@@ -130,25 +172,47 @@ def test_closed_streams_are_no_hindrance(folder: Path, tmp_path: Path, closed: s
     status, _, said = shell(f"$V run wall --steps 2 --out {tmp_path}/run {closed}")
     assert status == 0, said
     assert len(read_run(tmp_path / "run").history["t"]) == 3
-    status, _, said = shell(f"$V motion info {folder}/motion.at2 {closed}; $V motion info nowhere {closed}")
+    status, _, said = shell(
+        f"$V motion info {folder}/motion.at2 {closed}; $V motion info nowhere {closed}"
+    )
     assert status == 1 and "Error" not in said
 
 
 def test_a_reader_that_has_gone_is_no_error(folder: Path, tmp_path: Path) -> None:
     """As of "| head -1": what was to be done is done; a file that is a stream was not written to its end."""
-    line = f"$V motion convert {folder}/motion.at2 {tmp_path}/out.txt | true; echo ${{PIPESTATUS[0]}}"
+    line = (
+        f"$V motion convert {folder}/motion.at2 {tmp_path}/out.txt | true; echo ${{PIPESTATUS[0]}}"
+    )
     assert shell(line)[1:] == ("0\n", "")
     assert (tmp_path / "out.txt").read_text().count("\n") > 4000
-    status, said, wrong = shell(f"$V motion convert {folder}/motion.at2 /dev/stdout | true; echo ${{PIPESTATUS[0]}}")
-    assert said == "1\n" and "/dev/stdout: cannot be written (Broken pipe)" in wrong and "folder" not in wrong
+    status, said, wrong = shell(
+        f"$V motion convert {folder}/motion.at2 /dev/stdout | true; echo ${{PIPESTATUS[0]}}"
+    )
+    assert (
+        said == "1\n"
+        and "/dev/stdout: cannot be written (Broken pipe)" in wrong
+        and "folder" not in wrong
+    )
 
 
-@pytest.mark.parametrize("words", ["report RUN", "plot RUN", "film RUN", "motion plot MOTION --out x.png",
-                                   "run wall --check --out check"])
+@pytest.mark.parametrize(
+    "words",
+    [
+        "report RUN",
+        "plot RUN",
+        "film RUN",
+        "motion plot MOTION --out x.png",
+        "run wall --check --out check",
+    ],
+)
 def test_a_backend_that_matplotlib_does_not_know(folder: Path, tmp_path: Path, words: str) -> None:
     """It is the setting that is wrong, and no file."""
     (folder / "run" / "model.json").write_text(json.dumps(MODEL))
     words = words.replace("RUN", str(folder / "run")).replace("MOTION", str(folder / "motion.at2"))
     status, _, said = shell(f"cd {tmp_path}; $V {words}", MPLBACKEND="nonsense")
-    assert status == 1 and "correct the environment variable MPLBACKEND" in said and "damaged" not in said
+    assert (
+        status == 1
+        and "correct the environment variable MPLBACKEND" in said
+        and "damaged" not in said
+    )
     assert said.count("\n") == 1

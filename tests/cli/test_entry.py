@@ -28,7 +28,9 @@ def shell(*arguments: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "vi_contact", *arguments]
     # env: without what MPI, started in this process, has put into the C environment; a child that inherits it
     # takes itself for this process, and may end without a word
-    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False, env=dict(os.environ))
+    return subprocess.run(
+        command, capture_output=True, text=True, cwd=ROOT, check=False, env=dict(os.environ)
+    )
 
 
 @pytest.fixture
@@ -43,7 +45,14 @@ def record(tmp_path: Path) -> Path:
 def test_help_explains_itself():
     done = shell("--help")
     assert done.returncode == 0 and not done.stderr
-    for word in ("vi-contact", "lift off, bounce and slide", "mpirun", "run a case", "cases", "ground motion files"):
+    for word in (
+        "vi-contact",
+        "lift off, bounce and slide",
+        "mpirun",
+        "run a case",
+        "cases",
+        "ground motion files",
+    ):
         assert word in done.stdout
 
 
@@ -68,7 +77,8 @@ def test_every_command_has_its_own_help():
 
 
 @pytest.mark.parametrize(
-    ("arguments", "word"), [([], "COMMAND"), (["bridge"], "invalid choice: 'bridge'"), (["motion"], "ACTION")]
+    ("arguments", "word"),
+    [([], "COMMAND"), (["bridge"], "invalid choice: 'bridge'"), (["motion"], "ACTION")],
 )
 def test_unknown_commands_show_the_usage(arguments, word, capsys):
     with pytest.raises(SystemExit, match="^2$"):
@@ -91,7 +101,9 @@ def test_motion_info(record):
     assert lines["file"] == str(record) and lines["samples"] == "101" and lines["dt"] == "0.01 s"
     assert lines["PGA"].startswith("2 m/s2 = 0.2039 g at t = 0.25 s")
     assert float(lines["PGV"].split()[0]) == pytest.approx(2.0 / np.pi, rel=2e-3)  # (1 - cos) a/w
-    assert float(lines["Arias intensity"].split()[0]) == pytest.approx(np.pi / (2 * 9.80665) * 2.0, rel=1e-3)
+    assert float(lines["Arias intensity"].split()[0]) == pytest.approx(
+        np.pi / (2 * 9.80665) * 2.0, rel=1e-3
+    )
 
 
 @pytest.mark.slow
@@ -100,7 +112,10 @@ def test_motion_info(record):
     [
         (["motion", "info", "nowhere.AT2"], "nowhere.AT2: there is no such file"),
         (["motion", "info", "."], "Is a directory"),
-        (["run", "wall", "--set", "contact.points=[[5.0, 3.0]]"], "contact point (5, 3) is 1 m away from"),
+        (
+            ["run", "wall", "--set", "contact.points=[[5.0, 3.0]]"],
+            "contact point (5, 3) is 1 m away from",
+        ),
     ],
 )
 def test_errors_are_one_sentence(arguments, word):
@@ -118,7 +133,10 @@ def test_errors_are_one_sentence(arguments, word):
     ("arguments", "word"),
     [
         (["run", "wall", "--set", "impact.type=Soft"], "unknown type 'Soft'"),
-        (["run", "wall", "--set", 'impact={type="Newton", e=1.5}'], "restitution coefficient e is 1.5"),
+        (
+            ["run", "wall", "--set", 'impact={type="Newton", e=1.5}'],
+            "restitution coefficient e is 1.5",
+        ),
         (["run", "wal"], "there is no built-in case 'wal': did you mean wall?"),
     ],
 )
@@ -136,11 +154,23 @@ def test_wrong_cases_are_one_sentence(arguments, word, capsys):
         (["motion", "convert", "r.at2", "./link.at2"], "link.at2 is read by this command"),
         (["motion", "plot", "r.at2", "--out", "r.at2"], "a picture ends in .png, .pdf or .svg"),
         (["motion", "plot", "r.at2", "--out", "x.nosuch"], "a picture ends in"),
-        (["motion", "plot", "r.at2", "--out", "x" * 300 + ".png"], "give the name of a file in a folder that exists"),
+        (
+            ["motion", "plot", "r.at2", "--out", "x" * 300 + ".png"],
+            "give the name of a file in a folder that exists",
+        ),
         (["motion", "spectrum", "r.at2", "--csv", "r.at2"], "r.at2 is read by this command"),
-        (["motion", "spectrum", "r.at2", "--csv", "x.png", "--png", "x.png"], "overwritten by its picture"),
-        (["post", "spectrum", "run", "a_g_x", "--out", "run/history.csv"], "history.csv is read by this command"),
-        (["post", "peaks", "run", "--out", "run/../run/checkpoint.npz"], "checkpoint.npz is read by this command"),
+        (
+            ["motion", "spectrum", "r.at2", "--csv", "x.png", "--png", "x.png"],
+            "overwritten by its picture",
+        ),
+        (
+            ["post", "spectrum", "run", "a_g_x", "--out", "run/history.csv"],
+            "history.csv is read by this command",
+        ),
+        (
+            ["post", "peaks", "run", "--out", "run/../run/checkpoint.npz"],
+            "checkpoint.npz is read by this command",
+        ),
         (["post", "spectrum", "run", "a_g_x", "--out", "x.png"], "give a name such as x.csv"),
         (["report", "run", "--out", "page.docx"], "is not an .html or .pdf file"),
     ],
@@ -152,8 +182,12 @@ def test_no_input_is_overwritten(tmp_path, monkeypatch, capsys, arguments, word)
     Path("link.at2").symlink_to("r.at2")
     Path("run").mkdir()
     names = "k,t,iterations,certificate,escalated,a_g_x"
-    Path("run/history.csv").write_text(names + "\n" + "".join(f"{k},{0.01 * k},1,0,0,0.{k}\n" for k in range(9)))
-    Path("run/columns.json").write_text(json.dumps({name: {"unit": "-", "meaning": name} for name in names.split(",")}))
+    Path("run/history.csv").write_text(
+        names + "\n" + "".join(f"{k},{0.01 * k},1,0,0,0.{k}\n" for k in range(9))
+    )
+    Path("run/columns.json").write_text(
+        json.dumps({name: {"unit": "-", "meaning": name} for name in names.split(",")})
+    )
     Path("run/checkpoint.npz").write_bytes(b"kept")
     before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     assert main(arguments) == 1
@@ -177,12 +211,16 @@ def test_a_rank_that_fails_alone_ends_the_others(monkeypatch, capsys, error, oth
 
     monkeypatch.setitem(sys.modules, "mpi4py.MPI", SimpleNamespace(COMM_WORLD=World))
     monkeypatch.setattr(cli_errors, "PATIENCE", 0.0)
-    monkeypatch.setattr("vi_contact.cli.entry.parser", lambda *_: SimpleNamespace(
-        parse_args=lambda words: SimpleNamespace(run=fails)))
+    monkeypatch.setattr(
+        "vi_contact.cli.entry.parser",
+        lambda *_: SimpleNamespace(parse_args=lambda words: SimpleNamespace(run=fails)),
+    )
     if others == "wait":
         with pytest.raises(SystemExit, match="1"):
             main(["run"])
-        assert "rank 1 of 2 stopped alone" in (said := capsys.readouterr().err) and str(error) in said
+        assert (
+            "rank 1 of 2 stopped alone" in (said := capsys.readouterr().err) and str(error) in said
+        )
     elif isinstance(error, InputError):
         assert main(["run"]) == 1 and not capsys.readouterr().err
     else:
@@ -216,7 +254,9 @@ def test_a_library_that_is_missing_is_named():
     def missing(name):
         raise ModuleNotFoundError(f"No module named '{name}'", name=name)
 
-    with pytest.raises(ViContactError, match=r"^ufl is needed and this Python does not find it: install it"):
+    with pytest.raises(
+        ViContactError, match=r"^ufl is needed and this Python does not find it: install it"
+    ):
         told(lambda: missing("ufl"), {})
     with pytest.raises(ModuleNotFoundError, match="No module named 'mine'"):
         told(lambda: missing("mine"), {})

@@ -10,9 +10,17 @@ import pytest
 
 pytestmark = pytest.mark.serial
 WITHOUT = (  # what the wall has no use for
-    "gmsh", "matplotlib", "scipy.optimize", "scipy.integrate", "scipy.spatial", "scipy.interpolate",
-    "vi_contact.bem", "vi_contact.plots", "vi_contact.studies.ida",
-    "vi_contact.ground_motion.formats", "vi_contact.run.files.reading",
+    "gmsh",
+    "matplotlib",
+    "scipy.optimize",
+    "scipy.integrate",
+    "scipy.spatial",
+    "scipy.interpolate",
+    "vi_contact.bem",
+    "vi_contact.plots",
+    "vi_contact.studies.ida",
+    "vi_contact.ground_motion.formats",
+    "vi_contact.run.files.reading",
 )
 CODE = """
 import sys
@@ -25,7 +33,13 @@ raise SystemExit(status)
 
 def test_the_wall_starts_without_what_it_has_no_use_for(tmp_path: Path) -> None:
     pytest.importorskip("dolfinx")
-    ended = subprocess.run([sys.executable, "-c", CODE, str(tmp_path)], capture_output=True, text=True, check=True)
+    ended = subprocess.run(
+        [sys.executable, "-c", CODE, str(tmp_path)], capture_output=True, text=True, check=True
+    )
     loaded = ended.stdout.split()
     assert {"dolfinx", "scipy.sparse", "vi_contact.meshes.wall"} <= set(loaded)
-    assert [one for one in loaded if one in WITHOUT or one.startswith(tuple(f"{name}." for name in WITHOUT))] == []
+    assert [
+        one
+        for one in loaded
+        if one in WITHOUT or one.startswith(tuple(f"{name}." for name in WITHOUT))
+    ] == []

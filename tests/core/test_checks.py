@@ -16,7 +16,9 @@ HUGE = 10**5000  # more digits than a float holds and Python prints
 
 def test_what_is_no_number_is_named():
     for value in ("1", None, True, np.bool_(True), math.nan, math.inf, HUGE, 1j, [1.0], np.ones(1)):
-        with pytest.raises(InputError, match=r"^Beam: its length is .*; give a finite number in m$"):
+        with pytest.raises(
+            InputError, match=r"^Beam: its length is .*; give a finite number in m$"
+        ):
             checks.number("Beam", "its length", value, unit="m")
 
 
@@ -27,7 +29,9 @@ def test_numbers_come_back_as_floats_and_signs_are_asked_for():
     assert checks.number("Beam", "its gap", 0, not_negative=True) == 0.0
     with pytest.raises(InputError, match="Beam: its length is 0; give a finite number above zero"):
         checks.number("Beam", "its length", 0, positive=True)
-    with pytest.raises(InputError, match=r"Beam: its gap is -1\.0; give zero or a positive finite number"):
+    with pytest.raises(
+        InputError, match=r"Beam: its gap is -1\.0; give zero or a positive finite number"
+    ):
         checks.number("Beam", "its gap", -1.0, not_negative=True)
 
 
@@ -36,12 +40,16 @@ def test_whole_numbers():
         found = checks.whole("march", "steps", value)
         assert type(found) is int and found == 3
     for value in (2.5, -1, math.inf, math.nan, "3", True, HUGE):
-        with pytest.raises(InputError, match="march: steps is .*; give a whole number of at least 0 and at most 9"):
+        with pytest.raises(
+            InputError, match="march: steps is .*; give a whole number of at least 0 and at most 9"
+        ):
             checks.whole("march", "steps", value, most=9)
 
 
 def test_a_class_is_no_object():
-    with pytest.raises(InputError, match=r"is the class ValueError; make an object of it, ValueError\(…\), or give"):
+    with pytest.raises(
+        InputError, match=r"is the class ValueError; make an object of it, ValueError\(…\), or give"
+    ):
         checks.instance("run", "the error", ValueError, ValueError, "give an error")
     with pytest.raises(InputError, match="run: the error is 'text'; give an error"):
         checks.instance("run", "the error", "text", (ValueError, TypeError), "give an error")
@@ -60,7 +68,9 @@ def test_arrays_have_shapes_and_finite_numbers():
     found = checks.array("state", "u", [1, 2], (2,))
     assert found.dtype == float and np.array_equal(found, [1.0, 2.0])
     assert checks.array("state", "u", np.ones((3, 2)), (None, 2)).shape == (3, 2)
-    with pytest.raises(InputError, match=r"state: u has shape \(2,\); give numbers of shape \(3,\)"):
+    with pytest.raises(
+        InputError, match=r"state: u has shape \(2,\); give numbers of shape \(3,\)"
+    ):
         checks.array("state", "u", [1, 2], (3,))
     with pytest.raises(InputError, match=r"state: u is nan at \(1,\); give finite numbers"):
         checks.array("state", "u", [1, math.nan], (2,))

@@ -59,13 +59,22 @@ def test_parts_beside_dense_algebra(name: str, short: float, monkeypatch: Any) -
     """L_cc L_ccᵀ is the Schur complement; forward, then backward, solves; any x_c leaves the others in equilibrium."""
     monkeypatch.setattr(contact_last, "SHORT_COLUMNS", short)
     A, last = MATRICES[name]
-    c, dense, b = np.array(last, dtype=np.int64), A.toarray(), np.random.default_rng(0).normal(size=A.shape[0])
+    c, dense, b = (
+        np.array(last, dtype=np.int64),
+        A.toarray(),
+        np.random.default_rng(0).normal(size=A.shape[0]),
+    )
     i = np.setdiff1d(np.arange(len(b)), c)
     factor, inverse = ContactLast(cholmod(SerialComm()), A, c), np.linalg.inv(dense)
     limit = 50.0 * EPS * np.linalg.cond(dense)
-    schur = dense[np.ix_(c, c)] - dense[np.ix_(c, i)] @ np.linalg.solve(dense[np.ix_(i, i)], dense[np.ix_(i, c)])
+    schur = dense[np.ix_(c, c)] - dense[np.ix_(c, i)] @ np.linalg.solve(
+        dense[np.ix_(i, i)], dense[np.ix_(i, c)]
+    )
     assert np.array_equal(factor.corner, np.tril(factor.corner))
-    assert np.abs(factor.corner @ factor.corner.T - schur).max(initial=0.0) <= limit * np.abs(dense).max()
+    assert (
+        np.abs(factor.corner @ factor.corner.T - schur).max(initial=0.0)
+        <= limit * np.abs(dense).max()
+    )
 
     def near(found: Array, expected: Array) -> None:
         assert np.abs(found - expected).max(initial=0.0) <= limit * np.abs(inverse).max() * len(b)
@@ -115,7 +124,9 @@ NEEDS = "PETSc factorises, because the quicker way needs a C compiler and PETSc'
 SLOW = "numpy does what compiled loops would do faster, because they need a C compiler: "
 
 
-@pytest.mark.parametrize("how", ["no compiler", "no cache", "no header", "no CHOLMOD", "no PETSc", "two", "static"])
+@pytest.mark.parametrize(
+    "how", ["no compiler", "no cache", "no header", "no CHOLMOD", "no PETSc", "two", "static"]
+)
 def test_without_it_today_s_factor_serves_and_the_log_says_so_once(
     how: str, cold: Path, small: Path, monkeypatch: Any, caplog: Any, tmp_path: Path
 ) -> None:
@@ -131,7 +142,9 @@ def test_without_it_today_s_factor_serves_and_the_log_says_so_once(
         cold.write_text("a file where the folder should be")
         said = "there is no C compiler that works"
     elif how == "no header":
-        monkeypatch.setattr(compiled, "cholmod_of_petsc", lambda: Path("/nowhere/lib/libcholmod.so.3"))
+        monkeypatch.setattr(
+            compiled, "cholmod_of_petsc", lambda: Path("/nowhere/lib/libcholmod.so.3")
+        )
         said = "there is no header cholmod.h beside /nowhere/lib/libcholmod.so.3"
     elif how == "no CHOLMOD":
         monkeypatch.setattr(packages, "petsc_has", lambda package: False)
@@ -140,13 +153,23 @@ def test_without_it_today_s_factor_serves_and_the_log_says_so_once(
         monkeypatch.setattr(packages, "PETSC", "nobody.PETSc")
         said = "no PETSc is in this process"
     else:
-        maps.write_text(line.format("/lib/libm.so.6") + 2 * (how == "two") * line.format("/a/libcholmod.so.3")
-                        + (how == "two") * line.format("/b/libcholmod-1.so.4") + "7f02-7f03 r-xp 0 08:01 0\n")
+        maps.write_text(
+            line.format("/lib/libm.so.6")
+            + 2 * (how == "two") * line.format("/a/libcholmod.so.3")
+            + (how == "two") * line.format("/b/libcholmod-1.so.4")
+            + "7f02-7f03 r-xp 0 08:01 0\n"
+        )
         monkeypatch.setattr(compiled, "MAPS", maps)
-        said = "there are 2 files of CHOLMOD in this process" if how == "two" else "there are 0 files of CHOLMOD"
+        said = (
+            "there are 2 files of CHOLMOD in this process"
+            if how == "two"
+            else "there are 0 files of CHOLMOD"
+        )
     assert cholmod(SerialComm()) is None and cholmod(SerialComm()) is None
     told = [record.getMessage() for record in caplog.records]
-    assert [one for one in told if one.startswith(NEEDS)] == [one for one in told if said in one] != []
+    assert (
+        [one for one in told if one.startswith(NEEDS)] == [one for one in told if said in one] != []
+    )
     assert (library(SerialComm()) is None) == (how in ("no compiler", "no cache"))
     slow = sum(record.getMessage().startswith(SLOW) for record in caplog.records)
     assert slow == (how in ("no compiler", "no cache"))
@@ -156,10 +179,14 @@ def test_without_it_today_s_factor_serves_and_the_log_says_so_once(
 
 def test_the_loops_need_no_library_of_the_machine() -> None:
     """What every process loads names no CHOLMOD, and brings none."""
-    script = ("from vi_contact.core.algebra import SerialComm; from vi_contact.core.compiled import cholmod, library; "
-              "print(library(SerialComm()) is not None, cholmod(SerialComm()), "
-              "'cholmod' in open('/proc/self/maps').read())")
-    told = subprocess.run([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True, check=True).stdout
+    script = (
+        "from vi_contact.core.algebra import SerialComm; from vi_contact.core.compiled import cholmod, library; "
+        "print(library(SerialComm()) is not None, cholmod(SerialComm()), "
+        "'cholmod' in open('/proc/self/maps').read())"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", script], stdout=subprocess.PIPE, text=True, check=True
+    ).stdout
     assert told.split() == ["True", "None", "False"]
 
 
@@ -171,7 +198,9 @@ def test_a_cholmod_of_another_version_than_its_header_is_left_alone(
         pytest.skip("PETSc has no CHOLMOD here")
     header = compiled._header(compiled.cholmod_of_petsc()) / "cholmod.h"
     other = tmp_path / "cholmod.h"
-    other.write_text(f'#include "{header}"\n#undef CHOLMOD_SUB_VERSION\n#define CHOLMOD_SUB_VERSION 99\n')
+    other.write_text(
+        f'#include "{header}"\n#undef CHOLMOD_SUB_VERSION\n#define CHOLMOD_SUB_VERSION 99\n'
+    )
     monkeypatch.setattr(compiled, "_header", lambda file: tmp_path)
     monkeypatch.setattr(compiled, "LOOPS", small)
     forget()
@@ -183,7 +212,11 @@ def test_a_file_that_cannot_be_loaded_is_made_again(small: Path) -> None:
     file = compiled.compiled(small, [])
     file.write_bytes(b"not a library")
     os.utime(file, (0, 0))
-    assert compiled.compiled(small, []) == file and file.stat().st_size > 1000 and file.stat().st_mtime > 0
+    assert (
+        compiled.compiled(small, []) == file
+        and file.stat().st_size > 1000
+        and file.stat().st_mtime > 0
+    )
 
 
 def test_another_library_is_another_file(small: Path, tmp_path: Path) -> None:
@@ -196,8 +229,15 @@ def test_another_library_is_another_file(small: Path, tmp_path: Path) -> None:
 
 def test_processes_that_compile_at_once_do_not_meet(small: Path, cold: Path) -> None:
     """Both find it missing, both make it, one file is left, and each has loaded a whole one."""
-    script = f"import pathlib; from vi_contact.core import compiled; source = pathlib.Path({str(small)!r}); " \
-             "print(compiled.compiled(source, []))"
-    runs = [subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    script = (
+        f"import pathlib; from vi_contact.core import compiled; source = pathlib.Path({str(small)!r}); "
+        "print(compiled.compiled(source, []))"
+    )
+    runs = [
+        subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+        for _ in range(2)
+    ]
     told = {run.communicate()[0].strip() for run in runs}
-    assert all(run.returncode == 0 for run in runs) and told == {str(file) for file in cold.iterdir()}
+    assert all(run.returncode == 0 for run in runs) and told == {
+        str(file) for file in cold.iterdir()
+    }

@@ -93,16 +93,25 @@ def test_projections_of_a_large_body(name: str, large: Any) -> None:
     for states, begin in ((small, None), (other, large)):
         if begin:
             begin()
-        states += [s for s, _ in vc.march(replace(problem), scheme=scheme, solver=solver, dt=BOX_DT, steps=6)]
+        states += [
+            s
+            for s, _ in vc.march(replace(problem), scheme=scheme, solver=solver, dt=BOX_DT, steps=6)
+        ]
     assert problem.surface.some(small[-1].active)
     for one, two in zip(small, other, strict=True):
         assert np.array_equal(one.active, two.active)
         assert max_over_ranks(COMM, one.v - two.v) <= 1e-9 * max_over_ranks(COMM, one.v)
-        assert max_over_ranks(COMM, one.r_n - two.r_n) <= 1e-9 * (max_over_ranks(COMM, one.r_n) or 1.0)
+        assert max_over_ranks(COMM, one.r_n - two.r_n) <= 1e-9 * (
+            max_over_ranks(COMM, one.r_n) or 1.0
+        )
 
 
-@pytest.mark.parametrize(("build", "factors"), [(shaken_wall, 1), (thrown_box, 0)], ids=["plane", "space"])
-def test_impacts_in_the_plane_are_condensed_longer(build: Any, factors: int, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("build", "factors"), [(shaken_wall, 1), (thrown_box, 0)], ids=["plane", "space"]
+)
+def test_impacts_in_the_plane_are_condensed_longer(
+    build: Any, factors: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """They come in every step: M is factorised up to six times the unknowns. Conjugate gradients agree to 1e-12."""
     after, made = [], []
     monkeypatch.setattr(impact, "condense", lambda *given: made.append(given) or condense(*given))
@@ -113,7 +122,11 @@ def test_impacts_in_the_plane_are_condensed_longer(build: Any, factors: int, mon
         monkeypatch.setattr(sizes, "OWN_UNKNOWNS", total(surface.comm, system.rows) / worth)
         after.append(ImpulseUpdate()(system, surface, v, np.zeros(surface.count)))
     assert len(made) == factors
-    assert max_over_ranks(COMM, after[0] - after[1]) <= 1e-12 * max_over_ranks(COMM, after[0] - v) > 0.0
+    assert (
+        max_over_ranks(COMM, after[0] - after[1])
+        <= 1e-12 * max_over_ranks(COMM, after[0] - v)
+        > 0.0
+    )
 
 
 def test_a_condensed_solver_would_be_caught(large: Any) -> None:

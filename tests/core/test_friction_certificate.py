@@ -25,10 +25,15 @@ pytestmark = pytest.mark.serial
 SCHEME, DT = ZienkiewiczWoodTaylor(), 5e-3
 
 
-def last(friction: FrictionLaw, steps: int = 20, v0: tuple[float, float] = (1.0, -1.0), **more: Any) -> Report:
+def last(
+    friction: FrictionLaw, steps: int = 20, v0: tuple[float, float] = (1.0, -1.0), **more: Any
+) -> Report:
     """The last report of a column in oblique impact."""
     problem = column(20, v0=v0, friction=friction, mass=ConsistentMass(), **more)
-    return [report for _, report in march(problem, scheme=SCHEME, solver=Condensed(), dt=DT, steps=steps)][-1]
+    return [
+        report
+        for _, report in march(problem, scheme=SCHEME, solver=Condensed(), dt=DT, steps=steps)
+    ][-1]
 
 
 def other(report: Report, surface: ContactSurface, r_t: float) -> StepResult:
@@ -78,10 +83,14 @@ def test_a_long_way_blunts_nothing() -> None:
     step = report.step
     far = np.zeros_like(step.guess)
     far[::2] = 1e4 * np.abs(report.result.x[0] - step.slip0[0, 0])
-    moved = replace(step, b=step.b + step.A @ far, guess=step.guess + far, slip0=step.slip0 + far[0])
+    moved = replace(
+        step, b=step.b + step.A @ far, guess=step.guess + far, slip0=step.slip0 + far[0]
+    )
     result = replace(report.result, x=report.result.x + far)
     assert kkt_residual(moved, result).worst <= 1e-10
-    wrong = other(replace(report, step=moved, result=result), step.surface, 0.999 * report.result.r_t[0, 0])
+    wrong = other(
+        replace(report, step=moved, result=result), step.surface, 0.999 * report.result.r_t[0, 0]
+    )
     assert kkt_residual(moved, wrong).dissipation == pytest.approx(1e-3, rel=1e-2)
 
 
@@ -98,7 +107,9 @@ def test_held_points_rub_under_pressure_only() -> None:
     for v_y, share in ((-1.0, 1.0), (1.0, 0.0)):
         report = last(Coulomb(0.3), v0=(1.0, v_y), held=True, steps=1)
         assert np.sign(report.new.r_n[0]) == -v_y
-        assert report.new.r_t[0, 0] == pytest.approx(share * 0.3 * abs(report.new.r_n[0]), abs=1e-15)
+        assert report.new.r_t[0, 0] == pytest.approx(
+            share * 0.3 * abs(report.new.r_n[0]), abs=1e-15
+        )
         assert report.certificate.worst <= 1e-14
 
 
@@ -113,7 +124,9 @@ def test_contact_recorder_by_hand() -> None:
     """Friction on the body is -r_t along x; without friction the columns are those of before."""
     report = last(Coulomb(0.3))
     recorder = Contact()
-    row = recorder.start(column(20, v0=(0.0, 0.0), friction=Coulomb(0.3), mass=ConsistentMass()), report.new)
+    row = recorder.start(
+        column(20, v0=(0.0, 0.0), friction=Coulomb(0.3), mass=ConsistentMass()), report.new
+    )
     assert set(row) == set(recorder.columns())
     assert row["friction_force_x"] == -report.new.r_t[0, 0] < 0.0 and row["friction_force_y"] == 0.0
     assert row["contact_force_y"] == report.new.r_n[0]

@@ -39,9 +39,14 @@ def test_numbers_of_no_facet_are_refused_on_all_ranks() -> None:
     for wrong in (10**6, -1):
         mine = np.array([wrong if COMM.rank == COMM.size - 1 else 0])
         for kind in (fem.Facets, fem.Cells):
-            with pytest.raises(InputError, match=f"{kind.__name__}: 'a' has numbers from .* give numbers of this mesh"):
+            with pytest.raises(
+                InputError,
+                match=f"{kind.__name__}: 'a' has numbers from .* give numbers of this mesh",
+            ):
                 kind("a", mine, mesh)
-    here = np.array([0]) if COMM.rank == 0 else np.zeros(0)  # a rank may have none, whatever their type
+    here = (
+        np.array([0]) if COMM.rank == 0 else np.zeros(0)
+    )  # a rank may have none, whatever their type
     assert fem.Facets("a", np.tile(here, 2), mesh).indices.dtype == np.int32
 
 
@@ -51,15 +56,33 @@ def test_other_displacements_on_the_same_facets() -> None:
     bottom, left = tags["bottom"], tags["left"]
     moved = fem.Prescribed(bottom, (1.0, 0.0))
     shared = fem.Facets("shared", bottom.indices if COMM.rank == 0 else bottom.indices[:0], mesh)
-    for conditions in ({"clamped": bottom, "prescribed": moved}, {"prescribed": [moved, fem.Prescribed(bottom)]}):
-        with pytest.raises(InputError, match="'bottom' and 'bottom' share facets on which different displacements"):
+    for conditions in (
+        {"clamped": bottom, "prescribed": moved},
+        {"prescribed": [moved, fem.Prescribed(bottom)]},
+    ):
+        with pytest.raises(
+            InputError, match="'bottom' and 'bottom' share facets on which different displacements"
+        ):
             fem.assemble(mesh, STEEL, **conditions)
     if COMM.allreduce(len(shared.indices)):
         with pytest.raises(InputError, match="'shared' and 'bottom' share facets"):
             fem.assemble(mesh, STEEL, clamped=shared, prescribed=moved)
-    across = [fem.Prescribed(bottom, (1.0, 0.0), components=(0,)), fem.Prescribed(bottom, (0.0, 2.0), components=(1,))]
-    for right in (across, [moved, replace(moved)], [fem.Prescribed(left), moved], fem.Prescribed(bottom, (0.0, 0.0))):
-        fem.assemble(mesh, STEEL, clamped=bottom if isinstance(right, fem.Prescribed) else (), prescribed=right)
+    across = [
+        fem.Prescribed(bottom, (1.0, 0.0), components=(0,)),
+        fem.Prescribed(bottom, (0.0, 2.0), components=(1,)),
+    ]
+    for right in (
+        across,
+        [moved, replace(moved)],
+        [fem.Prescribed(left), moved],
+        fem.Prescribed(bottom, (0.0, 0.0)),
+    ):
+        fem.assemble(
+            mesh,
+            STEEL,
+            clamped=bottom if isinstance(right, fem.Prescribed) else (),
+            prescribed=right,
+        )
 
 
 def test_a_surface_belongs_to_the_systems_of_its_space() -> None:
@@ -67,7 +90,11 @@ def test_a_surface_belongs_to_the_systems_of_its_space() -> None:
     mesh, tags = body()
     system, other = (fem.assemble(mesh, STEEL, clamped=tags[name]) for name in ("bottom", "left"))
     surface = fem.contact_surface(system, tags["right"])
-    for same in (vc.with_weight(system), system.with_load((system.u0, np.sin)), replace(system, v0=system.v0 + 1.0)):
+    for same in (
+        vc.with_weight(system),
+        system.with_load((system.u0, np.sin)),
+        replace(system, v0=system.v0 + 1.0),
+    ):
         vc.ContactProblem(same, surface.bilateral_everywhere().on_springs(1e9))
     with pytest.raises(InputError, match="contact surface was made for another system"):
         vc.ContactProblem(other, surface)
@@ -80,7 +107,10 @@ def test_a_state_belongs_to_its_problem() -> None:
     problem = vc.ContactProblem(system, fem.contact_surface(system, tags["right"]))
     state = next(vc.march(problem, dt=DT, steps=1))[0]
     short = replace(state, v=state.v[:-1]) if COMM.rank == COMM.size - 1 else state
-    for wrong, words in ((short, "has v of shape"), (replace(state, active=state.active[:-1]), "has active of shape")):
+    for wrong, words in (
+        (short, "has v of shape"),
+        (replace(state, active=state.active[:-1]), "has active of shape"),
+    ):
         with pytest.raises(InputError, match=words):
             vc.march(problem, dt=DT, steps=1, state=wrong)
         with pytest.raises(InputError, match=words):
@@ -114,22 +144,30 @@ def test_motions_beside_a_run_are_marched_with_its_scheme_and_steps() -> None:
 
     def problems() -> list[vc.ContactProblem]:
         ground = soil.base_motion(SHAKE)
-        moved = fem.Prescribed(tags["bottom"], ground.displacement, ground.velocity, ground.acceleration)
+        moved = fem.Prescribed(
+            tags["bottom"], ground.displacement, ground.velocity, ground.acceleration
+        )
         sides = [soil.FreeField(tags[side], base=ground) for side in ("left", "right")]
         system = fem.assemble(mesh, STEEL, prescribed=moved, dashpots=sides)
         system = vc.with_weight(system).with_load((np.zeros_like(system.u0), np.sin))
         alone = fem.assemble(mesh, STEEL, clamped=tags["bottom"])
         carried = ground.carrying(fem.contact_surface(alone, tags["top"]), alone)
-        return [vc.ContactProblem(system, fem.contact_surface(system, tags["top"])),
-                vc.ContactProblem(alone, fem.joined_surfaces(carried))]
+        return [
+            vc.ContactProblem(system, fem.contact_surface(system, tags["top"])),
+            vc.ContactProblem(alone, fem.joined_surfaces(carried)),
+        ]
 
     def runs(one: vc.ContactProblem, other: vc.ContactProblem) -> list[Array]:
-        marches = (vc.march(one, scheme=vc.HHT(), dt=DT, steps=6),
-                   vc.march(other, scheme=vc.Newmark(), dt=2 * DT, steps=6))
+        marches = (
+            vc.march(one, scheme=vc.HHT(), dt=DT, steps=6),
+            vc.march(other, scheme=vc.Newmark(), dt=2 * DT, steps=6),
+        )
         return [np.array([state.u for state, _ in pair]) for pair in zip(*marches, strict=True)]
 
     for one, other in zip(problems(), problems(), strict=True):
-        assert {beside.name for beside in (*one.system.companions, *one.surface.companions)} >= {"base_motion"}
+        assert {beside.name for beside in (*one.system.companions, *one.surface.companions)} >= {
+            "base_motion"
+        }
         np.testing.assert_array_equal(runs(one, one), runs(one, other))
         with pytest.raises(InputError, match="needs its time steps beforehand"):
             vc.march(one, scheme=vc.HHT(), dt=vc.HalvedAtImpact(DT), steps=1)
@@ -153,12 +191,19 @@ def test_outputs_say_when_the_matrices_are_not_of_their_materials(
         caplog.clear()
         with caplog.at_level(logging.WARNING):
             vc.simulate(
-                vc.ContactProblem(one, surface), dt=DT, steps=1, record=record, out=shared_tmp / "run", progress=False,
+                vc.ContactProblem(one, surface),
+                dt=DT,
+                steps=1,
+                record=record,
+                out=shared_tmp / "run",
+                progress=False,
                 fields=fem.XDMF(),
             )
         found = [text for text in caplog.messages if "reactions" in text and words in text]
         assert len(found) == (told if COMM.rank == 0 else 0)
-        assert (shared_tmp / "run" / "run.log").read_text().count(f"XDMF, von_mises: {words}") == told
+        assert (shared_tmp / "run" / "run.log").read_text().count(
+            f"XDMF, von_mises: {words}"
+        ) == told
 
 
 @pytest.mark.serial
@@ -167,14 +212,19 @@ def test_row_sums_that_are_no_masses() -> None:
     problem = chain_problem(4)
     M = sp.diags([-0.55, 1.0, -0.55], [-1, 0, 1], shape=(4, 4))
     system = replace(problem.system, M=SerialMatrix(M))
-    with pytest.raises(InputError, match=r"cannot lump negative row sums of M and 2 unknowns have them: .*lumping=0"):
+    with pytest.raises(
+        InputError,
+        match=r"cannot lump negative row sums of M and 2 unknowns have them: .*lumping=0",
+    ):
         vc.march(replace(problem, system=system, mass=vc.Redistributed()), dt=1e-2, steps=1)
 
 
 @pytest.mark.serial
 def test_numbers_beyond_those_of_the_machine(tmp_path: Path) -> None:
     """A run that overflows fails: its ledger would be NaN with the status of a run that went well."""
-    problem = chain_problem(3, gap=inf, excitation=vc.Harmonic(1e300, 1.0, phase=1.0, direction=(1.0,)))
+    problem = chain_problem(
+        3, gap=inf, excitation=vc.Harmonic(1e300, 1.0, phase=1.0, direction=(1.0,))
+    )
     with pytest.raises(StepFailure, match="step 1 at t = 0.01 s: energy_kinetic is inf, too large"):
         vc.simulate(problem, dt=1e-2, steps=3, out=tmp_path, progress=False)
     summary = json.loads((tmp_path / "summary.json").read_text())
@@ -191,7 +241,11 @@ def test_what_a_users_function_returns_is_looked_at() -> None:
 
     for field in (texts, lambda x, t: 1j * x, lambda x, t: None):
         with pytest.raises(InputError, match=r"BodyForce returned .*return real numbers"):
-            next(vc.march(vc.ContactProblem(*_touching(mesh, tags, fem.BodyForce(field))), dt=DT, steps=1))
+            next(
+                vc.march(
+                    vc.ContactProblem(*_touching(mesh, tags, fem.BodyForce(field))), dt=DT, steps=1
+                )
+            )
 
 
 def _touching(mesh: Any, tags: Any, load: Any) -> tuple[Any, Any]:

@@ -28,8 +28,14 @@ def body(**given: Any) -> tuple[Any, Any, Any]:
     """A soft block over an oblique plane: system, mesh tags and surface, in nodal frames of their own."""
     mesh, tags = fem.build_mesh(meshes.BlockMesh(lengths=(2.0, 1.0), divisions=(4, 2)), COMM)
     soft = vc.LinearElastic(E=1.0e7, nu=0.3, rho=1000.0)
-    system = fem.assemble(mesh, soft, damping=vc.Rayleigh(1.0, 1e-4), clamped=tags["top"],
-                          initial_velocity=(1.0, -1.0), **given)
+    system = fem.assemble(
+        mesh,
+        soft,
+        damping=vc.Rayleigh(1.0, 1e-4),
+        clamped=tags["top"],
+        initial_velocity=(1.0, -1.0),
+        **given,
+    )
     return system, tags, oblique(system, tags["bottom"])
 
 
@@ -37,8 +43,12 @@ def oblique(system: Any, facets: Any, tilt: float = 0.2) -> Any:
     return fem.contact_surface(system, facets, obstacle=vc.HalfSpace((0.0, -1e-3), (tilt, 1.0)))
 
 
-def level(system: Any, facets: Any, point: tuple[float, float] = (0.0, -1e-4),
-          normal: tuple[float, float] = (0.0, 1.0)) -> Any:
+def level(
+    system: Any,
+    facets: Any,
+    point: tuple[float, float] = (0.0, -1e-4),
+    normal: tuple[float, float] = (0.0, 1.0),
+) -> Any:
     """A surface along the axes: no turned matrices."""
     return fem.contact_surface(system, facets, obstacle=vc.HalfSpace(point, normal))
 
@@ -55,7 +65,9 @@ def used(problem: vc.ContactProblem, kind: str) -> Any:
     mass = vc.ConsistentMass()
     problem = replace(problem, mass=mass, impact=vc.Inelastic() if kind == "impact" else None)
     *_, (state, _) = vc.march(problem, steps=12, dt=4e-4, **SCHEMES[kind])
-    return np.concatenate([problem.cartesian(state.u), problem.cartesian(vc.static_equilibrium(problem).u)])
+    return np.concatenate(
+        [problem.cartesian(state.u), problem.cartesian(vc.static_equilibrium(problem).u)]
+    )
 
 
 def downwards(problem: vc.ContactProblem, size: float) -> vc.ContactProblem:
@@ -70,11 +82,16 @@ Change = Callable[[vc.ContactProblem, Any], vc.ContactProblem]
 CHANGES: dict[str, Change] = {
     "loaded": lambda p, tags: downwards(p, 300.0),
     "loaded twice": lambda p, tags: downwards(downwards(p, 300.0), 100.0),
-    "with_load": lambda p, tags: replace(p, system=p.system.with_load(
-        (p.system.M @ (p.system.influence @ np.array([0.0, -300.0])), lambda t: 1.0 + t))),
+    "with_load": lambda p, tags: replace(
+        p,
+        system=p.system.with_load(
+            (p.system.M @ (p.system.influence @ np.array([0.0, -300.0])), lambda t: 1.0 + t)
+        ),
+    ),
     "with_weight": lambda p, tags: replace(p, system=vc.with_weight(p.system)),
-    "changed": lambda p, tags: replace(p, system=p.system.changed(
-        K=p.system.algebra.combine([(2.0, p.system.K)]))),
+    "changed": lambda p, tags: replace(
+        p, system=p.system.changed(K=p.system.algebra.combine([(2.0, p.system.K)]))
+    ),
     "v0": lambda p, tags: replace(p, system=p.system.changed(v0=0.5 * p.system.v0)),
     "moving": lambda p, tags: replace(p, surface=p.surface.moving(towards=lambda t: 0.02 * t)),
     "on_springs": lambda p, tags: replace(p, surface=p.surface.on_springs(1e8)),
@@ -82,15 +99,30 @@ CHANGES: dict[str, Change] = {
     "gap": lambda p, tags: replace(p, surface=replace(p.surface, gap0=0.5 * p.surface.gap0)),
     "other plane": lambda p, tags: replace(p, surface=oblique(p.system, tags["bottom"], 0.3)),
     "level plane": lambda p, tags: replace(p, surface=level(p.system, tags["bottom"])),
-    "other facets": lambda p, tags: replace(p, surface=level(p.system, tags["right"], (2.0001, 0.0), (-1.0, 0.0))),
+    "other facets": lambda p, tags: replace(
+        p, surface=level(p.system, tags["right"], (2.0001, 0.0), (-1.0, 0.0))
+    ),
     "friction": lambda p, tags: replace(p, friction=vc.Coulomb(0.3)),
     "excitation": lambda p, tags: replace(p, excitation=SHAKING),
 }
 
 
 @pytest.mark.parametrize("kind", SCHEMES)
-@pytest.mark.parametrize(("start", "name"), [(oblique, name) for name in CHANGES] + [
-    (level, name) for name in ("loaded", "on_springs", "other plane", "other facets", "friction", "excitation")])
+@pytest.mark.parametrize(
+    ("start", "name"),
+    [(oblique, name) for name in CHANGES]
+    + [
+        (level, name)
+        for name in (
+            "loaded",
+            "on_springs",
+            "other plane",
+            "other facets",
+            "friction",
+            "excitation",
+        )
+    ],
+)
 def test_another_argument_is_another_answer(start, name, kind):
     """Used before or not, the changed problem gives the same digits; the old one does too when it is used again."""
     system, tags, _ = body()
@@ -126,6 +158,7 @@ def test_factors_are_kept_by_what_they_are_of():
         def make() -> Any:
             made.append(objects)
             return len(made)
+
         return system.cached("factor", make, *objects)
 
     one, two = np.zeros(1), np.zeros(1)
@@ -148,10 +181,14 @@ def test_a_function_of_the_user_s_that_changed_between_runs():
     other, _, face = body()
     fresh = vc.ContactProblem(other.with_load((force, lambda t: 2.0)), face)
     *_, (state, _) = vc.march(fresh, steps=1, dt=4e-4)
-    assert np.array_equal(runs[1], state.u) and COMM.allreduce(int(not np.array_equal(runs[0], runs[1])))
+    assert np.array_equal(runs[1], state.u) and COMM.allreduce(
+        int(not np.array_equal(runs[0], runs[1]))
+    )
 
 
-@pytest.mark.parametrize("name", ["gap0", "weights", "bilateral", "compliance", "normals", "points"])
+@pytest.mark.parametrize(
+    "name", ["gap0", "weights", "bilateral", "compliance", "normals", "points"]
+)
 def test_arrays_of_a_surface_are_its_own(name):
     """Whoever made a surface may go on writing to the arrays, and nobody writes to those of the surface."""
     _, _, surface = body()
@@ -168,9 +205,15 @@ def test_arrays_of_a_surface_are_its_own(name):
 @pytest.mark.parametrize("name", ["K", "M", "coordinates", "v0", "load"])
 def test_arrays_given_to_a_system_are_its_own(name):
     """Matrices and vectors of numpy and scipy: what their owner does to them later is not seen."""
-    given = {"K": sp.csr_matrix(sp.diags([np.full(6, 2e4), np.full(5, -1e4), np.full(5, -1e4)], [0, 1, -1])),
-             "M": sp.csr_matrix(sp.identity(6)), "coordinates": np.linspace(0.0, 1.0, 6)[:, None], "v0": np.ones(6),
-             "load": np.full(6, 10.0)}
+    given = {
+        "K": sp.csr_matrix(
+            sp.diags([np.full(6, 2e4), np.full(5, -1e4), np.full(5, -1e4)], [0, 1, -1])
+        ),
+        "M": sp.csr_matrix(sp.identity(6)),
+        "coordinates": np.linspace(0.0, 1.0, 6)[:, None],
+        "v0": np.ones(6),
+        "load": np.full(6, 10.0),
+    }
 
     def last(system: Any) -> Any:
         surface = vc.contact_points(system, [5], [1.0], gap0=1e-3)

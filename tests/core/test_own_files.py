@@ -58,12 +58,24 @@ def listening(path: Path, notes: Path) -> None:
             os.replace(place, path)
 
 
-FOREIGN = {"a link": linked, "a link to nothing": hanging, "a pipe": piped, "a link to a device": device,
-           "a folder": foldered, "a socket": listening}
+FOREIGN = {
+    "a link": linked,
+    "a link to nothing": hanging,
+    "a pipe": piped,
+    "a link to a device": device,
+    "a folder": foldered,
+    "a socket": listening,
+}
 READERS: dict[str, Callable[[Path], Any]] = {
-    "is_own": own_files.is_own, "open_to_read": own_files.open_to_read, "read_bytes": own_files.read_bytes,
-    "read_text": own_files.read_text, "open_to_append": own_files.open_to_append, "open_lock": own_files.open_lock,
-    "open_hdf5": open_hdf5, "push": push, "copy_start": lambda path: copy_start(path, path.with_name("copy"), 3),
+    "is_own": own_files.is_own,
+    "open_to_read": own_files.open_to_read,
+    "read_bytes": own_files.read_bytes,
+    "read_text": own_files.read_text,
+    "open_to_append": own_files.open_to_append,
+    "open_lock": own_files.open_lock,
+    "open_hdf5": open_hdf5,
+    "push": push,
+    "copy_start": lambda path: copy_start(path, path.with_name("copy"), 3),
 }
 
 
@@ -77,21 +89,30 @@ def notes(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("kind", FOREIGN)
 @pytest.mark.parametrize("reader", READERS)
-def test_what_is_read_or_continued_is_a_regular_file(tmp_path: Path, notes: Path, kind: str, reader: str) -> None:
+def test_what_is_read_or_continued_is_a_regular_file(
+    tmp_path: Path, notes: Path, kind: str, reader: str
+) -> None:
     path = tmp_path / "history.csv"
     FOREIGN[kind](path, notes)
-    with pytest.raises(InputError, match=rf"history.csv' is {kind.split(' to ')[0]}, and a run reads and writes only"):
+    with pytest.raises(
+        InputError,
+        match=rf"history.csv' is {kind.split(' to ')[0]}, and a run reads and writes only",
+    ):
         READERS[reader](path)
     assert notes.read_bytes() == NOTES and not notes.with_name("nowhere").exists()
 
 
 @pytest.mark.parametrize("kind", [kind for kind in FOREIGN if kind != "a folder"])
-def test_what_is_made_anew_takes_the_place_of_a_name(tmp_path: Path, notes: Path, kind: str) -> None:
+def test_what_is_made_anew_takes_the_place_of_a_name(
+    tmp_path: Path, notes: Path, kind: str
+) -> None:
     """The link goes, and not what it leads to; the temporary file beside it is made in the same way."""
     path = tmp_path / "history.csv"
     writers: dict[str, Callable[[], Any]] = {
-        "new": lambda: own_files.open_new(path).close(), "whole": lambda: write_atomically(path, b"x"),
-        "output": lambda: write_output(path, b"x"), "table": lambda: write_csv(path, ["a"], [[1]]),
+        "new": lambda: own_files.open_new(path).close(),
+        "whole": lambda: write_atomically(path, b"x"),
+        "output": lambda: write_output(path, b"x"),
+        "table": lambda: write_csv(path, ["a"], [[1]]),
         "hdf5": lambda: hdf5_atomically(path, lambda file: file.update({"x": 1})),
     }
     for name, write in writers.items():
@@ -175,16 +196,22 @@ def vast(group: Any, other: Path, raw: Path) -> None:
 
 
 def texts(group: Any, other: Path, raw: Path) -> None:
-    group.create_dataset("u", data=np.array(["x"] * 12, dtype=object).reshape(4, 3), dtype=h5py.string_dtype())
+    group.create_dataset(
+        "u", data=np.array(["x"] * 12, dtype=object).reshape(4, 3), dtype=h5py.string_dtype()
+    )
 
 
 def named_type(group: Any, other: Path, raw: Path) -> None:
     group["u"] = np.dtype("f8")
 
 
-@pytest.mark.parametrize("kind", [external_link, soft_link, virtual, external_storage, vast, texts, named_type])
+@pytest.mark.parametrize(
+    "kind", [external_link, soft_link, virtual, external_storage, vast, texts, named_type]
+)
 @pytest.mark.parametrize("place", ["/", "/000010"])
-def test_numbers_lie_in_the_very_file(tmp_path: Path, kind: Callable[[Any, Path, Path], None], place: str) -> None:
+def test_numbers_lie_in_the_very_file(
+    tmp_path: Path, kind: Callable[[Any, Path, Path], None], place: str
+) -> None:
     other, raw, path = tmp_path / "other.h5", tmp_path / "raw", tmp_path / "frame.h5"
     raw.write_bytes(bytes(200))
     with h5py.File(other, "w") as file:
@@ -194,7 +221,9 @@ def test_numbers_lie_in_the_very_file(tmp_path: Path, kind: Callable[[Any, Path,
         kind(file.require_group(place), other, raw)
     with open_hdf5(path) as file:
         assert file["sound"][()].sum() == 12.0 and "u" in file[place] and "v" not in file[place]
-        with pytest.raises(InputError, match="/u (lies in another file|is no array of numbers of this file)"):
+        with pytest.raises(
+            InputError, match="/u (lies in another file|is no array of numbers of this file)"
+        ):
             file[f"{place}/u"]
         with h5py.File(tmp_path / "copy.h5", "w") as copy, pytest.raises(InputError, match="/u "):
             file[place].copy_to(copy, "again")
@@ -215,7 +244,9 @@ def test_a_group_elsewhere_is_not_entered(tmp_path: Path) -> None:
                 file[name]
 
 
-def test_a_file_that_is_exchanged_while_it_is_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_is_exchanged_while_it_is_opened(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """HDF5 opens a name: what it has opened must be the regular file that was looked at."""
     for name in ("one.h5", "other.h5"):
         with h5py.File(tmp_path / name, "w") as file:

@@ -23,7 +23,9 @@ pytestmark = pytest.mark.serial
 FEW, MANY = 20, 120
 
 
-def per_step(monkeypatch: pytest.MonkeyPatch, scheme: Any, *, damping: float, ledger: bool, **more: Any) -> float:
+def per_step(
+    monkeypatch: pytest.MonkeyPatch, scheme: Any, *, damping: float, ledger: bool, **more: Any
+) -> float:
     """Products a step of a chain that hits its walls, with the ledger or without."""
     made = [0]
 
@@ -37,7 +39,12 @@ def per_step(monkeypatch: pytest.MonkeyPatch, scheme: Any, *, damping: float, le
         made[0] = 0
         problem = chain(damping=damping, **more)
         found = simulate(
-            problem, scheme=scheme, solver=Condensed(), dt=5e-3, steps=steps, record=[Energy()] if ledger else [],
+            problem,
+            scheme=scheme,
+            solver=Condensed(),
+            dt=5e-3,
+            steps=steps,
+            record=[Energy()] if ledger else [],
             progress=False,
         )
         counts.append(made[0])
@@ -46,16 +53,26 @@ def per_step(monkeypatch: pytest.MonkeyPatch, scheme: Any, *, damping: float, le
 
 
 @pytest.mark.parametrize("ledger", [False, True], ids=["march", "ledger"])
-@pytest.mark.parametrize("scheme", [
-    ZienkiewiczWoodTaylor(), ZienkiewiczWoodTaylor(0.7), Trapezoidal(), MoreauJean(),
-    ContactStabilisedNewmark(projected=False),
-], ids=repr)
+@pytest.mark.parametrize(
+    "scheme",
+    [
+        ZienkiewiczWoodTaylor(),
+        ZienkiewiczWoodTaylor(0.7),
+        Trapezoidal(),
+        MoreauJean(),
+        ContactStabilisedNewmark(projected=False),
+    ],
+    ids=repr,
+)
 def test_a_step_makes_three_products(monkeypatch, scheme, ledger):
     """M u, M v and K u serve the right-hand side, the certificate, the ledger and the next step; C u with damping (and
     C v where the step is one in velocities; the ledger asks for C (u1 - u0)/dt)."""
     assert per_step(monkeypatch, scheme, damping=0.0, ledger=ledger, impact=None) <= 3.0
     in_velocities = ledger and isinstance(scheme, MoreauJean)
-    assert per_step(monkeypatch, scheme, damping=1e-4, ledger=ledger, impact=None) <= 4.0 + 1.0 * in_velocities
+    assert (
+        per_step(monkeypatch, scheme, damping=1e-4, ledger=ledger, impact=None)
+        <= 4.0 + 1.0 * in_velocities
+    )
 
 
 def test_an_impact_costs_one_more(monkeypatch):
@@ -88,11 +105,15 @@ def test_only_vectors_that_nobody_writes_to_are_remembered():
     assert remembered(x) is not first  # only so many are kept
     told = remembered.know(np.array([7.0]), lambda: np.array([0.5]))
     assert remembered(told).tolist() == [0.5]
-    assert remembered(told.copy()).tolist() == [14.0]  # equal numbers in another place are another vector
+    assert remembered(told.copy()).tolist() == [
+        14.0
+    ]  # equal numbers in another place are another vector
 
 
 def test_the_load_of_a_time_is_made_once():
     problem = chain()
     system = problem.equations
-    assert system.load_at(0.3) is system.load_at(0.3) and np.array_equal(system.load_at(0.3), system.load(0.3))
+    assert system.load_at(0.3) is system.load_at(0.3) and np.array_equal(
+        system.load_at(0.3), system.load(0.3)
+    )
     assert system.load_at(0.4) is not system.load_at(0.3)

@@ -13,7 +13,10 @@ pytestmark = pytest.mark.serial
 
 def test_an_old_name_gives_the_new_thing_and_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(renamed.NAMES, "vi_contact", {"Bounce": "vi_contact.laws.Elastic"})
-    with pytest.warns(DeprecationWarning, match="'vi_contact.Bounce' is now vi_contact.laws.Elastic: use that name"):
+    with pytest.warns(
+        DeprecationWarning,
+        match="'vi_contact.Bounce' is now vi_contact.laws.Elastic: use that name",
+    ):
         law = vi_contact.Bounce
     assert law is vi_contact.Elastic
 

@@ -41,8 +41,10 @@ def rubbing(m: int) -> Any:
 
 
 def told(owner: str, rows: int) -> str:
-    return re.escape(f"{owner} stores a dense matrix of its {rows} contact unknowns on every rank, 0.8 GB: take "
-                     f"Iterative(), which stores none, or at most {DENSE_ROWS}")
+    return re.escape(
+        f"{owner} stores a dense matrix of its {rows} contact unknowns on every rank, 0.8 GB: take "
+        f"Iterative(), which stores none, or at most {DENSE_ROWS}"
+    )
 
 
 def test_condensed_refuses_what_its_dense_matrix_would_not_fit() -> None:
@@ -52,7 +54,9 @@ def test_condensed_refuses_what_its_dense_matrix_would_not_fit() -> None:
     for refused in (
         lambda: Condensed().check(large),
         lambda: march(large, solver=Condensed(), dt=0.1, steps=1),
-        lambda: Condensed().prepare(large.system.effective(m=1.0, c=0.0, k=1.0), large.surface, 1.0),
+        lambda: Condensed().prepare(
+            large.system.effective(m=1.0, c=0.0, k=1.0), large.surface, 1.0
+        ),
     ):
         with pytest.raises(InputError, match=told("Condensed()", DENSE_ROWS + 1)):
             refused()
@@ -74,4 +78,6 @@ def test_small_is_counted_over_all_ranks() -> None:
 
     assert small(SerialComm(), OWN_UNKNOWNS, OWN_CONDITIONS)
     assert small(Two(), OWN_UNKNOWNS // 2, OWN_CONDITIONS // 2)
-    assert not small(Two(), OWN_UNKNOWNS // 2 + 1, 1) and not small(Two(), 1, OWN_CONDITIONS // 2 + 1)
+    assert not small(Two(), OWN_UNKNOWNS // 2 + 1, 1) and not small(
+        Two(), 1, OWN_CONDITIONS // 2 + 1
+    )

@@ -11,8 +11,9 @@ from vi_contact.core import stages
 pytestmark = pytest.mark.serial
 
 
-def test_a_long_stage_is_told_at_the_terminal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-                                              ) -> None:
+def test_a_long_stage_is_told_at_the_terminal(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Longer than a second, and only where it is wanted; nothing of a stage that fails."""
     times = iter((0.0, 2.0, 10.0, 10.5, 20.0, 22.0, 30.0, 32.0, 40.0))
     monkeypatch.setattr(stages.time, "perf_counter", lambda: next(times))
@@ -24,4 +25,7 @@ def test_a_long_stage_is_told_at_the_terminal(monkeypatch: pytest.MonkeyPatch, c
     with pytest.raises(ZeroDivisionError):
         stages.stage("dividing")(lambda: 1 / 0)()
     assert capsys.readouterr().err == "vi-contact: meshing 2 s\n"
-    assert stages.done() == "meshing 2 s, meshing 0.5 s, meshing 2 s, meshing 2 s" and stages.done() == ""
+    assert (
+        stages.done() == "meshing 2 s, meshing 0.5 s, meshing 2 s, meshing 2 s"
+        and stages.done() == ""
+    )

@@ -22,7 +22,9 @@ def test_equations_are_in_the_contact_direction():
     np.testing.assert_array_equal(problem.equations.u0[:2], [-1.0, 3.5])
     np.testing.assert_array_equal(problem.cartesian(problem.equations.u0), problem.system.u0)
     np.testing.assert_array_equal(problem.surface.normal_values(problem.equations.u0), [-1.0])
-    assert problem.equations.load(0.0)[0] == pytest.approx(2.0 * 2.5 / 2)  # weight of half an element, towards the wall
+    assert problem.equations.load(0.0)[0] == pytest.approx(
+        2.0 * 2.5 / 2
+    )  # weight of half an element, towards the wall
 
 
 def test_base_motion_loads_the_body_with_its_inertia():
@@ -31,14 +33,18 @@ def test_base_motion_loads_the_body_with_its_inertia():
     problem = chain_problem(3, mass=2.0, excitation=shaken, constant=5.0)
     a_g = 3.0 - 2.0 * np.sin(np.pi / 4)  # at t = 1
     np.testing.assert_allclose(problem.ground_acceleration(1.0), [a_g], rtol=1e-14)
-    np.testing.assert_allclose(problem.equations.load(1.0), np.array([0.0, 0.0, 5.0]) - 2.0 * a_g, rtol=1e-14)
+    np.testing.assert_allclose(
+        problem.equations.load(1.0), np.array([0.0, 0.0, 5.0]) - 2.0 * a_g, rtol=1e-14
+    )
     np.testing.assert_array_equal(problem.static_load.load(1.0), [0.0, 0.0, 5.0])
     assert len(chain_problem(3, excitation=shaken[0]).excitations) == 1
     assert not chain_problem(3).ground_acceleration(1.0).any()
 
 
 def test_excitation_of_another_dimension_is_refused():
-    with pytest.raises(InputError, match=r"has 2 components but the body has 1: give one component per dimension"):
+    with pytest.raises(
+        InputError, match=r"has 2 components but the body has 1: give one component per dimension"
+    ):
         chain_problem(3, excitation=Harmonic(1.0, 1.0, direction=(1.0, 0.0)))
 
 

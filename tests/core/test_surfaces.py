@@ -27,15 +27,22 @@ def test_half_space_oblique():
     """Gap and direction do not depend on the boundary's own normal (curved boundaries)."""
     slope = HalfSpace(point=(0.0, 0.0), normal=(1.0, 1.0))
     normals = np.array([[-1.0, 0.0], [0.0, -1.0], [-0.6, -0.8]])
-    np.testing.assert_allclose(slope.gap(POINTS, normals), POINTS.sum(axis=1) / np.sqrt(2.0), rtol=1e-15)
-    np.testing.assert_allclose(slope.directions(POINTS, normals), -np.sqrt(0.5) * np.ones((3, 2)), rtol=1e-15)
+    np.testing.assert_allclose(
+        slope.gap(POINTS, normals), POINTS.sum(axis=1) / np.sqrt(2.0), rtol=1e-15
+    )
+    np.testing.assert_allclose(
+        slope.directions(POINTS, normals), -np.sqrt(0.5) * np.ones((3, 2)), rtol=1e-15
+    )
 
 
 def test_half_space_along_a_whole_side_is_refused():
     """A side at right angles to the contact direction, but for rounding, can never touch."""
     for across in (1e-16, -1e-16):
         side = np.tile([1.0, across], (3, 1))
-        with pytest.raises(InputError, match=r"is along the boundary at 90 degrees to its mean outward normal \(1, "):
+        with pytest.raises(
+            InputError,
+            match=r"is along the boundary at 90 degrees to its mean outward normal \(1, ",
+        ):
             facing(HalfSpace((0.0, 0.0), (0.0, 1.0)), POINTS, side)
 
 
@@ -46,7 +53,10 @@ def test_half_space_along_a_whole_side_is_refused():
         (lambda: HalfSpace((0.0, 0.0), (0.0, np.nan)), "give finite numbers"),
         (lambda: HalfSpace((0.0, 0.0, 0.0), (0.0, 1.0)), "same number"),
         (lambda: facing(HalfSpace((0.0, 0.0), (0.0, -1.0)), POINTS, DOWN), "turn its sign"),
-        (lambda: facing(HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), POINTS, DOWN), "numbers of shape"),
+        (
+            lambda: facing(HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), POINTS, DOWN),
+            "numbers of shape",
+        ),
         (lambda: facing(AnalyticGap(lambda x: 0.5), POINTS, DOWN), "one real gap per point"),
     ],
 )
@@ -79,7 +89,9 @@ def test_nodal_frames_are_orthonormal(d):
     n /= np.linalg.norm(n, axis=1)[:, None]
     frames = nodal_frames(n)
     np.testing.assert_array_equal(frames[:, :, 0], n)
-    np.testing.assert_allclose(frames.transpose(0, 2, 1) @ frames, np.tile(np.eye(d), (len(n), 1, 1)), atol=1e-14)
+    np.testing.assert_allclose(
+        frames.transpose(0, 2, 1) @ frames, np.tile(np.eye(d), (len(n), 1, 1)), atol=1e-14
+    )
     if d > 1:
         np.testing.assert_allclose(np.linalg.det(frames), 1.0, rtol=1e-14)  # right-handed
 
@@ -96,7 +108,9 @@ def test_selection_and_its_transpose():
 def test_held_and_on_springs():
     surface = chain_surface(4, weight=0.25)
     assert surface.bilateral_everywhere().bilateral.all() and not surface.bilateral.any()
-    np.testing.assert_array_equal(surface.on_springs(8.0).compliance, [0.5])  # k = 8 Pa/m times 0.25 m²
+    np.testing.assert_array_equal(
+        surface.on_springs(8.0).compliance, [0.5]
+    )  # k = 8 Pa/m times 0.25 m²
     for stiffness in (0.0, -1.0, np.inf, np.nan):
         with pytest.raises(InputError, match="the foundation modulus is"):
             surface.on_springs(stiffness)

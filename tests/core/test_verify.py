@@ -24,7 +24,9 @@ from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 
 pytestmark = pytest.mark.serial
 HALF, NEWMARK = ZienkiewiczWoodTaylor(), LinearMultistep.newmark()
-HOUBOLT = LinearMultistep(a=(11 / 6, -3.0, 3 / 2, -1 / 3), b=(1.0, 0.0, 0.0, 0.0), gamma=(2.0, -5.0, 4.0, -1.0))
+HOUBOLT = LinearMultistep(
+    a=(11 / 6, -3.0, 3 / 2, -1 / 3), b=(1.0, 0.0, 0.0, 0.0), gamma=(2.0, -5.0, 4.0, -1.0)
+)
 SCHEMES = {
     "zwt ½": HALF,
     "zwt 0.7": ZienkiewiczWoodTaylor(0.7),
@@ -111,7 +113,9 @@ def test_bilateral_row_knows_both_signs():
         moved[3] += delta
         found = kkt_residual(held, replace(result, x=moved))
         assert found.penetration == 0.0
-        assert found.complementarity == pytest.approx(1e-5 / size(held, replace(result, x=moved))[0], rel=1e-6)
+        assert found.complementarity == pytest.approx(
+            1e-5 / size(held, replace(result, x=moved))[0], rel=1e-6
+        )
 
 
 def test_springs_are_allowed_to_sink_in():
@@ -137,12 +141,18 @@ def test_a_wide_gap_blunts_nothing():
 def test_units_do_not_matter():
     """x in units of a millionth, r in units of a thousand: A, b and bounds follow, the certificate stays."""
     step, result = pressed()
-    step = replace(step, A=EffectiveMatrix(step.A.matrix, step.A.algebra))  # A x by one product on both sides
+    step = replace(
+        step, A=EffectiveMatrix(step.A.matrix, step.A.algebra)
+    )  # A x by one product on both sides
     length, force = 2.0**20, 2.0**-10  # powers of two: bit-equal
     A = EffectiveMatrix(step.A.algebra.combine([(force / length, step.A.matrix)]), step.A.algebra)
     wrong = replace(result, x=result.x + 1e-7, r_n=result.r_n - 0.5)
-    other = replace(step, A=A, b=step.b * force, bound=step.bound * length, guess=step.guess * length)
-    assert kkt_residual(other, replace(wrong, x=wrong.x * length, r_n=wrong.r_n * force)) == kkt_residual(step, wrong)
+    other = replace(
+        step, A=A, b=step.b * force, bound=step.bound * length, guess=step.guess * length
+    )
+    assert kkt_residual(
+        other, replace(wrong, x=wrong.x * length, r_n=wrong.r_n * force)
+    ) == kkt_residual(step, wrong)
 
 
 def test_nan_and_nothing():
@@ -153,7 +163,9 @@ def test_nan_and_nothing():
         broken[0] = np.nan
         assert kkt_residual(step, replace(result, **{name: broken})).worst == np.inf
     zero = replace(step, b=0.0 * step.b, guess=0.0 * step.guess)
-    nothing = replace(result, x=0.0 * result.x, r_n=0.0 * result.r_n, active=np.zeros(2, dtype=bool))
+    nothing = replace(
+        result, x=0.0 * result.x, r_n=0.0 * result.r_n, active=np.zeros(2, dtype=bool)
+    )
     assert kkt_residual(zero, nothing).worst == 0.0
     assert kkt_residual(zero, replace(nothing, r_n=np.array([0.0, 1e-300]))).worst == np.inf
     assert kkt_residual(replace(zero, bound=np.array([-1e-300, 1.0])), nothing).worst == np.inf
@@ -202,7 +214,9 @@ def test_V97_ledger_closes(scheme, damping, impact):
     assert (totals["damping"] > 1e-3 * biggest) == (damping > 0.0)
     assert (totals["impact"] != 0.0) == (impact is not None)
     if scheme is HALF:
-        assert abs(totals["algorithmic"]) <= 1e-12 * biggest  # the midpoint rule has no algorithmic loss
+        assert (
+            abs(totals["algorithmic"]) <= 1e-12 * biggest
+        )  # the midpoint rule has no algorithmic loss
     if isinstance(impact, Inelastic) and isinstance(impact.update, ImpulseUpdate):
         assert totals["impact"] > 0.0
 
@@ -225,9 +239,9 @@ def test_ledger_with_known_energies_is_the_same():
     report = list(run(problem, HALF, dt=5e-3, steps=9))[-1]
     states = report.old, before_impact(report)
     before, after = (energies(problem.equations, state.u, state.v) for state in states)
-    assert energy_balance(problem, *states, report.balance, before=before, after=after) == energy_balance(
-        problem, *states, report.balance
-    )
+    assert energy_balance(
+        problem, *states, report.balance, before=before, after=after
+    ) == energy_balance(problem, *states, report.balance)
     assert before.total == before.kinetic + before.strain
 
 
@@ -239,7 +253,9 @@ def test_ledger_finds_a_wrong_step():
     found = energy_balance(problem, report.old, before_impact(report), wrong)
     du = report.new.u - report.old.u
     assert isinstance(problem.equations.M, SerialMatrix)
-    assert found.algorithmic == pytest.approx(0.01 * du @ (problem.equations.M @ report.balance.a), rel=1e-6)
+    assert found.algorithmic == pytest.approx(
+        0.01 * du @ (problem.equations.M @ report.balance.a), rel=1e-6
+    )
     lighter = replace(report.balance, f=report.balance.f + 1.0)
     defect = energy_balance(problem, report.old, before_impact(report), lighter).defect
     assert defect == pytest.approx(-du.sum(), rel=1e-9)
@@ -250,7 +266,9 @@ def test_compiled_sizes_are_those_of_numpy(monkeypatch):
     if library(SerialComm()) is None:
         pytest.skip("needs a compiler and CHOLMOD")
     step, result = pressed()
-    A = EffectiveMatrix(step.A.matrix, step.A.algebra, image=lambda x: np.ascontiguousarray((step.A.matrix @ x.T).T))
+    A = EffectiveMatrix(
+        step.A.matrix, step.A.algebra, image=lambda x: np.ascontiguousarray((step.A.matrix @ x.T).T)
+    )
     step = replace(step, A=A)
     rng, m, n = np.random.default_rng(3), 2, len(result.x)
     odd = replace(step.surface, bilateral=np.array([True, False]), compliance=np.array([0.0, 1e-3]))
@@ -259,23 +277,38 @@ def test_compiled_sizes_are_those_of_numpy(monkeypatch):
         rows = replace(result, x=x, r_n=r_n, active=rng.random((4, m)) < 0.5, r_t=r_t)
         rows = rows if surface.tangents.size else replace(rows, r_t=None)
         rows.x[3, 1] = np.nan
-        many = replace(step, surface=surface, b=rng.normal(size=(4, n)), guess=-0.5 * x, active=rows.active)
+        many = replace(
+            step, surface=surface, b=rng.normal(size=(4, n)), guess=-0.5 * x, active=rows.active
+        )
         single = replace(many, b=many.b[1], guess=many.guess[1], active=rows.active[1])
-        own = replace(rows, x=x[1], r_n=r_n[1], active=rows.active[1], r_t=None if rows.r_t is None else r_t[1])
+        own = replace(
+            rows,
+            x=x[1],
+            r_n=r_n[1],
+            active=rows.active[1],
+            r_t=None if rows.r_t is None else r_t[1],
+        )
         compiled = verify._sizes(many, rows), verify._sizes(single, own)
         monkeypatch.setattr(verify, "already", lambda: None)
         assert compiled == (verify._sizes(many, rows), verify._sizes(single, own))
         monkeypatch.undo()
-        assert verify.already() is not None and compiled[1] == compiled[0][1:2] and np.inf in compiled[0][3]
+        assert (
+            verify.already() is not None
+            and compiled[1] == compiled[0][1:2]
+            and np.inf in compiled[0][3]
+        )
         assert np.isfinite(compiled[0][:3]).all() and min(compiled[0][0][:6]) > 0.0
 
 
 @pytest.mark.skipif(library(SerialComm()) is None, reason="no compiler here")
-@pytest.mark.parametrize("worse", [
-    lambda result: replace(result, active=result.active.astype(int)),
-    lambda result: replace(result, x=result.x.astype(np.float32)),
-    lambda result: replace(result, x=np.repeat(result.x, 2)[::2]),
-])
+@pytest.mark.parametrize(
+    "worse",
+    [
+        lambda result: replace(result, active=result.active.astype(int)),
+        lambda result: replace(result, x=result.x.astype(np.float32)),
+        lambda result: replace(result, x=np.repeat(result.x, 2)[::2]),
+    ],
+)
 def test_what_solvers_of_others_give_is_read_as_what_it_is(worse):
     """Whole numbers for a set, single precision, every second number: the certificate is that of the numpy way."""
     step, result = pressed()

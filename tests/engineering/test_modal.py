@@ -21,7 +21,9 @@ pytestmark = pytest.mark.serial
 def test_frequency_of_the_discrete_bar(n, lumped):
     """f1 = sqrt(lambda1)/(2 pi) of K phi = lambda M phi, scipy's dense eigenvalue, to 1e-10."""
     system = bar(n, clamped=True, lumped=lumped).system
-    exact = np.sqrt(eigh(system.K.csr.toarray(), system.M.csr.toarray(), eigvals_only=True)[0]) / (2.0 * np.pi)
+    exact = np.sqrt(eigh(system.K.csr.toarray(), system.M.csr.toarray(), eigvals_only=True)[0]) / (
+        2.0 * np.pi
+    )
     assert lowest_frequency(system) == pytest.approx(exact, rel=1e-10)
 
 
@@ -37,11 +39,16 @@ def test_frequency_of_the_continuous_bar():
 
 def test_contact_basis_does_not_matter():
     problem = bar(30, clamped=True)
-    assert lowest_frequency(problem.equations) == pytest.approx(lowest_frequency(problem.system), rel=1e-12)
+    assert lowest_frequency(problem.equations) == pytest.approx(
+        lowest_frequency(problem.system), rel=1e-12
+    )
 
 
 def test_units_do_not_matter():
-    small, large = chain_system(5, mass=1e-9, stiffness=1e-6), chain_system(5, mass=1.0, stiffness=1e3)
+    small, large = (
+        chain_system(5, mass=1e-9, stiffness=1e-6),
+        chain_system(5, mass=1.0, stiffness=1e3),
+    )
     assert lowest_frequency(small) == pytest.approx(lowest_frequency(large), rel=1e-13)
 
 

@@ -24,8 +24,12 @@ K0 = SOIL.nu / (1.0 - SOIL.nu)
 def box_of_soil(comm: Any) -> tuple[Any, Any, Any]:
     """(problem, its rest, groups): soil on a smooth rigid floor between a roller and a smooth rigid wall."""
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(B, H), divisions=(4, N)), comm)
-    system = vc.with_weight(fem.assemble(mesh, SOIL, prescribed=fem.Prescribed(tags["left"], components=(0,))))
-    floor = fem.contact_surface(system, tags["bottom"], obstacle=vc.HalfSpace((0.0, 0.0), (0.0, 1.0)))
+    system = vc.with_weight(
+        fem.assemble(mesh, SOIL, prescribed=fem.Prescribed(tags["left"], components=(0,)))
+    )
+    floor = fem.contact_surface(
+        system, tags["bottom"], obstacle=vc.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    )
     wall = fem.contact_surface(system, tags["right"], obstacle=vc.HalfSpace((B, 0.0), (-1.0, 0.0)))
     problem = vc.ContactProblem(system, fem.joined_surfaces(floor, wall))
     return problem, vc.static_equilibrium(problem, solver=vc.Condensed()), tags
@@ -79,14 +83,18 @@ def test_trapezoid_under_an_eccentric_load(comm: Any) -> None:
     stiff = vc.LinearElastic(E=1e13, nu=0.2, rho=RHO)
     loads = [fem.Traction(tags["right"], (0.0, -DOWN)), fem.Traction(tags["left"], (ACROSS, 0.0))]
     system = vc.with_weight(fem.assemble(mesh, stiff, loads=loads))
-    surface = fem.contact_surface(system, tags["bottom"], obstacle=vc.HalfSpace((0.0, 0.0), (0.0, 1.0)))
+    surface = fem.contact_surface(
+        system, tags["bottom"], obstacle=vc.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    )
     problem = vc.ContactProblem(system, surface.on_springs(SPRINGS), friction=vc.Coulomb(MU))
     rest = vc.static_equilibrium(problem, solver=vc.Condensed())
     found = row(problem, rest, "foot", part=tags["bottom"])
     down, across, weight = DOWN * TALL, ACROSS * TALL, RHO * G * WIDTH * TALL
     normal, e = weight + down, (0.5 * down * WIDTH + 0.5 * across * TALL) / (weight + down)
     assert 0.0 < e < WIDTH / 6.0 and found["uplift_foot"] == 0.0
-    assert found["N_foot"] == pytest.approx(normal, rel=1e-6) and found["e_foot"] == pytest.approx(e, rel=1e-5)
+    assert found["N_foot"] == pytest.approx(normal, rel=1e-6) and found["e_foot"] == pytest.approx(
+        e, rel=1e-5
+    )
     inertia = WIDTH**3 / 12.0 + WIDTH * (WIDTH / 12) ** 2 / 6.0
     for end, sign in (("low", -1.0), ("high", 1.0)):
         pressure = normal / WIDTH + sign * normal * e * 0.5 * WIDTH / inertia
@@ -101,7 +109,9 @@ def test_a_block_slides_until_its_speed_is_gone(comm: Any) -> None:
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(2.0, 1.0), divisions=(4, 2)), comm)
     stiff = vc.LinearElastic(E=1e9, nu=0.2, rho=RHO)
     system = vc.with_weight(fem.assemble(mesh, stiff, damping=vc.Rayleigh(0.0, 2e-3)))
-    surface = fem.contact_surface(system, tags["bottom"], obstacle=vc.HalfSpace((0.0, 0.0), (0.0, 1.0)))
+    surface = fem.contact_surface(
+        system, tags["bottom"], obstacle=vc.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    )
     problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.5))
     rest = vc.static_equilibrium(problem, solver=vc.Condensed())
     speed = 0.5
@@ -111,11 +121,18 @@ def test_a_block_slides_until_its_speed_is_gone(comm: Any) -> None:
     run = vc.simulate(problem, dt=1e-3, t_end=0.2, state=start, record=[foot], progress=False)
     slid = run.history["sliding_foot"][-1] - run.history["sliding_foot"][0]
     assert abs(slid) == pytest.approx(speed**2 / (2.0 * 0.5 * G), rel=0.01)
-    assert np.nanmax(np.abs(run.history["margin_foot"][10:80])) < 0.05 < 0.5 < run.history["margin_foot"][-20:].mean()
+    assert (
+        np.nanmax(np.abs(run.history["margin_foot"][10:80]))
+        < 0.05
+        < 0.5
+        < run.history["margin_foot"][-20:].mean()
+    )
 
 
 def surface_of(system: Any, tags: Any) -> Any:
-    return fem.contact_surface(system, tags["bottom"], obstacle=vc.HalfSpace((0.0, 0.0), (0.0, 1.0)))
+    return fem.contact_surface(
+        system, tags["bottom"], obstacle=vc.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    )
 
 
 CASE = """
@@ -189,7 +206,10 @@ def test_bad_parts_are_refused() -> None:
         ({"name": "a", "part": ((9.0, 9.0), (10.0, 10.0))}, "part 'a' has no contact points"),
         ({"name": "a", "part": tags["top"]}, "part 'a': its group has no whole facet in contact"),
         ({"name": "a", "part": (1.0, 2.0)}, "part 'a': part, a box, has shape"),
-        ({"name": "a", "part": tags["right"], "where": lambda x, n: n[:, 0] > 0}, "has both part and where"),
+        (
+            {"name": "a", "part": tags["right"], "where": lambda x, n: n[:, 0] > 0},
+            "has both part and where",
+        ),
         ({}, "part name ''"),
     ):
         with pytest.raises(InputError, match=said):

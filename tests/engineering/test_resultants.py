@@ -33,13 +33,20 @@ class Points:
 
 
 HALVES = np.array([0.5, 1.0, 0.5])
-FOOTING = Points(np.column_stack([[0.0, 1.0, 2.0], np.zeros(3)]), np.tile([0.0, -1.0], (3, 1)), HALVES)
-WALL = Points(np.column_stack([np.full(3, 4.0), [1.0, 2.0, 3.0]]), np.tile([1.0, 0.0], (3, 1)), np.ones(3))
+FOOTING = Points(
+    np.column_stack([[0.0, 1.0, 2.0], np.zeros(3)]), np.tile([0.0, -1.0], (3, 1)), HALVES
+)
+WALL = Points(
+    np.column_stack([np.full(3, 4.0), [1.0, 2.0, 3.0]]), np.tile([1.0, 0.0], (3, 1)), np.ones(3)
+)
 
 
 def history(geometry: Points, r_n: Any, gap: Any, r_t: Any = None) -> dict[str, Array]:
     """Rows of reactions [N] as Contact() would have recorded them."""
-    r_n, gap = np.atleast_2d(np.asarray(r_n, dtype=float)), np.atleast_2d(np.asarray(gap, dtype=float))
+    r_n, gap = (
+        np.atleast_2d(np.asarray(r_n, dtype=float)),
+        np.atleast_2d(np.asarray(gap, dtype=float)),
+    )
     t = np.arange(len(r_n), dtype=float)
     found = {"t": t, "pressure": r_n / geometry.weights, "gap": gap, "active": gap == 0.0}
     if r_t is not None:
@@ -54,10 +61,20 @@ def test_footing() -> None:
     rows = history(FOOTING, [[0.0, 30.0, 10.0]], [[2e-3, 0.0, 0.0]], [[0.0, 6.0, 2.0]])
     found = engineering.contact_summary(rows, FOOTING, centre=(1.0, 0.0))
     expected = {
-        "uplift": 0.25, "opening": 2e-3, "slip": 0.3, "N": 40.0, "T": -8.0, "M": 10.0, "e": 0.25, "height": 0.0,
-        "force_x": -8.0, "force_y": 40.0,  # the tangent of n = (0, -1) is (1, 0): friction on the body points left
+        "uplift": 0.25,
+        "opening": 2e-3,
+        "slip": 0.3,
+        "N": 40.0,
+        "T": -8.0,
+        "M": 10.0,
+        "e": 0.25,
+        "height": 0.0,
+        "force_x": -8.0,
+        "force_y": 40.0,  # the tangent of n = (0, -1) is (1, 0): friction on the body points left
     }
-    assert {name: float(values[0]) for name, values in found.items()} == pytest.approx(expected, rel=1e-14)
+    assert {name: float(values[0]) for name, values in found.items()} == pytest.approx(
+        expected, rel=1e-14
+    )
 
 
 def test_wall_thrust_and_its_height() -> None:
@@ -66,7 +83,9 @@ def test_wall_thrust_and_its_height() -> None:
     found = engineering.contact_summary(rows, WALL, centre=(4.0, 0.5))
     assert found["N"].tolist() == [10.0, 0.0]
     assert found["force_x"].tolist() == [-10.0, 0.0]
-    assert found["height"][0] == pytest.approx((5.0 * 0.5 + 3.0 * 1.5 + 2.0 * 2.5) / 10.0, rel=1e-14)
+    assert found["height"][0] == pytest.approx(
+        (5.0 * 0.5 + 3.0 * 1.5 + 2.0 * 2.5) / 10.0, rel=1e-14
+    )
     assert found["e"][0] == pytest.approx(found["height"][0], rel=1e-14)  # t = (0, 1)
     assert found["M"][0] == pytest.approx(12.0, rel=1e-14)
     assert np.isnan(found["height"][1]) and np.isnan(found["e"][1])
@@ -76,15 +95,22 @@ def test_wall_thrust_and_its_height() -> None:
 def test_part_by_position_and_by_direction() -> None:
     """A corner of floor and wall: each part for itself; both together need a direction of N when they cancel."""
     corner = Points(
-        np.vstack([FOOTING.points, WALL.points]), np.vstack([FOOTING.normals, WALL.normals]),
+        np.vstack([FOOTING.points, WALL.points]),
+        np.vstack([FOOTING.normals, WALL.normals]),
         np.concatenate([FOOTING.weights, WALL.weights]),
     )
     rows = history(corner, [[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]], [[0.0] * 6])
-    floor = engineering.contact_summary(rows, corner, centre=(1.0, 0.0), where=lambda x, n: n[:, 1] < -0.5)
-    high = engineering.contact_summary(rows, corner, centre=(4.0, 2.0), where=lambda x, n: x[:, 1] >= 2.0)
+    floor = engineering.contact_summary(
+        rows, corner, centre=(1.0, 0.0), where=lambda x, n: n[:, 1] < -0.5
+    )
+    high = engineering.contact_summary(
+        rows, corner, centre=(4.0, 2.0), where=lambda x, n: x[:, 1] >= 2.0
+    )
     assert (floor["N"][0], high["N"][0]) == (6.0, 11.0)
     assert high["height"][0] == pytest.approx(6.0 / 11.0)
-    ring = Points(corner.points, np.vstack([FOOTING.normals, -FOOTING.normals]), np.tile(FOOTING.weights, 2))
+    ring = Points(
+        corner.points, np.vstack([FOOTING.normals, -FOOTING.normals]), np.tile(FOOTING.weights, 2)
+    )
     with pytest.raises(InputError, match="cancel"):
         engineering.contact_summary(rows, ring, centre=(0.0, 0.0))
     rows = history(ring, [[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]], [[0.0] * 6])
@@ -95,7 +121,12 @@ def test_part_by_position_and_by_direction() -> None:
 def test_three_dimensions() -> None:
     """M is a vector, T and e are sizes: N = 3 at (1, 2) with a drag along x."""
     surface = Points(np.array([[1.0, 2.0, 0.0]]), np.array([[0.0, 0.0, -1.0]]), np.ones(1))
-    rows = {"t": np.zeros(1), "pressure": np.full((1, 1), 3.0), "gap": np.zeros((1, 1)), "active": np.ones((1, 1))}
+    rows = {
+        "t": np.zeros(1),
+        "pressure": np.full((1, 1), 3.0),
+        "gap": np.zeros((1, 1)),
+        "active": np.ones((1, 1)),
+    }
     found = engineering.contact_summary(rows, surface, centre=(0.0, 0.0, 0.0))
     assert (found["M_x"][0], found["M_y"][0], found["M_z"][0]) == (6.0, -3.0, 0.0)
     assert found["e"][0] == pytest.approx(np.sqrt(5.0))
@@ -112,7 +143,9 @@ def test_bad_parts_are_refused() -> None:
         with pytest.raises(InputError, match=text):
             engineering.contact_summary(rows, FOOTING, **data)
     with pytest.raises(InputError, match="no column gap"):
-        engineering.contact_summary({"t": rows["t"], "pressure": rows["pressure"]}, FOOTING, centre=(0.0, 0.0))
+        engineering.contact_summary(
+            {"t": rows["t"], "pressure": rows["pressure"]}, FOOTING, centre=(0.0, 0.0)
+        )
     with pytest.raises(InputError, match="letters"):
         engineering.Resultants("left toe", (0.0, 0.0))
 
@@ -120,12 +153,18 @@ def test_bad_parts_are_refused() -> None:
 def test_recorder_agrees_with_the_summary() -> None:
     """Recorded while the chain bounces between its walls, and computed from its history afterwards."""
     problem = chain_problem(
-        4, gap=1e-3, left_gap=2e-3, excitation=vc.Harmonic(3.0, 2.0, direction=(1.0,)), consistent=True
+        4,
+        gap=1e-3,
+        left_gap=2e-3,
+        excitation=vc.Harmonic(3.0, 2.0, direction=(1.0,)),
+        consistent=True,
     )
     right = {"where": lambda x, n: n[:, 0] > 0.0}
     recorder = engineering.Resultants("right", (0.0,), **right)
     scheme = vc.ZienkiewiczWoodTaylor()
-    solution = vc.simulate(problem, scheme=scheme, dt=5e-3, steps=200, record=[vc.Contact(), recorder], progress=False)
+    solution = vc.simulate(
+        problem, scheme=scheme, dt=5e-3, steps=200, record=[vc.Contact(), recorder], progress=False
+    )
     after = engineering.contact_summary(solution.history, problem.surface, centre=(0.0,), **right)
     assert {"uplift", "opening", "N", "force_x", "height"} <= set(after)
     assert 0.0 < after["uplift"].mean() < 1.0
@@ -157,8 +196,12 @@ COLUMNS = {"t": ("s", "time"), "a": ("m", "a length"), "b": ("N", "a force"), "c
 def test_peaks_table(tmp_path: Path) -> None:
     """First instants of the extremes; nan left out; what is nan throughout says so."""
     t = np.arange(5.0)
-    rows = {"t": t, "a": np.array([0.0, 3.0, -1.0, 3.0, -1.0]), "b": np.array([np.nan, 2.0, 5.0, 1.0, 1.0]),
-            "c": np.full(5, np.nan)}
+    rows = {
+        "t": t,
+        "a": np.array([0.0, 3.0, -1.0, 3.0, -1.0]),
+        "b": np.array([np.nan, 2.0, 5.0, 1.0, 1.0]),
+        "c": np.full(5, np.nan),
+    }
     path = engineering.write_peaks(tmp_path / "peaks.csv", engineering.peaks(rows, COLUMNS))
     with path.open(newline="") as file:
         read = list(csv.reader(file))
@@ -188,10 +231,16 @@ def oscillator(steps: int = 2000, dt: float = 2e-3) -> dict[str, Array]:
     """A damped oscillator of 5 Hz and 5 % under a Ricker wave, until it rests: absolute and ground accelerations."""
     stiffness = 2.0 * OMEGA**2  # mass 2 kg
     problem = chain_problem(
-        1, gap=1.0, damping=2.0 * ZETA / OMEGA, excitation=vc.Ricker(3.0, 6.0, direction=(1.0,)), stiffness=stiffness
+        1,
+        gap=1.0,
+        damping=2.0 * ZETA / OMEGA,
+        excitation=vc.Ricker(3.0, 6.0, direction=(1.0,)),
+        stiffness=stiffness,
     )
     probe = vc.Probe({"top": (1.0,)}, acceleration=True)
-    run = vc.simulate(problem, scheme=vc.Trapezoidal(), dt=dt, steps=steps, record=[probe], progress=False)
+    run = vc.simulate(
+        problem, scheme=vc.Trapezoidal(), dt=dt, steps=steps, record=[probe], progress=False
+    )
     return dict(run.history)
 
 
@@ -205,9 +254,13 @@ def test_transfer_function_of_an_oscillator(resting: dict[str, Array]) -> None:
     frequencies = np.array([1.0, 2.5, 4.0, 5.0, 6.0, 8.0, 10.0])
     raw = engineering.transfer_function(resting, "a_x_top", frequencies=frequencies, bandwidth=None)
     r = 2.0 * np.pi * frequencies / OMEGA
-    exact = np.sqrt(1.0 + (2.0 * ZETA * r) ** 2) / np.sqrt((1.0 - r**2) ** 2 + (2.0 * ZETA * r) ** 2)
+    exact = np.sqrt(1.0 + (2.0 * ZETA * r) ** 2) / np.sqrt(
+        (1.0 - r**2) ** 2 + (2.0 * ZETA * r) ** 2
+    )
     assert np.abs(raw.amplitude / exact - 1.0).max() < 0.01
-    smooth = engineering.transfer_function(resting, "a_x_top", frequencies=np.linspace(3.0, 7.0, 81))
+    smooth = engineering.transfer_function(
+        resting, "a_x_top", frequencies=np.linspace(3.0, 7.0, 81)
+    )
     assert smooth.peak[0] == pytest.approx(5.0, abs=0.15)
     assert 0.8 * exact.max() < smooth.peak[1] < exact.max()
     same = engineering.transfer_function(resting, "a_g_x", "a_g_x")
@@ -223,10 +276,16 @@ def test_floor_spectrum_and_its_frame(resting: dict[str, Array]) -> None:
     periods = np.array([0.02, 1.0])
     spectrum = engineering.floor_spectrum(resting, "a_x_top", periods)
     assert spectrum.psa[0] == pytest.approx(np.abs(resting["a_x_top"]).max(), rel=0.03)
-    motions = [engineering.recorded_motion(resting, "a_x_top", relative=one).acceleration for one in (False, True)]
+    motions = [
+        engineering.recorded_motion(resting, "a_x_top", relative=one).acceleration
+        for one in (False, True)
+    ]
     ground = engineering.recorded_motion(resting, "a_g_x").acceleration
     assert np.abs(motions[0] - motions[1] - ground).max() < 1e-14
-    assert np.abs(engineering.recorded_motion(resting, "a_g_x", relative=True).acceleration).max() == 0.0
+    assert (
+        np.abs(engineering.recorded_motion(resting, "a_g_x", relative=True).acceleration).max()
+        == 0.0
+    )
     with pytest.raises(InputError, match="not an acceleration"):
         engineering.recorded_motion(resting, "u_x_top")
 
@@ -236,13 +295,25 @@ def test_velocities_know_the_jumps_of_impacts() -> None:
     without an impact law both columns are the same motion."""
     for impact, same in ((vc.Inelastic(), False), (None, True)):
         problem = chain_problem(
-            3, gap=1e-3, left_gap=2e-3, excitation=vc.Ricker(3.0, 6.0, direction=(1.0,)), impact=impact, consistent=True
+            3,
+            gap=1e-3,
+            left_gap=2e-3,
+            excitation=vc.Ricker(3.0, 6.0, direction=(1.0,)),
+            impact=impact,
+            consistent=True,
         )
         probe = vc.Probe({"end": (3.0,)}, velocity=True, acceleration=True)
         scheme = vc.ZienkiewiczWoodTaylor()
-        rows = vc.simulate(problem, scheme=scheme, dt=5e-3, steps=200, record=[probe], progress=False).history
-        a, v = (engineering.recorded_motion(rows, f"{kind}_x_end", relative=True).acceleration for kind in "av")
-        assert 5e-3 * v.sum() == pytest.approx(rows["v_x_end"][-1], abs=1e-12 * np.abs(rows["v_x_end"]).max())
+        rows = vc.simulate(
+            problem, scheme=scheme, dt=5e-3, steps=200, record=[probe], progress=False
+        ).history
+        a, v = (
+            engineering.recorded_motion(rows, f"{kind}_x_end", relative=True).acceleration
+            for kind in "av"
+        )
+        assert 5e-3 * v.sum() == pytest.approx(
+            rows["v_x_end"][-1], abs=1e-12 * np.abs(rows["v_x_end"]).max()
+        )
         difference = np.abs(a - v)[1:].max() / np.abs(v).max()
         assert difference < 1e-10 if same else difference > 1e-2
 
@@ -252,7 +323,10 @@ def test_uneven_steps_are_brought_to_even_ones() -> None:
     t = np.array([0.0, 0.1, 0.2, 0.25, 0.3, 0.4, 0.5])
     record = engineering.recorded_motion({"t": t, "a_x_top": 3.0 * t}, "a_x_top")
     assert record.dt == pytest.approx(0.1)
-    assert np.abs(record.acceleration - 3.0 * record.times).max() < 1e-14 and len(record.acceleration) == 6
+    assert (
+        np.abs(record.acceleration - 3.0 * record.times).max() < 1e-14
+        and len(record.acceleration) == 6
+    )
 
 
 def test_konno_ohmachi_keeps_constants_and_powers_centre() -> None:
@@ -269,11 +343,18 @@ def test_arc_position_of_lines_and_channels() -> None:
     assert place.tolist() == [1.0, 2.0, 3.0] and name == "y [m]"
     place, name = arc_position(np.array([[0.0, 0.0], [3.0, 4.0], [1.5, 2.0]]))
     assert place == pytest.approx([0.0, 5.0, 2.5]) and "length" in name
-    channel = np.array([[0.0, 2.0], [2.0, 2.0], [0.0, 1.0], [0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 1.0]])
+    channel = np.array(
+        [[0.0, 2.0], [2.0, 2.0], [0.0, 1.0], [0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 1.0]]
+    )
     place, name = arc_position(channel)
     assert place == pytest.approx([0.0, 6.0, 1.0, 2.0, 3.0, 4.0, 5.0]) and name == "arc length [m]"
-    sides = np.array([[-1.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, -1.0], [0.0, -1.0], [1.0, 0.0], [1.0, 0.0]])
-    corners, other = np.vstack([channel, channel[[3, 5]]]), np.vstack([sides, [[-1.0, 0.0], [0.0, -1.0]]])
+    sides = np.array(
+        [[-1.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, -1.0], [0.0, -1.0], [1.0, 0.0], [1.0, 0.0]]
+    )
+    corners, other = (
+        np.vstack([channel, channel[[3, 5]]]),
+        np.vstack([sides, [[-1.0, 0.0], [0.0, -1.0]]]),
+    )
     place, _ = arc_position(corners, other)  # each corner's condition on the side that comes first
     assert place == pytest.approx([0.0, 6.0, 1.0, 2.0, 3.0, 4.0, 5.0, 2.0, 4.0], abs=1e-4)
     assert place[7] < place[3] < place[4] < place[8] < place[5]
@@ -288,5 +369,7 @@ def test_thinned_maps_keep_peaks() -> None:
 
 
 def test_racking_of_nothing_is_refused():
-    with pytest.raises(InputError, match="Racking: frames is empty; give labels and four corners each"):
+    with pytest.raises(
+        InputError, match="Racking: frames is empty; give labels and four corners each"
+    ):
         engineering.Racking({})

@@ -37,16 +37,28 @@ def run(acceleration: Any, **columns: Any) -> dict[str, Any]:
     """A wall that is pressed by 1e5 N at 4 m and 2e4 N at 6 m for each m/s²; ``columns`` come in their place."""
     a = np.asarray(acceleration, dtype=float)
     thrust = 1e5 + 2e4 * a
-    return {"t": T, "a_g_x": a, "a_g_y": 0.0 * T, "N_wall": thrust, "height_wall": (4e5 + 12e4 * a) / thrust,
-            "uplift_wall": 0.0 * T} | columns
+    return {
+        "t": T,
+        "a_g_x": a,
+        "a_g_y": 0.0 * T,
+        "N_wall": thrust,
+        "height_wall": (4e5 + 12e4 * a) / thrust,
+        "uplift_wall": 0.0 * T,
+    } | columns
 
 
 def test_mononobe_okabe_of_tables() -> None:
     """K_AE of (30°, 15°) and (35°, 17.5°) for kh = 0 … 0.3 as tabulated to four digits; K of EN 1998-5, annex E, by a
     calculator of its own (phi 30°, tan psi = 0.24/1.12: 0.4856177)."""
-    table = {(30.0, 15.0): (0.3014, 0.3679, 0.4520, 0.5626), (35.0, 17.5): (0.2461, 0.3056, 0.3797, 0.4743)}
+    table = {
+        (30.0, 15.0): (0.3014, 0.3679, 0.4520, 0.5626),
+        (35.0, 17.5): (0.2461, 0.3056, 0.3797, 0.4743),
+    }
     for (phi, delta), values in table.items():
-        found = [wedge(phi * DEGREE, delta * DEGREE, 0.0, 0.0, psi=math.atan(kh)) for kh in (0.0, 0.1, 0.2, 0.3)]
+        found = [
+            wedge(phi * DEGREE, delta * DEGREE, 0.0, 0.0, psi=math.atan(kh))
+            for kh in (0.0, 0.1, 0.2, 0.3)
+        ]
         assert found == pytest.approx(values, abs=5e-5)
     annex = wedge(30.0 * DEGREE, 0.0, 0.0, 0.0, psi=math.atan(0.24 / 1.12))
     assert annex == pytest.approx(0.4856177257638489, rel=1e-12)
@@ -56,7 +68,9 @@ def test_mononobe_okabe_in_a_run() -> None:
     """The largest thrust of the run is compared; without earthquake it is Coulomb's; kv lightens and turns."""
     history = run(0.2 * G * np.sin(T))
     given = MononobeOkabe(**WALL, phi=30.0 * DEGREE, delta=15.0 * DEGREE, kh=0.3).compare(history)
-    assert given.expected == pytest.approx(0.5626 * math.cos(15.0 * DEGREE) * 0.5 * 1900.0 * G * 100.0, rel=1e-4)
+    assert given.expected == pytest.approx(
+        0.5626 * math.cos(15.0 * DEGREE) * 0.5 * 1900.0 * G * 100.0, rel=1e-4
+    )
     assert given.found == history["N_wall"].max()
     lifted = MononobeOkabe(**WALL, phi=0.6, delta=0.3, kh=0.2, kv=0.1).compare(history)
     still = MononobeOkabe(**WALL, phi=0.6, delta=0.3, kh=0.0).compare(history)
@@ -92,7 +106,10 @@ def test_smooth_wall_in_equilibrium() -> None:
     for nu, length in ((0.0, 20.0), (0.3, 2.0), (0.45, 5.0)):
         n = 2.0 * np.arange(1, 201) - 1.0
         k = n * np.pi / length
-        shear, vertical = (np.array(one) * 4.0 / (n * np.pi) for one in zip(*(mode(nu, one) for one in k), strict=True))
+        shear, vertical = (
+            np.array(one) * 4.0 / (n * np.pi)
+            for one in zip(*(mode(nu, one) for one in k), strict=True)
+        )
         thrust = 0.5 * length + np.sum(shear / k)
         height = (0.25 * length + np.sum(vertical / k**2)) / thrust
         assert smooth_wall(nu, length, 200) == pytest.approx((thrust, height), rel=1e-11)
@@ -105,7 +122,9 @@ def test_smooth_wall_is_the_published_one() -> None:
         assert smooth_wall(nu, 20.0) == pytest.approx((thrust, height), rel=4e-3)
     exact = smooth_wall(0.3, 20.0, 32000)
     assert smooth_wall(0.3, 20.0) == pytest.approx(exact, rel=2e-6)
-    assert smooth_wall(0.3, 40.0, 8000) == pytest.approx(smooth_wall(0.3, 20.0, 4000), rel=1e-5)  # far is far
+    assert smooth_wall(0.3, 40.0, 8000) == pytest.approx(
+        smooth_wall(0.3, 20.0, 4000), rel=1e-5
+    )  # far is far
     narrow = smooth_wall(0.3, 0.02)[0]  # a column between two walls that hold all of it
     assert narrow == pytest.approx(0.01, rel=0.02)
 
@@ -114,17 +133,30 @@ def test_wood_of_slow_motions_only() -> None:
     slow, fast = (run(2.0 * np.sin(2.0 * np.pi * f * T)) for f in (0.4, 2.0))
     found = Wood(**LAYER).compare(slow)
     assert found.expected == pytest.approx(0.96128 * 1900.0 * 2.0 * 100.0, rel=1e-4)
-    assert found.found == pytest.approx(4e4, rel=1e-4) and found.inputs["a"] == (float(slow["a_g_x"].max()), "m/s²")
+    assert found.found == pytest.approx(4e4, rel=1e-4) and found.inputs["a"] == (
+        float(slow["a_g_x"].max()),
+        "m/s²",
+    )
     height = Wood(**LAYER, of="height").compare(slow)
-    assert (height.expected, height.found) == (pytest.approx(5.748, rel=1e-4), pytest.approx(6.0, rel=1e-12))
-    assert Wood(**LAYER, length=20.0).compare(slow).expected == pytest.approx(0.70344 * 38e4, rel=1e-4)
+    assert (height.expected, height.found) == (
+        pytest.approx(5.748, rel=1e-4),
+        pytest.approx(6.0, rel=1e-12),
+    )
+    assert Wood(**LAYER, length=20.0).compare(slow).expected == pytest.approx(
+        0.70344 * 38e4, rel=1e-4
+    )
     refused = Wood(**LAYER).compare(fast)
-    assert refused.applies == "the motion has 2 Hz, above 0.3 of the layer's 3.75 Hz" and math.isnan(refused.expected)
+    assert (
+        refused.applies == "the motion has 2 Hz, above 0.3 of the layer's 3.75 Hz"
+        and math.isnan(refused.expected)
+    )
     opened = Wood(**LAYER).compare(slow | {"uplift_wall": 0.1 * (slow["a_g_x"] > 1.9)})
     assert opened.applies == "up to 10% of the wall leaves the soil"
     for check in (Wood, VeletsosYounan):  # open at rest already: no smooth wall that holds the soil
         agape = check(**LAYER).compare(slow | {"uplift_wall": 0.43 + 0.0 * T})
-        assert agape.applies == "up to 43% of the wall leaves the soil" and math.isnan(agape.expected)
+        assert agape.applies == "up to 43% of the wall leaves the soil" and math.isnan(
+            agape.expected
+        )
     for history in (run(0.0 * T), run(-np.abs(slow["a_g_x"]))):
         assert "never presses the soil on the wall" in Wood(**LAYER).compare(history).applies
     mirrored = slow | {"a_g_x": -slow["a_g_x"]}
@@ -140,19 +172,28 @@ def test_veletsos_and_younan() -> None:
     static = RigidWall(10.0, 1900.0, 0.3)
     found = VeletsosYounan(**LAYER).compare(slow)
     assert found.expected == pytest.approx(static.thrust(float(slow["a_g_x"].max())), rel=3e-4)
-    assert VeletsosYounan(**LAYER, of="height").compare(slow).expected == pytest.approx(5.986, rel=3e-4)
+    assert VeletsosYounan(**LAYER, of="height").compare(slow).expected == pytest.approx(
+        5.986, rel=3e-4
+    )
     n = 2.0 * np.arange(1, 41) - 1.0
     for ratio in (0.5, 1.5):
         history = run(2.0 * np.sin(2.0 * np.pi * ratio * 3.75 * T) * np.minimum(T / 4.0, 1.0))
         sums = np.sum(16.0 / (n * np.pi) ** 3 / np.sqrt(1.0 - (ratio / n) ** 2 / (1.0 + 0.2j)))
         expected = static.kappa * 1900.0 * 2.0 * 100.0 * abs(sums)
-        assert VeletsosYounan(**LAYER, damping=0.1).compare(history).expected == pytest.approx(expected, rel=1e-2)
+        assert VeletsosYounan(**LAYER, damping=0.1).compare(history).expected == pytest.approx(
+            expected, rel=1e-2
+        )
     start = {name: values[:2] for name, values in run(T).items()}
     assert "never presses" in VeletsosYounan(**LAYER).compare(start).applies
 
 
 def block(acceleration: Any, **fields: Any) -> float:
-    history = {"t": T, "a_g_x": np.asarray(acceleration, float), "a_g_y": 0.0 * T, "sliding_base": 0.0 * T}
+    history = {
+        "t": T,
+        "a_g_x": np.asarray(acceleration, float),
+        "a_g_y": 0.0 * T,
+        "sliding_base": 0.0 * T,
+    }
     return NewmarkBlock(**fields).compare(history).expected
 
 
@@ -162,8 +203,12 @@ def test_newmark_of_a_pulse_and_of_a_record() -> None:
     a = 0.4 * 9.81 * (t < 0.6) * np.array([1, 1, 0, 0])
     history = {"t": t, "a_g_x": a, "a_g_y": 0 * t, "sliding_base": 3.0 + t}
     pulse = NewmarkBlock(mu=0.2, gravity=9.81).compare(history)
-    assert pulse.expected == pytest.approx(0.4905, rel=1e-3) and pulse.found == 2.0  # parts of 16 and 47 ms
-    noise = 8.0 * np.convolve(np.random.default_rng(1).standard_normal(2001), np.ones(20) / 20.0, "same")
+    assert (
+        pulse.expected == pytest.approx(0.4905, rel=1e-3) and pulse.found == 2.0
+    )  # parts of 16 and 47 ms
+    noise = 8.0 * np.convolve(
+        np.random.default_rng(1).standard_normal(2001), np.ones(20) / 20.0, "same"
+    )
     exact = SlidingBlock(0.15, G).history(T, noise)[0]
     assert block(noise, mu=0.15) == pytest.approx(abs(exact[-1]), abs=4e-4 * np.abs(exact).max())
     assert block(0.14 * G * np.sin(T), mu=0.15) == 0.0
@@ -174,7 +219,9 @@ def test_newmark_to_one_side_is_that_of_an_independent_program() -> None:
     motion = 0.4 * np.sin(2 * np.pi * T) * np.sin(np.pi * T / 10) ** 2
     motion = G * (motion + 0.1 * np.sin(4.6 * np.pi * T) * np.sin(np.pi * T / 10))
     for sign, slid in ((-1.0, 1.1838483), (1.0, 1.1390758)):
-        assert block(sign * motion, mu=0.1, one_sided=True) == pytest.approx(slid, rel=6e-4)  # the step of 5 ms: 2e-4
+        assert block(sign * motion, mu=0.1, one_sided=True) == pytest.approx(
+            slid, rel=6e-4
+        )  # the step of 5 ms: 2e-4
 
 
 def test_newmark_on_a_slope() -> None:
@@ -194,28 +241,52 @@ def test_newmark_on_a_slope() -> None:
 def test_newmark_slides_to_the_side_that_is_named() -> None:
     """Mirrored motions, planes and sides slide alike; the pulse of 0.4 g to +x takes a wall whose fill is on its right
     0.4905 m to -x, and one on a plane that falls by nothing to +x, not at all; a plane that falls to either side."""
-    noise = 8.0 * np.convolve(np.random.default_rng(1).standard_normal(2001), np.ones(20) / 20.0, "same")
+    noise = 8.0 * np.convolve(
+        np.random.default_rng(1).standard_normal(2001), np.ones(20) / 20.0, "same"
+    )
     for slope, towards in ((0.0, -1.0), (0.02, -1.0), (0.02, 1.0), (-0.02, 0.0)):
         fields = {"mu": 0.15, "one_sided": True}
         slid = block(noise, slope=slope, towards=towards, **fields)
-        assert slid == pytest.approx(block(-noise, slope=-slope, towards=-towards, **fields), rel=1e-12) and slid > 0.01
+        assert (
+            slid
+            == pytest.approx(block(-noise, slope=-slope, towards=-towards, **fields), rel=1e-12)
+            and slid > 0.01
+        )
     pulse = np.where(T < 0.5, 0.4 * 9.81, 0.0)
     away = {"mu": 0.2, "gravity": 9.81, "one_sided": True, "towards": -1.0}
-    assert block(pulse, **away) == pytest.approx(0.4905, rel=0.02)  # the pulse ends within a step of 5 ms
-    assert block(pulse, **(away | {"towards": 1.0})) == block(pulse, **(away | {"towards": 0.0})) == 0.0
+    assert block(pulse, **away) == pytest.approx(
+        0.4905, rel=0.02
+    )  # the pulse ends within a step of 5 ms
+    assert (
+        block(pulse, **(away | {"towards": 1.0}))
+        == block(pulse, **(away | {"towards": 0.0}))
+        == 0.0
+    )
     downhill = block(-pulse, mu=0.4, slope=0.2, one_sided=True)
-    assert downhill == pytest.approx(block(pulse, mu=0.4, slope=-0.2, one_sided=True), rel=1e-12) and downhill > 0.1
+    assert (
+        downhill == pytest.approx(block(pulse, mu=0.4, slope=-0.2, one_sided=True), rel=1e-12)
+        and downhill > 0.1
+    )
     history = run(pulse, sliding_base=-0.002 + 1e-3 * T)
     assert "slides under its weight" in NewmarkBlock(mu=0.2, slope=-0.5).compare(history).applies
     assert NewmarkBlock(**away).compare(history).name == "NewmarkBlock, one sided"
-    assert NewmarkBlock(**away).compare(history).found == pytest.approx(0.01, rel=1e-12)  # through zero
+    assert NewmarkBlock(**away).compare(history).found == pytest.approx(
+        0.01, rel=1e-12
+    )  # through zero
     silent = NewmarkBlock(mu=0.2).compare(run(0.0 * T, sliding_base=0.0 * T))
-    assert silent.applies.startswith("the column a_g_x is zero: name acceleration=") and math.isnan(silent.expected)
+    assert silent.applies.startswith("the column a_g_x is zero: name acceleration=") and math.isnan(
+        silent.expected
+    )
 
 
-def rocking(check: Housner, a: Any, theta: float, end: float, up: float = 0.0) -> tuple[float, float]:
+def rocking(
+    check: Housner, a: Any, theta: float, end: float, up: float = 0.0
+) -> tuple[float, float]:
     """(the largest angle, the time of the first impact) by an integrator that finds the landings itself."""
-    alpha, p2 = math.atan(check.width / check.height), 1.5 * G / math.hypot(check.width, check.height)
+    alpha, p2 = (
+        math.atan(check.width / check.height),
+        1.5 * G / math.hypot(check.width, check.height),
+    )
     side = math.copysign(1.0, theta)
 
     def rate(t: float, y: Any) -> tuple[float, float]:
@@ -242,14 +313,27 @@ def test_housner_free_and_shaken() -> None:
     check = {"width": 1.0, "height": 5.0}
     for amplitude, theta in ((0.0, 0.1), (1.2, 0.05)):
         motion = amplitude * np.sin(3.0 * T)
-        largest, first = rocking(Housner(**check), lambda t, A=amplitude: A * math.sin(3.0 * t), theta, 6.0)
+        largest, first = rocking(
+            Housner(**check), lambda t, A=amplitude: A * math.sin(3.0 * t), theta, 6.0
+        )
         kept = T <= 6.0
-        history = {"t": T, "a_g_x": motion, "a_g_y": 0.0 * T, "theta_base": np.where(T < 1.0, theta, -0.02)}
+        history = {
+            "t": T,
+            "a_g_x": motion,
+            "a_g_y": 0.0 * T,
+            "theta_base": np.where(T < 1.0, theta, -0.02),
+        }
         history = {name: column[kept] for name, column in history.items()}
         angle = Housner(**check).compare(history)
-        assert angle.expected == pytest.approx(largest, rel=3e-3) and angle.found == theta and angle.unit == "rad"
+        assert (
+            angle.expected == pytest.approx(largest, rel=3e-3)
+            and angle.found == theta
+            and angle.unit == "rad"
+        )
         landing = Housner(**check, of="impact").compare(history)
-        assert landing.expected == pytest.approx(first, rel=1e-3) and landing.found == pytest.approx(1.0, rel=0.01)
+        assert landing.expected == pytest.approx(
+            first, rel=1e-3
+        ) and landing.found == pytest.approx(1.0, rel=0.01)
     slender = HousnerBlock(1.0, 5.0, G)
     first = rocking(Housner(**check), lambda t: 0.0, 0.1, 2.0)[1]
     assert first == pytest.approx(slender.impact_times(0.1, 1)[0], rel=3e-3)
@@ -261,10 +345,17 @@ def test_housner_on_ground_that_rises_or_falls() -> None:
     history = {"t": T, "a_g_x": 0.8 * np.sin(3.0 * T), "theta_base": np.where(T < 1.0, 0.05, -0.02)}
     for up in (-2.0, 2.0):
         largest, first = rocking(Housner(**check), lambda t: 0.8 * math.sin(3.0 * t), 0.05, 6.0, up)
-        kept = {name: column[T <= 6.0] for name, column in (history | {"a_g_y": 0.0 * T + up}).items()}
+        kept = {
+            name: column[T <= 6.0] for name, column in (history | {"a_g_y": 0.0 * T + up}).items()
+        }
         assert Housner(**check).compare(kept).expected == pytest.approx(largest, rel=3e-3)
-        assert Housner(**check, of="impact").compare(kept).expected == pytest.approx(first, rel=1e-3)
-    assert "falls away below" in Housner(**check).compare(history | {"a_g_y": -12.0 * np.sin(T)}).applies
+        assert Housner(**check, of="impact").compare(kept).expected == pytest.approx(
+            first, rel=1e-3
+        )
+    assert (
+        "falls away below"
+        in Housner(**check).compare(history | {"a_g_y": -12.0 * np.sin(T)}).applies
+    )
     still = {"t": T, "a_g_x": 0.0 * T, "a_g_y": 0.0 * T, "theta_base": 8e-17 + 0.0 * T}
     assert "does not rock" in Housner(width=3.0, height=4.0).compare(still).applies
 
@@ -275,18 +366,35 @@ def test_housner_where_it_does_not_apply() -> None:
     slender = HousnerBlock(0.4, 4.0, G)
 
     def shaken(pulse: Any, **fields: Any) -> str:
-        history = {"t": T, "a_g_x": np.asarray(pulse, float), "a_g_y": 0.0 * T, "theta_base": 0.0 * T}
+        history = {
+            "t": T,
+            "a_g_x": np.asarray(pulse, float),
+            "a_g_y": 0.0 * T,
+            "theta_base": 0.0 * T,
+        }
         return Housner(**(check | fields)).compare(history).applies
 
     onset = slender.onset_acceleration
-    assert "does not rock" in shaken(0.99 * onset * np.sin(T)) and not shaken(1.05 * onset * np.sin(20.0 * T))
+    assert "does not rock" in shaken(0.99 * onset * np.sin(T)) and not shaken(
+        1.05 * onset * np.sin(20.0 * T)
+    )
     time = slender.overturning_time(3.0 * onset)
-    longer, shorter = (3.0 * onset * np.where(factor * time > T, 1.0, 0.0) for factor in (1.03, 0.97))
+    longer, shorter = (
+        3.0 * onset * np.where(factor * time > T, 1.0, 0.0) for factor in (1.03, 0.97)
+    )
     assert shaken(longer) == "the rigid block overturns" and not shaken(shorter)
     assert "stops a block as wide" in shaken(20.0 * np.sin(T), width=6.0)
 
 
-BOX = {"width": 6.0, "height": 4.0, "wall": 1e8, "roof": 1e8, "invert": 1e8, "nu": 0.3, "depth": 10.0}
+BOX = {
+    "width": 6.0,
+    "height": 4.0,
+    "wall": 1e8,
+    "roof": 1e8,
+    "invert": 1e8,
+    "nu": 0.3,
+    "depth": 10.0,
+}
 
 
 def test_racking_of_a_run() -> None:
@@ -300,21 +408,29 @@ def test_racking_of_a_run() -> None:
     assert found.found == pytest.approx(1.6, rel=1e-12)
     soft = RackingRatio(**box, shear_modulus=2e8).compare(history)
     assert "beyond 10, where the curves end" in soft.applies and math.isnan(soft.expected)
-    assert "less than 1.5" in RackingRatio(**(box | {"depth": 5.0}), shear_modulus=1e7).compare(history).applies
-    still = RackingRatio(**box, shear_modulus=1e7).compare(history | {"racking_free_field": 0.0 * T})
+    assert (
+        "less than 1.5"
+        in RackingRatio(**(box | {"depth": 5.0}), shear_modulus=1e7).compare(history).applies
+    )
+    still = RackingRatio(**box, shear_modulus=1e7).compare(
+        history | {"racking_free_field": 0.0 * T}
+    )
     assert still.applies == "the free field does not shear" and math.isnan(still.found)
 
 
-@pytest.mark.parametrize(("wrong", "words"), [
-    (lambda: Wood(**(LAYER | {"nu": 0.6})), "nu is 0.6: give one from 0 to 0.5$"),
-    (lambda: VeletsosYounan(**LAYER, damping=0.0), "damping is 0.0"),
-    (lambda: Wood(**LAYER, length=-1.0), "length is -1.0"),
-    (lambda: MononobeOkabe(**WALL, phi=0.5, kh=-0.1), "kh is -0.1"),
-    (lambda: MononobeOkabe(**WALL, phi=0.5, kh=0.1, kv=1.0), "kv is 1.0"),
-    (lambda: Housner(width=1.0, height=0.0), "height is 0.0"),
-    (lambda: Housner(width=1.0, height=5.0, of="slip"), "unknown Housner: of 'slip'"),
-    (lambda: RackingRatio(**(BOX | {"wall": -1.0}), shear_modulus=1e7), "wall is -1.0"),
-])
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (lambda: Wood(**(LAYER | {"nu": 0.6})), "nu is 0.6: give one from 0 to 0.5$"),
+        (lambda: VeletsosYounan(**LAYER, damping=0.0), "damping is 0.0"),
+        (lambda: Wood(**LAYER, length=-1.0), "length is -1.0"),
+        (lambda: MononobeOkabe(**WALL, phi=0.5, kh=-0.1), "kh is -0.1"),
+        (lambda: MononobeOkabe(**WALL, phi=0.5, kh=0.1, kv=1.0), "kv is 1.0"),
+        (lambda: Housner(width=1.0, height=0.0), "height is 0.0"),
+        (lambda: Housner(width=1.0, height=5.0, of="slip"), "unknown Housner: of 'slip'"),
+        (lambda: RackingRatio(**(BOX | {"wall": -1.0}), shear_modulus=1e7), "wall is -1.0"),
+    ],
+)
 def test_wrong_fields(wrong: Any, words: str) -> None:
     with pytest.raises(InputError, match=words):
         wrong()

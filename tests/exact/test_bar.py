@@ -31,7 +31,9 @@ def test_thrown_steel_bar_numbers():
     """V1.1, the published second data set."""
     assert STEEL.wave_speed == pytest.approx(5000.0)
     assert (STEEL.contact_start, STEEL.contact_end) == (pytest.approx(2e-5), pytest.approx(1e-4))
-    assert STEEL.displacement([0.0, 0.2], 6e-5) == pytest.approx([-2e-3, -6e-3])  # the top: -4 mm since touch-down
+    assert STEEL.displacement([0.0, 0.2], 6e-5) == pytest.approx(
+        [-2e-3, -6e-3]
+    )  # the top: -4 mm since touch-down
     assert STEEL.energy == pytest.approx(8e6) and STEEL.pressure == pytest.approx(4e9)
     assert STEEL.velocity(0.2, [1e-5, 9e-5]) == pytest.approx([-100.0, 100.0])
 
@@ -46,7 +48,11 @@ def test_thrown_bar_is_a_free_bar_under_its_contact_force():
 
 @pytest.mark.parametrize(
     ("bar", "length", "E", "rho", "until"),
-    [(ThrownBar(), 10.0, 900.0, 1.0, 2.0), (STEEL, 0.2, 2e11, 8000.0, 2e-4), (PeriodicBar(), 1.0, 1.0, 1.0, 7.0)],
+    [
+        (ThrownBar(), 10.0, 900.0, 1.0, 2.0),
+        (STEEL, 0.2, 2e11, 8000.0, 2e-4),
+        (PeriodicBar(), 1.0, 1.0, 1.0, 7.0),
+    ],
 )
 def test_bar_obeys_its_equations(bar, length, E, rho, until):
     """V1.1, V1.3: wave equation, derivatives, force = -E strain at the foot, complementarity, energy."""
@@ -61,8 +67,14 @@ def test_bar_obeys_its_equations(bar, length, E, rho, until):
     gap = bar.displacement(0.0, t) + getattr(bar, "height", 0.0)
     p = bar.force(t)
     assert p == pytest.approx(-E * bar.strain(0.0, t), abs=1e-13 * p.max())
-    assert gap.min() > -1e-14 * top and (p * gap).max() < 1e-14 * top * p.max() and (gap <= 1e-14 * top).sum() > 100
-    energy = energies(bar.displacement, bar.velocity, bar.strain, length=length, E=E, rho=rho, t=t[:50])
+    assert (
+        gap.min() > -1e-14 * top
+        and (p * gap).max() < 1e-14 * top * p.max()
+        and (gap <= 1e-14 * top).sum() > 100
+    )
+    energy = energies(
+        bar.displacement, bar.velocity, bar.strain, length=length, E=E, rho=rho, t=t[:50]
+    )
     assert energy == pytest.approx(bar.energy, rel=2e-4)  # a front inside a cell
 
 
@@ -87,7 +99,9 @@ def test_periodic_bar_numbers():
 
 
 def test_wrong_data_are_refused():
-    with pytest.raises(InputError, match="ThrownBar: speed is -1.0; give a finite number above zero"):
+    with pytest.raises(
+        InputError, match="ThrownBar: speed is -1.0; give a finite number above zero"
+    ):
         ThrownBar(speed=-1.0)
     with pytest.raises(InputError, match="height is nan; give zero or a positive"):
         ThrownBar(height=float("nan"))

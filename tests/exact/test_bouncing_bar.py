@@ -19,7 +19,9 @@ def test_numbers():
     assert BAR.contacts(T) == pytest.approx(np.array([[1.0, 5 / 3], [11 / 3, 13 / 3]]), rel=1e-14)
     assert BAR.foot([2.0, 8 / 3, 29 / 6]) == pytest.approx([1.666667, 3.888889, 3.75], abs=5e-7)
     assert BAR.velocity(0.0, 2.0) == pytest.approx(6.666667, abs=5e-7)
-    assert BAR.force([1.0, 5 / 3 - 1e-12, 4 / 3, 4.0]) == pytest.approx([300.0, 500.0, 400.0, 400.0], rel=1e-10)
+    assert BAR.force([1.0, 5 / 3 - 1e-12, 4 / 3, 4.0]) == pytest.approx(
+        [300.0, 500.0, 400.0, 400.0], rel=1e-10
+    )
 
 
 def test_table_of_phases():
@@ -31,7 +33,9 @@ def test_table_of_phases():
     flight = V0 * r - G * r**2 / 2
     heights = [5.0 - G * t**2 / 2, flight + G * q * (q - 2 * TAU), flight]
     y = np.select([phase == 0, phase == 2, phase == 4], heights, 0.0)
-    p = np.select([phase == 1, phase == 3], [30.0 * (V0 + G * r), 30.0 * (V0 + 2 * G * TAU - G * r)], 0.0)
+    p = np.select(
+        [phase == 1, phase == 3], [30.0 * (V0 + G * r), 30.0 * (V0 + 2 * G * TAU - G * r)], 0.0
+    )
     for periods in (0, 2):
         assert BAR.foot(t + periods * T) == pytest.approx(y, abs=1e-12)
         assert BAR.force(t + periods * T) == pytest.approx(p, abs=1e-10)
@@ -71,16 +75,25 @@ def test_bar_obeys_its_equations(height):
     bar = BouncingBar(height=height)
     until = 6.0
     x, t = LENGTH * (0.1 + 0.8 * RANDOM.random(2000)), until * (0.1 + 0.8 * RANDOM.random(2000))
-    round_off = 16 * np.finfo(float).eps * G * until**2  # the largest of the terms that cancel, five of them
+    round_off = (
+        16 * np.finfo(float).eps * G * until**2
+    )  # the largest of the terms that cancel, five of them
     assert wave_defect(bar.displacement, length=LENGTH, c=C, until=until, force=-G) < round_off
     assert derivative_defect(bar.displacement, bar.velocity, x=x, t=t, h=(0.0, 1e-5)) < 1e-8
     assert derivative_defect(bar.displacement, bar.strain, x=x, t=t, h=(1e-4, 0.0)) < 1e-8
     p, y = bar.force(t), bar.foot(t)
-    assert p == pytest.approx(-900.0 * bar.strain(0.0, t), abs=1e-10) and abs(bar.strain(LENGTH, t)).max() < 1e-14
+    assert (
+        p == pytest.approx(-900.0 * bar.strain(0.0, t), abs=1e-10)
+        and abs(bar.strain(LENGTH, t)).max() < 1e-14
+    )
     assert p.min() >= 0.0 and y.min() > -1e-12 and (p * y).max() < 1e-10
-    energy = energies(bar.displacement, bar.velocity, bar.strain, length=LENGTH, E=900.0, rho=1.0, t=t[:20], g=G)
+    energy = energies(
+        bar.displacement, bar.velocity, bar.strain, length=LENGTH, E=900.0, rho=1.0, t=t[:20], g=G
+    )
     scale = 500.0  # kinetic energies at the impact of the bar of V1.2
-    assert energy == pytest.approx(np.zeros(20), abs=2e-4 * scale)  # zero level: where it is released
+    assert energy == pytest.approx(
+        np.zeros(20), abs=2e-4 * scale
+    )  # zero level: where it is released
 
 
 def test_impulse_is_the_change_of_momentum():

@@ -22,10 +22,21 @@ CELLS = (np.arange(20000) + 0.5)[:, np.newaxis] / 20000
 def test_bars_of_the_same_material():
     """V1.4: p = rho c v0/2, duration 2 L1/c, bar 1 stops, bar 2 moves with v0 L1/L2, e = L1/L2; longer striker too."""
     bars = TwoBars(length1=1.0, length2=2.0)
-    assert (bars.pressure, bars.duration, bars.velocity1, bars.velocity2, bars.restitution) == (0.5, 2.0, 0.0, 0.5, 0.5)
+    assert (bars.pressure, bars.duration, bars.velocity1, bars.velocity2, bars.restitution) == (
+        0.5,
+        2.0,
+        0.0,
+        0.5,
+        0.5,
+    )
     assert bars.force([-0.1, 1.0, 2.1]).tolist() == [0.0, 0.5, 0.0]
     swapped = TwoBars(length1=2.0, length2=1.0)
-    assert (swapped.duration, swapped.velocity1, swapped.velocity2, swapped.restitution) == (2.0, 0.5, 1.0, 0.5)
+    assert (swapped.duration, swapped.velocity1, swapped.velocity2, swapped.restitution) == (
+        2.0,
+        0.5,
+        1.0,
+        0.5,
+    )
 
 
 def test_bars_of_two_materials():
@@ -34,7 +45,9 @@ def test_bars_of_two_materials():
     assert bars.pressure == pytest.approx(1.6) and bars.duration == 2.0
     assert bars.velocity1 + 6.0 * bars.velocity2 == pytest.approx(2.0)
     impulse, duration, v1, v2 = lattice_collision(bars, n1=100)
-    assert impulse == pytest.approx(bars.impulse, rel=2e-2) and duration == pytest.approx(bars.duration, abs=5e-2)
+    assert impulse == pytest.approx(bars.impulse, rel=2e-2) and duration == pytest.approx(
+        bars.duration, abs=5e-2
+    )
     assert [v1, v2] == pytest.approx([bars.velocity1, bars.velocity2], abs=4e-2)
 
 
@@ -57,7 +70,11 @@ def lattice_collision(bars, n1):
             rate += dt * (np.append(tension, 0.0) - np.append(0.0, tension)) / m
         push = (v[0][-1] - v[1][0]) / (1.0 / mass[0][-1] + 1.0 / mass[1][0])
         if push <= 1e-12:
-            return impulse, duration, *(np.average(rate, weights=m) for rate, m in zip(v, mass, strict=True))
+            return (
+                impulse,
+                duration,
+                *(np.average(rate, weights=m) for rate, m in zip(v, mass, strict=True)),
+            )
         v[0][-1] -= push / mass[0][-1]
         v[1][0] += push / mass[1][0]
         impulse, duration = impulse + push, duration + dt
@@ -72,7 +89,9 @@ def test_bars_that_part_later_are_refused():
 
 def test_oblique_impact_numbers():
     """V1.5 as printed."""
-    assert OBLIQUE.duration == pytest.approx(math.sqrt(2.0)) and OBLIQUE.pressure == pytest.approx(math.sqrt(2.0))
+    assert OBLIQUE.duration == pytest.approx(math.sqrt(2.0)) and OBLIQUE.pressure == pytest.approx(
+        math.sqrt(2.0)
+    )
     assert OBLIQUE.slip_speed == pytest.approx(0.575736, abs=5e-7)
     assert OBLIQUE.impulses == pytest.approx((2.0, -0.6), rel=1e-14)
     assert OBLIQUE.friction_work == pytest.approx(0.345442, abs=5e-7)
@@ -82,7 +101,10 @@ def test_oblique_impact_numbers():
 def test_oblique_impact_that_sticks():
     """V1.5: traction rho c_S v_t, no work, when mu c_P v_n > c_S v_t."""
     column = ObliqueImpact(height=1.0, material=UNIT, speed_n=1.0, speed_t=0.4, mu=0.3)
-    assert (column.slip_speed, column.friction_work) == (0.0, 0.0) and column.traction == pytest.approx(0.4)
+    assert (column.slip_speed, column.friction_work) == (
+        0.0,
+        0.0,
+    ) and column.traction == pytest.approx(0.4)
     assert np.abs(column.velocity(0.0, np.linspace(0.01, 1.4, 50))[..., 1]).max() < 1e-15
 
 
@@ -93,6 +115,7 @@ def test_oblique_impact_obeys_its_equations(nu):
     column = ObliqueImpact(height=1.5, material=material, speed_n=1.0, speed_t=1.0, mu=0.3)
     y, t = 1.5 * (0.1 + 0.8 * RANDOM.random(1000)), 0.2 + 7.0 * RANDOM.random(1000)
     for axis, c in enumerate((material.c_p, material.c_s)):
+
         def u(y, t, axis=axis):
             return column.displacement(y, t)[..., axis]
 
@@ -126,7 +149,9 @@ def test_shear_column_numbers():
     """V1.6 as printed."""
     assert SHEAR.slip_speeds == pytest.approx([0.85, 0.55, 0.25], rel=1e-14)
     assert (SHEAR.stick_time, SHEAR.delta) == (6.0, 0.15)
-    assert (SHEAR.slip, SHEAR.friction_work, SHEAR.energy) == pytest.approx((3.3, 0.495, 0.005), rel=1e-12)
+    assert (SHEAR.slip, SHEAR.friction_work, SHEAR.energy) == pytest.approx(
+        (3.3, 0.495, 0.005), rel=1e-12
+    )
 
 
 def test_shear_column_obeys_its_equations():
@@ -136,7 +161,9 @@ def test_shear_column_obeys_its_equations():
     assert derivative_defect(SHEAR.displacement, SHEAR.velocity, x=y, t=t, h=(0.0, 1e-4)) < 1e-9
     base = SHEAR.velocity(0.0, np.array([1.0, 3.0, 5.0, 7.0, 9.0, 11.0]))
     assert base == pytest.approx([0.85, 0.55, 0.25, 0.0, 0.0, 0.0], abs=1e-14)
-    assert SHEAR.displacement(0.0, np.array([6.0, 7.3, 20.1])) == pytest.approx([3.3, 3.3, 3.3], rel=1e-13)
+    assert SHEAR.displacement(0.0, np.array([6.0, 7.3, 20.1])) == pytest.approx(
+        [3.3, 3.3, 3.3], rel=1e-13
+    )
     assert SHEAR.traction([1.0, 5.0, 7.0, 9.0]) == pytest.approx([0.15, 0.15, 0.1, -0.1])
     v, edges = SHEAR.velocity(CELLS, 7.3), np.linspace(0.0, 1.0, 20001)
     strain = np.diff(SHEAR.displacement(edges, 7.3)) * 20000

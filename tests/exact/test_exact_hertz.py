@@ -26,7 +26,9 @@ def test_lines_numbers():
     assert benchmark.half_width == pytest.approx(6.2146, abs=5e-5)
     assert benchmark.peak == pytest.approx(3585.36, abs=5e-3)
     unit = HertzLine(0.02, RIGID_PLANE, 1.0)
-    assert (unit.modulus, unit.half_width, unit.peak) == pytest.approx((1.098901, 0.152227, 0.083641), abs=5e-7)
+    assert (unit.modulus, unit.half_width, unit.peak) == pytest.approx(
+        (1.098901, 0.152227, 0.083641), abs=5e-7
+    )
 
 
 def test_points_numbers():
@@ -34,10 +36,14 @@ def test_points_numbers():
     modulus = contact_modulus((2e4, 0.3), (2e4, 0.3))
     spheres = HertzPoint.from_approach(4.0, modulus=modulus, radius=contact_radius(50.0, 50.0))
     assert (spheres.contact_radius, spheres.approach) == pytest.approx((10.0, 4.0), rel=1e-14)
-    assert spheres.peak == pytest.approx(2798.33, abs=5e-3) and spheres.force == pytest.approx(5.8608e5, abs=5.0)
+    assert spheres.peak == pytest.approx(2798.33, abs=5e-3) and spheres.force == pytest.approx(
+        5.8608e5, abs=5.0
+    )
     steel = HertzPoint(100.0, contact_modulus((210e3, 0.3)), 8.0)
     assert steel.contact_radius == pytest.approx(0.137507, abs=5e-7)
-    assert steel.peak == pytest.approx(2525.18, abs=5e-3) and steel.approach == pytest.approx(2.3635e-3, abs=5e-8)
+    assert steel.peak == pytest.approx(2525.18, abs=5e-3) and steel.approach == pytest.approx(
+        2.3635e-3, abs=5e-8
+    )
 
 
 def test_line_pressure_bends_the_half_plane_to_the_cylinder():
@@ -45,7 +51,9 @@ def test_line_pressure_bends_the_half_plane_to_the_cylinder():
     line = HertzLine(0.02, RIGID_PLANE, 1.0)
     a = line.half_width
     assert quad(line.pressure, -a, a, epsabs=0.0)[0] == pytest.approx(line.force, rel=1e-6)
-    s = -a * np.cos((np.arange(20000) + 0.5) * math.pi / 20000)  # Gauss-Chebyshev of the second kind, nearly
+    s = -a * np.cos(
+        (np.arange(20000) + 0.5) * math.pi / 20000
+    )  # Gauss-Chebyshev of the second kind, nearly
     weight = math.pi / 20000 * np.sqrt(a * a - s * s) * line.pressure(s)
     for x in (0.3 * a, 0.8 * a):
         sunk = -2.0 / (math.pi * RIGID_PLANE) * (weight * np.log(np.abs((x - s) / s))).sum()
@@ -57,7 +65,9 @@ def test_point_pressure_bends_the_half_space_to_the_sphere():
     """V2.3: integral of p is F; Boussinesq on the axis: 2/E* integral of p dr is the approach."""
     point = HertzPoint(100.0, 230.0, 8.0)
     a = point.contact_radius
-    assert quad(lambda r: 2.0 * math.pi * r * point.pressure(r), 0.0, a)[0] == pytest.approx(100.0, rel=1e-7)
+    assert quad(lambda r: 2.0 * math.pi * r * point.pressure(r), 0.0, a)[0] == pytest.approx(
+        100.0, rel=1e-7
+    )
     assert 2.0 / 230.0 * quad(point.pressure, 0.0, a)[0] == pytest.approx(point.approach, rel=1e-7)
 
 
@@ -87,9 +97,16 @@ def test_impact_numbers():
 
     def leaves(t, y):
         return y[0]
+
     leaves.terminal, leaves.direction = True, -1
-    run = solve_ivp(lambda t, y: (y[1], -max(y[0], 0.0) ** 1.5), (0.0, 9.0), (0.0, 1.0), rtol=1e-11, atol=1e-13,
-                    events=[leaves, lambda t, y: y[1]])
+    run = solve_ivp(
+        lambda t, y: (y[1], -(max(y[0], 0.0) ** 1.5)),
+        (0.0, 9.0),
+        (0.0, 1.0),
+        rtol=1e-11,
+        atol=1e-13,
+        events=[leaves, lambda t, y: y[1]],
+    )
     assert run.t_events[0][-1] == pytest.approx(unit.duration, rel=1e-8)
     assert run.y_events[1][0, 0] == pytest.approx(unit.approach, rel=1e-9)
     assert unit.deepest.force == pytest.approx(unit.approach**1.5, rel=1e-12)

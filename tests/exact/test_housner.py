@@ -16,7 +16,10 @@ ALPHA = BLOCK.alpha
 
 def test_numbers_of_the_example():
     """V3.1 as printed, but for the last two digits of p, printed 2.68600487."""
-    assert BLOCK.radius == pytest.approx(1.01980390, abs=5e-9) and pytest.approx(0.19739556, abs=5e-9) == ALPHA
+    assert (
+        BLOCK.radius == pytest.approx(1.01980390, abs=5e-9)
+        and pytest.approx(0.19739556, abs=5e-9) == ALPHA
+    )
     assert BLOCK.p == pytest.approx(2.68600490, abs=5e-9)
     assert BLOCK.restitution == pytest.approx(0.94230769, abs=5e-9)
     assert BLOCK.energy_ratio == pytest.approx(0.88794379, abs=5e-9)
@@ -46,6 +49,7 @@ def rocked(block, theta0, until, sine):
 
     def impact(t, y):
         return y[0] if y[1] else 1.0
+
     impact.terminal = True
     while t < until:
         side = math.copysign(1.0, y[0] if t == 0.0 else y[1])
@@ -68,7 +72,9 @@ def test_history_solves_the_slender_equation(phi0):
     t, theta = rocked(BLOCK, phi0 * ALPHA, 6.0, sine=False)
     assert BLOCK.free_rocking(phi0 * ALPHA, t) == pytest.approx(theta, abs=1e-6 * ALPHA)
     t, theta = rocked(BLOCK, phi0 * ALPHA, 2.0, sine=True)
-    assert np.abs(BLOCK.free_rocking(phi0 * ALPHA, t) - theta).max() < 0.02 * ALPHA  # slender: alpha = 0.2
+    assert (
+        np.abs(BLOCK.free_rocking(phi0 * ALPHA, t) - theta).max() < 0.02 * ALPHA
+    )  # slender: alpha = 0.2
 
 
 def test_history_ends_at_rest():
@@ -82,7 +88,9 @@ def test_energy_lost_in_impacts():
     """V3.1: ½ phi'² + p²(phi - phi²/2) falls by r at every impact: from the amplitudes alone."""
     phi = BLOCK.amplitudes(0.7 * ALPHA, 20) / ALPHA
     potential = phi - 0.5 * phi**2
-    assert potential[1:] / potential[:-1] == pytest.approx(np.full(20, BLOCK.energy_ratio), rel=1e-12)
+    assert potential[1:] / potential[:-1] == pytest.approx(
+        np.full(20, BLOCK.energy_ratio), rel=1e-12
+    )
 
 
 def test_overturning_pulse():
@@ -97,10 +105,14 @@ def test_overturning_pulse():
 
 def overturns(A, t1):
     """Whether phi'' = p²(phi - 1 + A [t < t1]) from rest reaches 1 before it returns to 0 (slender block)."""
+
     def rate(t, y, push):
         return y[1], BLOCK.p**2 * (y[0] - 1.0 + push)
+
     pushed = solve_ivp(rate, (0.0, t1), (0.0, 0.0), rtol=1e-10, atol=1e-12, args=(A,)).y[:, -1]
-    return bool(solve_ivp(rate, (0.0, 10.0), pushed, rtol=1e-10, atol=1e-12, args=(0.0,)).y[0, -1] > 1.0)
+    return bool(
+        solve_ivp(rate, (0.0, 10.0), pushed, rtol=1e-10, atol=1e-12, args=(0.0,)).y[0, -1] > 1.0
+    )
 
 
 def test_wrong_data_are_refused():

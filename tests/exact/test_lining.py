@@ -13,7 +13,11 @@ from vi_contact.core.errors import InputError
 from vi_contact.engineering.checks.racking_ratio import flexibility, racking_ratio
 
 pytestmark = pytest.mark.serial
-CONCRETE, SOIL, GAMMA = LinearElastic(E=25e9, nu=0.2, rho=2400.0), LinearElastic(E=100e6, nu=0.3, rho=1900.0), 1e-3
+CONCRETE, SOIL, GAMMA = (
+    LinearElastic(E=25e9, nu=0.2, rho=2400.0),
+    LinearElastic(E=100e6, nu=0.3, rho=1900.0),
+    1e-3,
+)
 
 
 @pytest.mark.parametrize(("nu", "thrust"), [(0.3, 0.995), (1 / 3, 1.030), (0.4, 1.108)])
@@ -21,7 +25,9 @@ def test_thrust_on_a_rigid_wall(nu: float, thrust: float):
     wall = RigidWall(height=1.0, rho=1.0, nu=nu)
     assert wall.thrust(1.0) == pytest.approx(thrust, abs=5e-4)
     assert wall.moment(1.0) / wall.thrust(1.0) == pytest.approx(0.5986, abs=5e-5)
-    assert RigidWall(height=3.0, rho=2.0, nu=nu).thrust(4.0) == pytest.approx(2.0 * 4.0 * 9.0 * wall.thrust(1.0))
+    assert RigidWall(height=3.0, rho=2.0, nu=nu).thrust(4.0) == pytest.approx(
+        2.0 * 4.0 * 9.0 * wall.thrust(1.0)
+    )
 
 
 @pytest.mark.parametrize(
@@ -56,13 +62,26 @@ def frame_force(W: float, H: float, wall: float, roof: float, invert: float) -> 
     K = np.zeros((5, 5))  # sway, rotations of bottom left, bottom right, top right, top left
     for bottom, top in ((1, 4), (2, 3)):
         k = wall / H
-        for i, j, value in ((bottom, bottom, 4 * k), (top, top, 4 * k), (bottom, top, 2 * k), (top, bottom, 2 * k),
-                            (0, 0, 12 * k / H**2), (0, bottom, 6 * k / H), (bottom, 0, 6 * k / H),
-                            (0, top, 6 * k / H), (top, 0, 6 * k / H)):
+        for i, j, value in (
+            (bottom, bottom, 4 * k),
+            (top, top, 4 * k),
+            (bottom, top, 2 * k),
+            (top, bottom, 2 * k),
+            (0, 0, 12 * k / H**2),
+            (0, bottom, 6 * k / H),
+            (bottom, 0, 6 * k / H),
+            (0, top, 6 * k / H),
+            (top, 0, 6 * k / H),
+        ):
             K[i, j] += value
     for left, right, bending in ((1, 2, invert), (4, 3, roof)):
         k = bending / W
-        for i, j, value in ((left, left, 4 * k), (right, right, 4 * k), (left, right, 2 * k), (right, left, 2 * k)):
+        for i, j, value in (
+            (left, left, 4 * k),
+            (right, right, 4 * k),
+            (left, right, 2 * k),
+            (right, left, 2 * k),
+        ):
             K[i, j] += value
     return float(K[0, 0] - K[0, 1:] @ np.linalg.solve(K[1:, 1:], K[1:, 0]))
 
@@ -77,7 +96,9 @@ def test_racking_ratio():
     rows = {0.1: 0.147, 0.5: 0.609, 1.0: 1.0, 2.0: 1.474, 5.0: 2.059, 10.0: 2.373, 1e9: 2.80}
     for flexible, ratio in rows.items():
         assert racking_ratio(flexible, 0.3) == pytest.approx(ratio, abs=6e-4)
-        assert racking_ratio(flexible, 0.5) == pytest.approx(2.0 * flexible / (1.0 + flexible), rel=1e-14)
+        assert racking_ratio(flexible, 0.5) == pytest.approx(
+            2.0 * flexible / (1.0 + flexible), rel=1e-14
+        )
 
 
 def test_thin_lining():
@@ -121,7 +142,10 @@ def test_thick_lining_is_in_equilibrium():
     """(r sigma_r)' - sigma_theta + 2 tau = 0 for fields cos 2 theta, sin 2 theta; the inside is free."""
     lining = ThickLining(2.7, 3.0, CONCRETE, SOIL)
     r, h = 2.85, 1e-4
-    slope = ((r + h) * lining.field("sigma_r", r + h, 1.0) - (r - h) * lining.field("sigma_r", r - h, 1.0)) / (2 * h)
+    slope = (
+        (r + h) * lining.field("sigma_r", r + h, 1.0)
+        - (r - h) * lining.field("sigma_r", r - h, 1.0)
+    ) / (2 * h)
     terms = slope, -lining.field("sigma_theta", r, 1.0), 2.0 * lining.field("tau", r, 1.0)
     assert abs(sum(terms)) < 1e-6 * max(map(abs, terms))
     for name in ("sigma_r", "tau"):

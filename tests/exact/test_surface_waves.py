@@ -37,8 +37,9 @@ def test_what_dashpots_reflect_at_an_angle(case):
     found = [dashpot_energy(poisson(nu), math.radians(angle), wave=wave) for angle in ANGLES]
     np.testing.assert_allclose(found, TABLE[case], atol=6e-6)
     for angle, amplitudes in ((30, (0.01604, 0.00895)), (60, (0.13397, 0.13397))):
-        np.testing.assert_allclose(dashpot_reflection(poisson(0.25), math.radians(angle), wave="P"), amplitudes,
-                                   atol=6e-6)
+        np.testing.assert_allclose(
+            dashpot_reflection(poisson(0.25), math.radians(angle), wave="P"), amplitudes, atol=6e-6
+        )
 
 
 def test_dashpots_at_right_angles():
@@ -57,8 +58,16 @@ def test_dashpots_at_right_angles():
 
 def test_rayleigh_waves():
     """V8.3: printed digits; seed 003's speed of steel; the motion at the surface leaves it free of stress."""
-    for nu, ratio in ((0.0, 0.874032), (0.1, 0.893106), (0.2, 0.9109959), (0.25, 0.9194017), (0.3, 0.9274127),
-                      (1 / 3, 0.9325259), (0.4, 0.9421954), (0.45, 0.9489597)):
+    for nu, ratio in (
+        (0.0, 0.874032),
+        (0.1, 0.893106),
+        (0.2, 0.9109959),
+        (0.25, 0.9194017),
+        (0.3, 0.9274127),
+        (1 / 3, 0.9325259),
+        (0.4, 0.9421954),
+        (0.45, 0.9489597),
+    ):
         assert math.isclose(rayleigh_speed(poisson(nu)) / poisson(nu).c_s, ratio, abs_tol=6e-7)
     for nu in (0.1, 0.25, 0.4):
         k, h, depth = 2.0 * math.pi, 1e-5, np.array([0.0, 1e-5, 2e-5])
@@ -74,9 +83,15 @@ def test_transfer_functions():
     """V8.2 and seismic practice 3.2: printed digits; natural frequencies."""
     layer, damped = SoilLayer(30.0, SOIL), SoilLayer(30.0, SOIL, xi=0.05)
     f = np.array([0.5, 1.0, 2.0, 3.0])
-    np.testing.assert_allclose(layer.on_rigid_base(f), [1.122326, 1.701302, 3.236068, 1.051462], atol=6e-7)
-    np.testing.assert_allclose(damped.on_rigid_base(f), [1.120939, 1.687834, 3.159038, 1.043650], atol=6e-7)
-    assert layer.frequency() == pytest.approx(1.6667, abs=5e-5) and layer.frequency(2) == pytest.approx(5.0)
+    np.testing.assert_allclose(
+        layer.on_rigid_base(f), [1.122326, 1.701302, 3.236068, 1.051462], atol=6e-7
+    )
+    np.testing.assert_allclose(
+        damped.on_rigid_base(f), [1.120939, 1.687834, 3.159038, 1.043650], atol=6e-7
+    )
+    assert layer.frequency() == pytest.approx(1.6667, abs=5e-5) and layer.frequency(
+        2
+    ) == pytest.approx(5.0)
     fine = np.linspace(1.5, 1.8, 3001)
     assert damped.on_rigid_base(fine).max() == pytest.approx(12.767, abs=5e-4)
     shallow = vc.LinearElastic.from_wave_speeds(600.0, 300.0, 2000.0)
@@ -84,7 +99,9 @@ def test_transfer_functions():
         column = SoilLayer(20.0, shallow, xi=xi)
         assert column.frequency() == 3.75
         for f_n, peak in zip((3.75, 11.25), peaks, strict=True):
-            assert column.on_rigid_base(np.linspace(0.98, 1.02, 801) * f_n).max() == pytest.approx(peak, abs=6e-3)
+            assert column.on_rigid_base(np.linspace(0.98, 1.02, 801) * f_n).max() == pytest.approx(
+                peak, abs=6e-3
+            )
     for speed, peak in ((1000.0, 3.141), (2000.0, 5.041)):
         rock = vc.LinearElastic.from_wave_speeds(2.0 * speed, speed, 2500.0)
         found = SoilLayer(20.0, shallow, xi=0.05).on_elastic_base(np.linspace(2.0, 5.0, 3001), rock)
@@ -105,7 +122,7 @@ def test_the_column_answers_like_the_layer(f):
     shake = vc.Harmonic(1.0, f)
     problem = column.on_rigid_base(shake)
     dt = 1.0 / (80.0 * f)
-    rows = [(s.t, s.u[-2]) for s, _ in vc.march(problem, dt=dt, steps=80 * 30)][-80 * 3:]
+    rows = [(s.t, s.u[-2]) for s, _ in vc.march(problem, dt=dt, steps=80 * 30)][-80 * 3 :]
     t, top = np.array(rows).T
     total = top - np.sin(2 * np.pi * f * t) / (2 * np.pi * f) ** 2  # the base goes as -sin/w²
     ratio = harmonic_amplitude(total, t, f) * (2 * np.pi * f) ** 2
@@ -124,7 +141,9 @@ def test_the_column_on_rock_answers_like_the_layer(speed, peak):
     column = column_of(soil, np.linspace(0.0, 20.0, 31), beta=0.05 / (np.pi * f))
     up = upgoing(vc.Harmonic(1.0, f, phase=0.5 * np.pi), dt=1.0 / (400.0 * f))
     problem = column.on_dashpots(rock.rho * rock.c_s, rock.rho * rock.c_p, up)
-    rows = [(s.t, s.v[-2]) for s, _ in vc.march(problem, dt=1.0 / (80.0 * f), steps=80 * 20)][-80 * 3:]
+    rows = [(s.t, s.v[-2]) for s, _ in vc.march(problem, dt=1.0 / (80.0 * f), steps=80 * 20)][
+        -80 * 3 :
+    ]
     t, top = np.array(rows).T
     ratio = harmonic_amplitude(top, t, f) * 2.0 * np.pi * f  # the outcrop's velocity has 1/w
     assert ratio == pytest.approx(peak, rel=1e-2)
@@ -140,6 +159,8 @@ def test_upgoing_velocity():
     np.testing.assert_allclose(whole(9.0), [0.1, 0.0], rtol=1e-13)  # the drift of this record
     sine = upgoing(vc.Harmonic(3.0, 2.0), dt=1e-3)
     t = 0.3137
-    assert sine(t)[0] == pytest.approx(0.5 * 3.0 / (4 * np.pi) * (1 - np.cos(4 * np.pi * t)), rel=1e-4)
+    assert sine(t)[0] == pytest.approx(
+        0.5 * 3.0 / (4 * np.pi) * (1 - np.cos(4 * np.pi * t)), rel=1e-4
+    )
     with pytest.raises(InputError, match="is to be integrated"):
         upgoing(vc.Harmonic(3.0, 2.0))

@@ -16,7 +16,13 @@ from vi_contact.fem import compat
 from vi_contact.fem.assembly import assemble
 from vi_contact.fem.loads import BodyForce, Prescribed, Traction
 from vi_contact.fem.mesh import Cells
-from vi_contact.laws.materials import LinearElastic, MassProportional, PlaneStrain, PlaneStress, Rayleigh
+from vi_contact.laws.materials import (
+    LinearElastic,
+    MassProportional,
+    PlaneStrain,
+    PlaneStress,
+    Rayleigh,
+)
 from vi_contact.run.march import march
 from vi_contact.run.static import static_equilibrium
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
@@ -44,6 +50,7 @@ def rotations(d: int) -> list:
 
 # Mass and stiffness ---------------------------------------------------------------------------------------------------
 
+
 @pytest.mark.two_ranks
 @bodies
 def test_rigid_modes_have_no_strain_energy(name):
@@ -67,18 +74,24 @@ def test_mass_of_rigid_motions(name):
     mass = CONCRETE.rho * lengths.prod()
     for i in range(d):
         assert 2.0 * system.kinetic_energy(system.influence[:, i]) == pytest.approx(mass, rel=1e-13)
-    second = mass * (np.diag(lengths**2) / 12.0 + np.outer(lengths, lengths) / 4.0)  # ∫ rho x xᵀ, before turning
+    second = mass * (
+        np.diag(lengths**2) / 12.0 + np.outer(lengths, lengths) / 4.0
+    )  # ∫ rho x xᵀ, before turning
     for turn in rotations(d):
         W = turn(np.eye(d)).T
         c, s = np.cos(BODIES[name].get("angle", 0.0)), np.sin(BODIES[name].get("angle", 0.0))
         R = np.eye(d)
         R[:2, :2] = [[c, -s], [s, c]]
         expected = np.trace(W @ R @ second @ R.T @ W.T)
-        assert 2.0 * system.kinetic_energy(nodal(system, turn)) == pytest.approx(expected, rel=1e-12)
+        assert 2.0 * system.kinetic_energy(nodal(system, turn)) == pytest.approx(
+            expected, rel=1e-12
+        )
 
 
 @pytest.mark.two_ranks
-@pytest.mark.parametrize("section, thickness", [(PlaneStress(0.2), 0.2), (PlaneStrain(3.0), 3.0), (None, 1.0)])
+@pytest.mark.parametrize(
+    "section, thickness", [(PlaneStress(0.2), 0.2), (PlaneStrain(3.0), 3.0), (None, 1.0)]
+)
 def test_thickness_multiplies_all_integrals(section, thickness):
     """M, K, C and loads of a section are its thickness times those of unit thickness; plane strain is the default."""
     mesh, tags = block(COMM, **BODIES["quadrilaterals"])
@@ -92,14 +105,15 @@ def test_thickness_multiplies_all_integrals(section, thickness):
     for matrix in "MKC":
         a, b = (dense(COMM, system, getattr(system, matrix)) for system in (thick, thin))
         assert np.abs(a - thickness * b).max() < 1e-13 * np.abs(a).max()
-    assert max_over_ranks(COMM, thick.load(0.0) - thickness * thin.load(0.0)) < 1e-13 * max_over_ranks(
-        COMM, thick.load(0.0)
-    )
+    assert max_over_ranks(
+        COMM, thick.load(0.0) - thickness * thin.load(0.0)
+    ) < 1e-13 * max_over_ranks(COMM, thick.load(0.0))
 
 
 @pytest.mark.parametrize("simplices", [False, True])
 @pytest.mark.parametrize(
-    "section, lengths", [("stress", (3.0, 0.5)), ("strain", (3.0, 0.5)), ("solid", (3.0, 0.5, 0.4)), ("bar", (3.0,))]
+    "section, lengths",
+    [("stress", (3.0, 0.5)), ("strain", (3.0, 0.5)), ("solid", (3.0, 0.5, 0.4)), ("bar", (3.0,))],
 )
 def test_uniaxial_bar(section, lengths, simplices):
     """u = sigma x / E', lateral contraction nu' y, rollers on the sides at zero (exact, it is linear).
@@ -109,12 +123,18 @@ def test_uniaxial_bar(section, lengths, simplices):
     d = len(lengths)
     mesh, tags = block(COMM, lengths=lengths, divisions=(4, 2, 2)[:d], simplices=simplices)
     sections = {"stress": PlaneStress(0.2), "strain": PlaneStrain(0.7)}
-    rollers = [Prescribed(tags[side], components=(i,)) for i, side in enumerate(("left", "bottom", "back")[:d])]
+    rollers = [
+        Prescribed(tags[side], components=(i,))
+        for i, side in enumerate(("left", "bottom", "back")[:d])
+    ]
     sigma = 4.0e6
     end = Traction(tags["right"], tuple(sigma * np.eye(d)[0]))
     system = assemble(mesh, CONCRETE, section=sections.get(section), prescribed=rollers, loads=end)
     E, nu = CONCRETE.E, CONCRETE.nu
-    modulus = {"strain": E / (1.0 - nu**2), "bar": CONCRETE.lame_lambda + 2.0 * CONCRETE.shear_modulus}.get(section, E)
+    modulus = {
+        "strain": E / (1.0 - nu**2),
+        "bar": CONCRETE.lame_lambda + 2.0 * CONCRETE.shear_modulus,
+    }.get(section, E)
     contraction = {"strain": nu / (1.0 - nu), "bar": 0.0}.get(section, nu)
     u = system.algebra.factor(system.K).solve(system.load(0.0))
     points, values = field(system, u)
@@ -126,7 +146,10 @@ def test_uniaxial_bar(section, lengths, simplices):
 def test_two_materials_in_series():
     """Two halves of a bar share the stress; their elongations and masses add. Cells are chosen by position."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 3))
-    soft, hard = LinearElastic(E=1.0e9, nu=0.0, rho=1000.0), LinearElastic(E=4.0e9, nu=0.0, rho=3000.0)
+    soft, hard = (
+        LinearElastic(E=1.0e9, nu=0.0, rho=1000.0),
+        LinearElastic(E=4.0e9, nu=0.0, rho=3000.0),
+    )
     middles = mesh.geometry.x[compat.geometry_dofmap(mesh)].mean(axis=1)[:, 0]
     halves = [
         (Cells("soft", np.flatnonzero(middles < 1.0).astype(np.int32), mesh), soft),
@@ -134,7 +157,9 @@ def test_two_materials_in_series():
     ]
     whole = assemble(mesh, halves)
     assert 2.0 * whole.kinetic_energy(whole.influence[:, 0]) == pytest.approx(4000.0, rel=1e-13)
-    system = assemble(mesh, halves, clamped=tags["left"], loads=Traction(tags["right"], (2.0e6, 0.0)))
+    system = assemble(
+        mesh, halves, clamped=tags["left"], loads=Traction(tags["right"], (2.0e6, 0.0))
+    )
     points, values = field(system, system.algebra.factor(system.K).solve(system.load(0.0)))
     x = points[:, 0]
     expected = np.where(x <= 1.0, 2.0e-3 * x, 2.0e-3 + 0.5e-3 * (x - 1.0))
@@ -146,6 +171,7 @@ def test_two_materials_in_series():
 
 
 # Damping --------------------------------------------------------------------------------------------------------------
+
 
 @pytest.mark.two_ranks
 def test_rayleigh_damping():
@@ -168,6 +194,7 @@ def test_mass_proportional_damping_is_a_force_per_volume():
 
 # Static and gravity stages --------------------------------------------------------------------------------------------
 
+
 @pytest.mark.parametrize(
     "sides, floating",
     [
@@ -185,7 +212,9 @@ def test_floating_in_the_plane(sides, floating):
     """Whether some rigid motion is left by the prescribed components, at any scale."""
     for size in (1.0, 1e-6, 1e5):
         mesh, tags = block(COMM, lengths=(2.0 * size, size), divisions=(2, 3))
-        system = assemble(mesh, CONCRETE, prescribed=[Prescribed(tags[s], components=c) for s, c in sides.items()])
+        system = assemble(
+            mesh, CONCRETE, prescribed=[Prescribed(tags[s], components=c) for s, c in sides.items()]
+        )
         assert system.floating is floating
 
 
@@ -202,7 +231,9 @@ def test_floating_in_the_plane(sides, floating):
 )
 def test_floating_in_space(sides, floating):
     mesh, tags = block(COMM, lengths=(2.0, 1.0, 3.0), divisions=(1, 2, 2))
-    system = assemble(mesh, CONCRETE, prescribed=[Prescribed(tags[s], components=c) for s, c in sides.items()])
+    system = assemble(
+        mesh, CONCRETE, prescribed=[Prescribed(tags[s], components=c) for s, c in sides.items()]
+    )
     assert system.floating is floating
 
 
@@ -210,10 +241,14 @@ def test_static_stage_is_the_start_of_an_equilibrium():
     """A clamped block under its weight, without contact: the dynamic stage that continues stays still."""
     mesh, tags = block(COMM, lengths=(1.0, 2.0), divisions=(3, 5))
     weight = BodyForce((0.0, -CONCRETE.rho * 9.80665))
-    problem = linear(assemble(mesh, CONCRETE, clamped=tags["bottom"], loads=weight, damping=Rayleigh(0.1, 1e-4)))
+    problem = linear(
+        assemble(mesh, CONCRETE, clamped=tags["bottom"], loads=weight, damping=Rayleigh(0.1, 1e-4))
+    )
     start = static_equilibrium(problem, solver=Condensed())
     sag = max_over_ranks(COMM, start.u)
-    for state, _ in march(problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=1e-3, steps=20, state=start):
+    for state, _ in march(
+        problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=1e-3, steps=20, state=start
+    ):
         assert max_over_ranks(COMM, state.u - start.u) < 1e-12 * sag
         assert max_over_ranks(COMM, state.v) * 1e-3 < 1e-12 * sag
 
@@ -225,7 +260,9 @@ def test_assemble_stays_a_function() -> None:
 
 
 @pytest.mark.serial
-def test_nearly_incompressible_materials_are_told(comm: Any, caplog: pytest.LogCaptureFixture) -> None:
+def test_nearly_incompressible_materials_are_told(
+    comm: Any, caplog: pytest.LogCaptureFixture
+) -> None:
     """They lock first-order cells but in plane stress."""
     mesh, tags = block(comm)
     nearly = LinearElastic(E=1.0, nu=0.4999, rho=1.0)

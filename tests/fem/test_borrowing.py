@@ -32,13 +32,19 @@ def error(n: int) -> float:
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 1.0), divisions=(n, n)), COMM)
     sides = [fem.Prescribed(tags[name], lowering) for name in ("left", "right", "top")]
     load = fem.BodyForce((0.5 * E * B, 0.0))
-    system = fem.assemble(mesh, vc.LinearElastic(E=E, nu=0.0, rho=1.0), prescribed=sides, loads=load)
-    surface = fem.contact_surface(system, tags["bottom"], obstacle=vc.HalfSpace((0.0, 0.0), (0.0, 1.0)))
+    system = fem.assemble(
+        mesh, vc.LinearElastic(E=E, nu=0.0, rho=1.0), prescribed=sides, loads=load
+    )
+    surface = fem.contact_surface(
+        system, tags["bottom"], obstacle=vc.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    )
     problem = vc.ContactProblem(system, surface)
     pressure = fem.as_function(problem, vc.static_equilibrium(problem), "contact_pressure")
     x = ufl.SpatialCoordinate(mesh)
     ds = compat.measure(mesh, 1, tags["bottom"].indices)
-    squares = dolfinx.fem.assemble_scalar(dolfinx.fem.form((pressure - E * (A + B * x[0])) ** 2 * ds))
+    squares = dolfinx.fem.assemble_scalar(
+        dolfinx.fem.form((pressure - E * (A + B * x[0])) ** 2 * ds)
+    )
     return float(np.sqrt(COMM.allreduce(squares, op=MPI.SUM)))
 
 
@@ -62,7 +68,9 @@ def test_nodes_beyond_the_edge_of_the_other_side_have_the_pressure_of_their_neig
         prescribed=fem.Prescribed(tags["upper_top"], components=(0,)),
         loads=fem.Traction(tags["upper_top"], (0.0, -1e6)),
     )
-    surface = fem.contact_pair(system, tags["lower_top"], tags["upper_bottom"], matching=fem.DualMortar())
+    surface = fem.contact_pair(
+        system, tags["lower_top"], tags["upper_bottom"], matching=fem.DualMortar()
+    )
     problem = vc.ContactProblem(system, surface)
     pressure = fem.as_function(problem, vc.static_equilibrium(problem), "contact_pressure")
     x = pressure.function_space.tabulate_dof_coordinates()

@@ -30,9 +30,13 @@ CLOSE = 1e-13  # of the largest entry of a product: round-off of some tens of te
 
 def pair() -> vc.ContactProblem:
     """Two blocks, turned: relative unknowns in the nodal frames."""
-    mesh = blocks(3, angle=0.4, simplices=True, upper=(2, 5, 2), lower=(2, 5, 2), lengths=(1.0, 2.0, 1.0))
+    mesh = blocks(
+        3, angle=0.4, simplices=True, upper=(2, 5, 2), lower=(2, 5, 2), lengths=(1.0, 2.0, 1.0)
+    )
     system, tags = two_blocks(COMM, mesh, damping=vc.Rayleigh(2.0, 1e-4))
-    system = thrown(system, lambda x: 0.0 * x, lambda x: 0.0 * x + np.append(turned((0.0, -1.0), 0.4), 0.0))
+    system = thrown(
+        system, lambda x: 0.0 * x, lambda x: 0.0 * x + np.append(turned((0.0, -1.0), 0.4), 0.0)
+    )
     one, two = (tags[side] for side in mesh.interface)
     return vc.ContactProblem(system, fem.contact_pair(system, one, two), mass=vc.Redistributed())
 
@@ -41,18 +45,25 @@ def shaken() -> vc.ContactProblem:
     """A block between a roller and a moving top: nodes with some of their components, and the pull of the top."""
     mesh, tags = block(COMM, lengths=(1.0, 2.0, 1.0), divisions=(3, 5, 3))
     top = fem.Prescribed(tags["top"], lambda x, t: np.full_like(x, -1e-3 * np.sin(40.0 * t)))
-    system = fem.assemble(mesh, SOFT, prescribed=[top, fem.Prescribed(tags["left"], components=(0,))])
+    system = fem.assemble(
+        mesh, SOFT, prescribed=[top, fem.Prescribed(tags["left"], components=(0,))]
+    )
     wavy = vc.AnalyticGap(lambda x: 1e-4 * (1.0 + np.sin(7.0 * x[:, 2])))
     return vc.ContactProblem(system, fem.contact_surface(system, tags["bottom"], obstacle=wavy))
 
 
 def tall() -> vc.ContactProblem:
     """Few of its rows are those of contact nodes, which are turned."""
-    return replace(thrown_box(COMM, simplices=True, angle=0.4, divisions=(2, 6, 2)), mass=vc.Redistributed())
+    return replace(
+        thrown_box(COMM, simplices=True, angle=0.4, divisions=(2, 6, 2)), mass=vc.Redistributed()
+    )
 
 
 PROBLEMS: dict[str, Callable[[], vc.ContactProblem]] = {
-    "tall": tall, "flat": lambda: thrown_box(COMM, angle=0.4), "pair": pair, "shaken": shaken,
+    "tall": tall,
+    "flat": lambda: thrown_box(COMM, angle=0.4),
+    "pair": pair,
+    "shaken": shaken,
 }
 
 
@@ -83,15 +94,23 @@ def test_the_same_matrices(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
             kinds.add(type(one).__name__)
             assert isinstance(one, PetscMatrix) and one.rows == two.rows
             assert alike(one @ x, two @ x) and alike(one.transpose_apply(x), two @ x)
-            assert alike(one.diagonal(), two.diagonal()) and alike(PetscMatrix(one.mat) @ x, two @ x)
+            assert alike(one.diagonal(), two.diagonal()) and alike(
+                PetscMatrix(one.mat) @ x, two @ x
+            )
             algebra, mask = ours.algebra, np.arange(len(x)) % 3 > 0
-            assert alike(algebra.entries(one, rows).toarray(), theirs.algebra.entries(two, rows).toarray())
-            held = [of.algebra.with_identity_rows(A, mask) @ x for of, A in ((ours, one), (theirs, two))]
+            assert alike(
+                algebra.entries(one, rows).toarray(), theirs.algebra.entries(two, rows).toarray()
+            )
+            held = [
+                of.algebra.with_identity_rows(A, mask) @ x for of, A in ((ours, one), (theirs, two))
+            ]
             assert alike(*held)
         assert alike(ours.inertia(np.eye(3)[1]), theirs.inertia(np.eye(3)[1]))
         assert alike(ours.load(0.01), theirs.load(0.01))
     assert kinds == ({"Half", "Replaced"} if name != "flat" else {"Half"})
-    size = [sum(one.M.bytes + one.K.bytes for one in (of.system, of.turned)) for of in (packed, plain)]
+    size = [
+        sum(one.M.bytes + one.K.bytes for one in (of.system, of.turned)) for of in (packed, plain)
+    ]
     assert COMM.allreduce(size[0]) < 0.7 * COMM.allreduce(size[1])
 
 
@@ -126,7 +145,9 @@ def test_rows_of_a_node_may_have_entries_in_different_places() -> None:
     for rank in range(COMM.size):
         mine = slice(n * rank, n * rank + 3)
         dense[mine, -3:] = dense[-3:, mine] = 1.0
-        dense[n * rank, mine] = dense[mine, n * rank] = 0.0  # the own block is met after the far one
+        dense[n * rank, mine] = dense[mine, n * rank] = (
+            0.0  # the own block is met after the far one
+        )
     rows = sp.csr_matrix(dense[first : first + n])
     held = algebra.held(aij_of(rows, COMM))
     assert isinstance(held, compact.Half)

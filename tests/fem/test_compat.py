@@ -18,7 +18,12 @@ from vi_contact.fem import compat  # noqa: E402
 @pytest.mark.parametrize("simplices", [True, False])
 @pytest.mark.parametrize("d", [1, 2, 3])
 def test_unknowns_of_first_order_spaces_sit_on_geometry_nodes(d, simplices, comm):
-    block = BlockMesh(lengths=(1.0, 2.0, 3.0)[:d], divisions=(3, 2, 2)[:d], simplices=simplices, angle=0.4 * (d > 1))
+    block = BlockMesh(
+        lengths=(1.0, 2.0, 3.0)[:d],
+        divisions=(3, 2, 2)[:d],
+        simplices=simplices,
+        angle=0.4 * (d > 1),
+    )
     mesh, _ = fem.build_mesh(block, comm)
     functions = compat.vector_space(mesh)
     nodes = compat.dof_to_node(functions)
@@ -27,16 +32,22 @@ def test_unknowns_of_first_order_spaces_sit_on_geometry_nodes(d, simplices, comm
     bs = functions.dofmap.index_map_bs
     assert bs == d
     field.interpolate(lambda x: x[:bs])
-    assert np.allclose(field.x.array.reshape(-1, bs), mesh.geometry.x[nodes, :bs], rtol=0.0, atol=1e-14)
+    assert np.allclose(
+        field.x.array.reshape(-1, bs), mesh.geometry.x[nodes, :bs], rtol=0.0, atol=1e-14
+    )
 
 
 def test_assembled_mass_is_symmetric_and_weighs_the_block(comm):
     """1'M1 = d volume, v'1 = d volume, for P1 on tetrahedra; contributions of all ranks are in."""
-    mesh, _ = fem.build_mesh(BlockMesh(lengths=(1.0, 2.0, 3.0), divisions=(2, 2, 2), simplices=True), comm)
+    mesh, _ = fem.build_mesh(
+        BlockMesh(lengths=(1.0, 2.0, 3.0), divisions=(2, 2, 2), simplices=True), comm
+    )
     functions = compat.vector_space(mesh)
     u, v = ufl.TrialFunction(functions), ufl.TestFunction(functions)
     M = compat.assemble_matrix(compat.compile_form(ufl.inner(u, v) * ufl.dx))
-    b = compat.assemble_vector(compat.compile_form(dolfinx.fem.Constant(mesh, 1.0) * sum(v) * ufl.dx))
+    b = compat.assemble_vector(
+        compat.compile_form(dolfinx.fem.Constant(mesh, 1.0) * sum(v) * ufl.dx)
+    )
     one, product = M.createVecs()
     one.set(1.0)
     M.mult(one, product)

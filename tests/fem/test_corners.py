@@ -48,18 +48,35 @@ def leaning(x: Array) -> Array:
 
 BODIES: dict[str, dict[str, Any]] = {
     "rectangle": {"lengths": (1.5, 1.0), "divisions": (4, 3)},
-    "turned rectangle": {"lengths": (1.5, 1.0), "divisions": (4, 3), "simplices": True, "angle": 0.4},
+    "turned rectangle": {
+        "lengths": (1.5, 1.0),
+        "divisions": (4, 3),
+        "simplices": True,
+        "angle": 0.4,
+    },
     "trapezoid": {"lengths": (3.0, 1.0), "divisions": (6, 3), "deform": trapezoid},
-    "turned trapezoid": {"lengths": (3.0, 1.0), "divisions": (6, 3), "deform": trapezoid, "angle": 0.7},
+    "turned trapezoid": {
+        "lengths": (3.0, 1.0),
+        "divisions": (6, 3),
+        "deform": trapezoid,
+        "angle": 0.7,
+    },
     "box": {"lengths": (1.5, 1.0, 1.2), "divisions": (3, 2, 2)},
     "leaning box": {"lengths": (1.5, 1.0, 1.2), "divisions": (3, 2, 2), "deform": leaning},
-    "leaning tetrahedra": {"lengths": (1.5, 1.0, 1.2), "divisions": (3, 2, 2), "deform": leaning, "simplices": True},
+    "leaning tetrahedra": {
+        "lengths": (1.5, 1.0, 1.2),
+        "divisions": (3, 2, 2),
+        "deform": leaning,
+        "simplices": True,
+    },
 }
 
 
 def on_ranks(names: Any, *several: Any) -> list[Any]:
     """Cases, all but the ``several`` on one rank only."""
-    return [name if name in several else pytest.param(name, marks=pytest.mark.serial) for name in names]
+    return [
+        name if name in several else pytest.param(name, marks=pytest.mark.serial) for name in names
+    ]
 
 
 def body(name: str, **data: Any) -> tuple[Any, Any]:
@@ -87,10 +104,13 @@ def same(one: ContactSurface, other: ContactSurface) -> None:
     one, other = seen(one), seen(other)
     a, b = order(one), order(other)
     for attribute in ("points", "normals", "weights", "gap0"):
-        assert getattr(one, attribute)[a] == pytest.approx(getattr(other, attribute)[b], rel=1e-13, abs=1e-13)
+        assert getattr(one, attribute)[a] == pytest.approx(
+            getattr(other, attribute)[b], rel=1e-13, abs=1e-13
+        )
 
 
 # One group is as many groups as it has faces --------------------------------------------------------------------------
+
 
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("name", on_ranks(BODIES, "turned trapezoid", "leaning tetrahedra"))
@@ -104,7 +124,9 @@ def test_one_group_is_a_group_for_each_face(name):
     one, d = seen(one), one.points.shape[1]
     assert sorted({len(corner) for corner in one.corners}) == list(range(2, d + 1))
     assert sum(len(corner) == d for corner in one.corners) == 2**d
-    assert np.linalg.norm(one.weights @ one.normals) < 1e-13 * one.weights.sum()  # a closed boundary
+    assert (
+        np.linalg.norm(one.weights @ one.normals) < 1e-13 * one.weights.sum()
+    )  # a closed boundary
 
 
 def thrown(name: str, surface_of: Any, **how: Any) -> tuple[ContactSurface, Array, Array, Array]:
@@ -119,7 +141,8 @@ def thrown(name: str, surface_of: Any, **how: Any) -> tuple[ContactSurface, Arra
     reports = [report for _, report in vc.march(problem, dt=1e-3, steps=25, **how)]
     assert max(report.certificate.worst for report in reports) <= 1e-9
     r_n, active = (
-        np.array([seen(surface).all(getattr(report.new, what)) for report in reports]) for what in ("r_n", "active")
+        np.array([seen(surface).all(getattr(report.new, what)) for report in reports])
+        for what in ("r_n", "active")
     )
     return surface, r_n, active, problem.cartesian(reports[-1].new.u)
 
@@ -130,7 +153,8 @@ def test_both_move_alike(name):
     """In every step to round-off, with corners closed on one and on several faces."""
     sides = sides_of(name)
     one, r_n, active, u = thrown(
-        name, lambda system, tags, near: fem.contact_surface(system, group(tags, *sides), obstacle=near)
+        name,
+        lambda system, tags, near: fem.contact_surface(system, group(tags, *sides), obstacle=near),
     )
     other, r_n_, active_, u_ = thrown(
         name,
@@ -148,7 +172,9 @@ def test_both_move_alike(name):
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("scheme", [vc.Midpoint(), vc.MoreauJean()], ids=["midpoint", "moreau-jean"])
+@pytest.mark.parametrize(
+    "scheme", [vc.Midpoint(), vc.MoreauJean()], ids=["midpoint", "moreau-jean"]
+)
 def test_a_turned_corner_is_the_same(scheme):
     """The trapezoid and its turned copy: reactions in newtons along each face's own normal."""
     runs = []
@@ -156,7 +182,9 @@ def test_a_turned_corner_is_the_same(scheme):
         runs.append(
             thrown(
                 name,
-                lambda system, tags, near: fem.contact_surface(system, group(tags, *SIDES[:4]), obstacle=near),
+                lambda system, tags, near: fem.contact_surface(
+                    system, group(tags, *SIDES[:4]), obstacle=near
+                ),
                 scheme=scheme,
             )
         )
@@ -173,7 +201,9 @@ def test_mirror_symmetry_of_an_oblique_wall():
     surface = fem.contact_surface(system, group(tags, *SIDES[:4]), obstacle=near)
     images = []
     for way in (1.0, -1.0):
-        problem = ContactProblem(system, surface, excitation=vc.Harmonic(10.0, 8.0, direction=(way, -0.8)))
+        problem = ContactProblem(
+            system, surface, excitation=vc.Harmonic(10.0, 8.0, direction=(way, -0.8))
+        )
         reports = [report for _, report in vc.march(problem, dt=2e-3, steps=40)]
         images.append((reports, field(system, problem.cartesian(reports[-1].new.u))))
     points = seen(surface).points * (-1.0, 1.0) + (3.0, 0.0)
@@ -187,6 +217,7 @@ def test_mirror_symmetry_of_an_oblique_wall():
 
 
 # Oblique frames -------------------------------------------------------------------------------------------------------
+
 
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("name", ["trapezoid", "leaning box"])
@@ -205,16 +236,27 @@ def test_the_oblique_system_is_the_same_system(name):
     problem = ContactProblem(system, surface)
     other = problem.equations
     T, dual = dense(COMM, system, surface.basis), dense(COMM, system, surface.dual)
-    assert np.abs(T.T @ dual - np.eye(len(T))).max() < 1e-13 and np.abs(T.T @ T - np.eye(len(T))).max() > 0.1
+    assert (
+        np.abs(T.T @ dual - np.eye(len(T))).max() < 1e-13
+        and np.abs(T.T @ T - np.eye(len(T))).max() > 0.1
+    )
     u = system.space.restrict(some_field(system.space.points))
-    assert max_over_ranks(COMM, problem.cartesian(relative(problem, u)) - u) < 1e-13 * max_over_ranks(COMM, u)
+    assert max_over_ranks(
+        COMM, problem.cartesian(relative(problem, u)) - u
+    ) < 1e-13 * max_over_ranks(COMM, u)
     expected = np.sum(some_field(seen(surface).points) * seen(surface).normals, axis=1)
     assert seen(surface).normal_values(relative(problem, u)) == pytest.approx(expected, abs=1e-12)
-    assert other.kinetic_energy(other.v0) == pytest.approx(system.kinetic_energy(system.v0), rel=1e-12)
-    assert other.strain_energy(other.u0) == pytest.approx(system.strain_energy(system.u0), rel=1e-12)
+    assert other.kinetic_energy(other.v0) == pytest.approx(
+        system.kinetic_energy(system.v0), rel=1e-12
+    )
+    assert other.strain_energy(other.u0) == pytest.approx(
+        system.strain_energy(system.u0), rel=1e-12
+    )
     work = system.algebra.dot(system.load(0.0), system.v0)
     assert other.algebra.dot(other.load(0.0), other.v0) == pytest.approx(work, rel=1e-12)
-    assert max_over_ranks(COMM, problem.cartesian(other.u0) - system.u0) < 1e-13 * max_over_ranks(COMM, u)
+    assert max_over_ranks(COMM, problem.cartesian(other.u0) - system.u0) < 1e-13 * max_over_ranks(
+        COMM, u
+    )
     random = np.random.default_rng(2).random(seen(surface).count)
     push = forces(problem, seen(surface).reaction_load(random, system.rows))
     by_node = np.zeros_like(push)
@@ -262,6 +304,7 @@ def test_lumped_mass_does_not_depend_on_the_frames():
 
 # Against other answers ------------------------------------------------------------------------------------------------
 
+
 @pytest.mark.parametrize("name", on_ranks(("trapezoid", "turned trapezoid"), "turned trapezoid"))
 def test_static_answer_by_enumeration(name):
     """The trapezoid, its top moved into a notch with gaps: r_n of all sets of contacts tried, on dense matrices along
@@ -269,21 +312,29 @@ def test_static_answer_by_enumeration(name):
     angle = BODIES[name].get("angle", 0.0)
     push = turned((0.004, -0.02), angle)
     mesh, tags = fem.build_mesh(BlockMesh(**(BODIES[name] | {"divisions": (3, 1)})), COMM)
-    system = fem.assemble(mesh, SOFT, prescribed=fem.Prescribed(tags["top"], lambda x, t: np.tile(push, (len(x), 1))))
+    system = fem.assemble(
+        mesh, SOFT, prescribed=fem.Prescribed(tags["top"], lambda x, t: np.tile(push, (len(x), 1)))
+    )
     gap = vc.AnalyticGap(lambda x: 0.005 * np.cos(3.0 * x[:, 0]) ** 2)
     surface = fem.contact_surface(system, group(tags, "left", "bottom", "right"), obstacle=gap)
     assert seen(surface).count == 6 and len(seen(surface).corners) == 2
     problem = ContactProblem(system, surface)
     K, size = dense(COMM, system, system.K), len(dense(COMM, system, system.K))
-    ids, rank = np.unique(np.concatenate(COMM.allgather(np.asarray(system.space.ids))), return_inverse=True)
+    ids, rank = np.unique(
+        np.concatenate(COMM.allgather(np.asarray(system.space.ids))), return_inverse=True
+    )
     assert len(rank) == size
     B = np.zeros((seen(surface).count, size))
-    for row, (node, normal) in enumerate(zip(seen(surface).nodes, seen(surface).normals, strict=True)):
+    for row, (node, normal) in enumerate(
+        zip(seen(surface).nodes, seen(surface).normals, strict=True)
+    ):
         B[row, np.searchsorted(ids, 2 * node + np.arange(2))] = normal
     f = np.zeros(int(ids.max()) + 1)
     np.add.at(f, system.space.ids, system.load(0.0))
     free = np.linalg.solve(K, system.algebra.comm.sum(f)[ids])
-    r = enumerate_lcp(B @ np.linalg.solve(K, B.T), seen(surface).gap0 - B @ free, seen(surface).bilateral)
+    r = enumerate_lcp(
+        B @ np.linalg.solve(K, B.T), seen(surface).gap0 - B @ free, seen(surface).bilateral
+    )
     for solver in (vc.Condensed(), Volume()):
         state = vc.static_equilibrium(problem, solver=solver)
         assert seen(surface).all(state.r_n) == pytest.approx(r, abs=1e-9 * r.max())
@@ -314,7 +365,9 @@ def test_a_block_wedged_in_a_notch(name):
     row = vc.Contact().start(problem, state)
     assert [row[f"contact_force_{axis}"] for axis in "xyz"[:d]] == pytest.approx(-weight, rel=1e-8)
     for face in range(d):
-        part = engineering.Resultants("face", np.zeros(d), where=lambda points, n, face=face: normals_of == face)
+        part = engineering.Resultants(
+            "face", np.zeros(d), where=lambda points, n, face=face: normals_of == face
+        )
         assert part.start(problem, state)["N_face"] == pytest.approx(expected[face], rel=1e-8)
 
 
@@ -322,8 +375,14 @@ def test_a_block_wedged_in_a_notch(name):
 def test_ledger_of_a_block_that_slams_into_a_notch():
     """Contact work and impact losses at oblique corners, by several schemes and a law; the ledger closes to 1e-11."""
     cases: list[dict[str, Any]] = [
-        {"scheme": None}, {"scheme": vc.MoreauJean(e=0.5)}, {"scheme": vc.ContactStabilisedNewmark()},
-        {"scheme": vc.ZienkiewiczWoodTaylor(), "impact": vc.Inelastic(), "mass": vc.ConsistentMass()},
+        {"scheme": None},
+        {"scheme": vc.MoreauJean(e=0.5)},
+        {"scheme": vc.ContactStabilisedNewmark()},
+        {
+            "scheme": vc.ZienkiewiczWoodTaylor(),
+            "impact": vc.Inelastic(),
+            "mass": vc.ConsistentMass(),
+        },
     ]
     system, tags = body("trapezoid", initial_velocity=lambda x: np.tile((-0.8, -1.5), (len(x), 1)))
     for case in cases:
@@ -331,7 +390,9 @@ def test_ledger_of_a_block_that_slams_into_a_notch():
         surface = fem.contact_surface(system, group(tags, "left", "bottom", "right"), obstacle=near)
         problem = ContactProblem(system, surface, impact=case.get("impact"), mass=case.get("mass"))
         energy = vc.Energy()
-        found = vc.simulate(problem, scheme=case["scheme"], dt=1e-3, steps=30, record=[energy], progress=False)
+        found = vc.simulate(
+            problem, scheme=case["scheme"], dt=1e-3, steps=30, record=[energy], progress=False
+        )
         history = found.history
         start = history["energy_kinetic"][0]
         assert np.abs(history["energy_defect"]).max() < 1e-11 * start
@@ -348,13 +409,16 @@ def test_an_inelastic_impact_on_one_face_of_a_corner():
     v = np.tile((0.3, -0.7), (len(system.space.points), 1))
     target = np.full(seen(surface).count, np.nan)
     target[corner[0]] = 0.0
-    after = vc.ComponentReset()(problem.equations, surface, relative(problem, system.space.restrict(v)), target)
+    after = vc.ComponentReset()(
+        problem.equations, surface, relative(problem, system.space.restrict(v)), target
+    )
     values = field(system, problem.cartesian(after))[1][seen(surface).nodes[corner[0]]]
     n = seen(surface).normals[corner[0]]
     assert values == pytest.approx(np.array([0.3, -0.7]) - n * (n @ (0.3, -0.7)), abs=1e-14)
 
 
 # Obstacles ------------------------------------------------------------------------------------------------------------
+
 
 @pytest.mark.two_ranks
 def test_one_direction_is_one_condition():
@@ -363,13 +427,17 @@ def test_one_direction_is_one_condition():
     system, tags = body("rectangle")
     wall = group(tags, "left", "bottom", "right")
     ground = vc.HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
-    surface, smooth = (fem.contact_surface(system, wall, obstacle=ground, feature_angle=a) for a in (pi / 6, pi))
+    surface, smooth = (
+        fem.contact_surface(system, wall, obstacle=ground, feature_angle=a) for a in (pi / 6, pi)
+    )
     assert not seen(surface).corners
     for attribute in ("points", "normals", "weights", "gap0", "owned", "tangents"):
         assert np.array_equal(getattr(surface, attribute), getattr(smooth, attribute)), attribute
     corners = [(0.0, 0.0), (1.5, 0.0)]
     listed = fem.contact_surface(system, wall, obstacle=ground, points=corners)
-    assert seen(listed).count == 2 and seen(listed).weights == pytest.approx([0.5 * (1.5 / 4 + 1.0 / 3)] * 2, rel=1e-13)
+    assert seen(listed).count == 2 and seen(listed).weights == pytest.approx(
+        [0.5 * (1.5 / 4 + 1.0 / 3)] * 2, rel=1e-13
+    )
     fitted = fem.contact_surface(system, wall, points=corners)
     assert seen(fitted).count == 4
     assert seen(fitted).weights.sum() == pytest.approx(seen(listed).weights.sum(), rel=1e-13)
@@ -383,9 +451,15 @@ def test_one_direction_is_one_condition():
             return points[:, 1] + 0.25 + 0.125 * np.abs(normals[:, 0])
 
     own = fem.contact_surface(system, wall, obstacle=Own())
-    assert not seen(own).corners and seen(own).gap0[seen(own).points[:, 1] == 0.0] == pytest.approx([0.25] * 5)
-    leaning_sides, names = body("trapezoid")  # seen from the corner, its side looks away from the ground
-    below = fem.contact_surface(leaning_sides, group(names, "left", "bottom"), obstacle=ground, points=[(0.0, 0.0)])
+    assert not seen(own).corners and seen(own).gap0[seen(own).points[:, 1] == 0.0] == pytest.approx(
+        [0.25] * 5
+    )
+    leaning_sides, names = body(
+        "trapezoid"
+    )  # seen from the corner, its side looks away from the ground
+    below = fem.contact_surface(
+        leaning_sides, group(names, "left", "bottom"), obstacle=ground, points=[(0.0, 0.0)]
+    )
     assert seen(below).count == 1 and seen(below).normals[0] == pytest.approx([0.0, -1.0])
     with pytest.raises(InputError, match="points into the body"):
         fem.contact_surface(leaning_sides, group(names, "left", "bottom"), obstacle=ground)
@@ -394,14 +468,19 @@ def test_one_direction_is_one_condition():
 @pytest.mark.serial
 def test_a_wall_moved_with_its_ground():
     """Oblique corners on an obstacle that moves with the base: the same as in the frame of the ground."""
-    shake = (vc.Harmonic(8.0, 6.0, direction=(1.0, 0.0)), vc.Harmonic(5.0, 9.0, direction=(0.0, 1.0)))
+    shake = (
+        vc.Harmonic(8.0, 6.0, direction=(1.0, 0.0)),
+        vc.Harmonic(5.0, 9.0, direction=(0.0, 1.0)),
+    )
     motion = base_motion(shake)
     near = vc.AnalyticGap(lambda x: np.full(len(x), 2e-4))
     answers = []
     for moved in (False, True):
         mesh, tags = fem.build_mesh(BlockMesh(**BODIES["trapezoid"]), COMM)
         names = ("displacement", "velocity", "acceleration")
-        held = fem.Prescribed(tags["top"], **({name: getattr(motion, name) for name in names} if moved else {}))
+        held = fem.Prescribed(
+            tags["top"], **({name: getattr(motion, name) for name in names} if moved else {})
+        )
         system = fem.assemble(mesh, SOFT, prescribed=held)
         surface = fem.contact_surface(system, group(tags, "left", "bottom", "right"), obstacle=near)
         surface = motion.carrying(surface, system) if moved else surface
@@ -419,16 +498,25 @@ def test_supports_released_beside_an_oblique_notch(tmp_path):
     mesh, tags = fem.build_mesh(BlockMesh(**BODIES["trapezoid"]), COMM)
     weight = fem.BodyForce((-300.0, -2e3))
     systems = [fem.assemble(mesh, SOFT, loads=weight, clamped=held) for held in (tags["top"], ())]
-    places = [(k / 3.0 / np.sqrt(3.0), k / 3.0) for k in (2, 1, 0)] + [(0.5 * k, 0.0) for k in range(1, 7)]
+    places = [(k / 3.0 / np.sqrt(3.0), k / 3.0) for k in (2, 1, 0)] + [
+        (0.5 * k, 0.0) for k in range(1, 7)
+    ]
     static, free = (
-        ContactProblem(one, fem.contact_surface(one, group(tags, "left", "bottom"), points=places)) for one in systems
+        ContactProblem(one, fem.contact_surface(one, group(tags, "left", "bottom"), points=places))
+        for one in systems
     )
     state = vc.static_equilibrium(static, solver=vc.Condensed())
     corner = seen(static.surface).corners[0]
     assert state.r_n[corner].min() > 0.0
     problem, start = fem.release(static, state, free)
     found = vc.simulate(
-        problem, dt=1e-3, steps=5, state=start, out=tmp_path / "run", fields=fem.XDMF(every=1), progress=False
+        problem,
+        dt=1e-3,
+        steps=5,
+        state=start,
+        out=tmp_path / "run",
+        fields=fem.XDMF(every=1),
+        progress=False,
     )
     u = systems[1].space.expand(problem.cartesian(found.state.u), 0.0)
     before = systems[0].space.expand(static.cartesian(state.u), 0.0)
@@ -436,10 +524,13 @@ def test_supports_released_beside_an_oblique_notch(tmp_path):
     assert np.abs(found.state.r_n - state.r_n).max() < 1e-9 * state.r_n.max()
     with h5py.File(tmp_path / "run" / "fields" / "frame_000001.h5") as file:
         pressure = file["contact_pressure"][seen(static.surface).nodes[corner[0]]]
-    assert pressure == pytest.approx((state.r_n / seen(static.surface).weights)[corner].max(), rel=1e-8)
+    assert pressure == pytest.approx(
+        (state.r_n / seen(static.surface).weights)[corner].max(), rel=1e-8
+    )
 
 
 # The feature angle ----------------------------------------------------------------------------------------------------
+
 
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("turn", on_ranks((29.0, 31.0, 45.0), 31.0))
@@ -449,15 +540,27 @@ def test_the_angle(turn, caplog: pytest.LogCaptureFixture):
     caplog.set_level(logging.INFO)
 
     def ring(x: Array) -> Array:
-        return (1.0 + x[:, 1:]) * np.column_stack([np.sin(radians(turn) * x[:, 0]), np.cos(radians(turn) * x[:, 0])])
+        return (1.0 + x[:, 1:]) * np.column_stack(
+            [np.sin(radians(turn) * x[:, 0]), np.cos(radians(turn) * x[:, 0])]
+        )
 
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(4.0, 0.2), divisions=(4, 1), deform=ring), COMM)
     system = fem.assemble(mesh, SOFT)
-    for angle, splits in ((pi / 6, turn > 30.0), (radians(turn) * 1.01, False), (radians(turn) * 0.99, True)):
+    for angle, splits in (
+        (pi / 6, turn > 30.0),
+        (radians(turn) * 1.01, False),
+        (radians(turn) * 0.99, True),
+    ):
         caplog.clear()
         for side in ("top", "bottom"):  # outside, and inside
-            assert fem.contact_surface(system, tags[side], feature_angle=angle).total == (8 if splits else 5)
-        told = [record.getMessage() for record in caplog.records if "turns by more than" in record.getMessage()]
+            assert fem.contact_surface(system, tags[side], feature_angle=angle).total == (
+                8 if splits else 5
+            )
+        told = [
+            record.getMessage()
+            for record in caplog.records
+            if "turns by more than" in record.getMessage()
+        ]
         assert len(told) == (2 if splits and COMM.rank == 0 else 0)
         if told:
             assert "'top' turns by more than" in told[0] and "degrees at 3 contact nodes" in told[0]
@@ -470,7 +573,12 @@ class Blade:
     def build(self, gmsh: Any) -> None:
         points = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 0.005)])
         cells, sides = np.array([(0, 1, 2)]), np.array([(0, 1), (0, 2)])
-        add_arrays(gmsh, MeshArrays("triangle", points, cells, {"body": np.ones(1, dtype=bool)}, {"sides": sides}))
+        add_arrays(
+            gmsh,
+            MeshArrays(
+                "triangle", points, cells, {"body": np.ones(1, dtype=bool)}, {"sides": sides}
+            ),
+        )
 
 
 @dataclass(frozen=True)
@@ -481,7 +589,12 @@ class Pyramid:
         points = np.array([(1, 1, 0), (-1, 1, 0), (-1, -1, 0), (1, -1, 0), (0, 0, 1)], dtype=float)
         sides = np.array([(0, 1, 4), (1, 2, 4), (2, 3, 4), (0, 3, 4)])
         cells = np.array([(0, 1, 2, 4), (0, 2, 3, 4)])
-        add_arrays(gmsh, MeshArrays("tetrahedron", points, cells, {"body": np.ones(2, dtype=bool)}, {"sides": sides}))
+        add_arrays(
+            gmsh,
+            MeshArrays(
+                "tetrahedron", points, cells, {"body": np.ones(2, dtype=bool)}, {"sides": sides}
+            ),
+        )
 
 
 @pytest.mark.two_ranks
@@ -489,11 +602,15 @@ def test_refusals():
     """More faces than dimensions, angles that are none, friction on two faces: a sentence with the remedy."""
     mesh, tags = fem.build_mesh(Pyramid(), COMM)
     system = fem.assemble(mesh, SOFT)
-    with pytest.raises(InputError, match=r"\(0, 0, 1\) has 4 contact directions, more than its 3 dimensions: treat"):
+    with pytest.raises(
+        InputError, match=r"\(0, 0, 1\) has 4 contact directions, more than its 3 dimensions: treat"
+    ):
         fem.contact_surface(system, tags["sides"])
     assert fem.contact_surface(system, tags["sides"], feature_angle=pi).total == 5
     mesh, tags = fem.build_mesh(Blade(), COMM)
-    with pytest.raises(InputError, match=r"\(0, 0\) has 2 contact directions, not independent in its 2 dimensions"):
+    with pytest.raises(
+        InputError, match=r"\(0, 0\) has 2 contact directions, not independent in its 2 dimensions"
+    ):
         fem.contact_surface(fem.assemble(mesh, SOFT), tags["sides"])
     system, tags = body("trapezoid")
     wall = group(tags, "left", "bottom")
@@ -506,11 +623,14 @@ def test_refusals():
         with pytest.raises(InputError, match=sentence):
             ContactProblem(system, surface, friction=friction)
         ContactProblem(system, surface.with_frictionless_corners(), friction=friction)
-        ContactProblem(system, fem.contact_surface(system, wall, feature_angle=3.0), friction=friction)
+        ContactProblem(
+            system, fem.contact_surface(system, wall, feature_angle=3.0), friction=friction
+        )
     ContactProblem(system, surface)
 
 
 # Pairs ----------------------------------------------------------------------------------------------------------------
+
 
 def notch(gap: float = 0.0, upper: int = 2) -> tuple[Any, Any]:
     """A box in a notch of three blocks, which meet at its lower corners."""
@@ -518,8 +638,12 @@ def notch(gap: float = 0.0, upper: int = 2) -> tuple[Any, Any]:
     def smaller(x: Array) -> Array:
         return np.column_stack([np.clip(x[:, 0], gap, 2.0 - gap), np.maximum(x[:, 1], gap)])
 
-    places = {"box": (0.0, 0.0, 2.0, 1.0), "under": (0.0, -1.0, 2.0, 1.0), "west": (-1.0, 0.0, 1.0, 1.0),
-              "east": (2.0, 0.0, 1.0, 1.0)}
+    places = {
+        "box": (0.0, 0.0, 2.0, 1.0),
+        "under": (0.0, -1.0, 2.0, 1.0),
+        "west": (-1.0, 0.0, 1.0, 1.0),
+        "east": (2.0, 0.0, 1.0, 1.0),
+    }
     n = {"box": (2 * upper, upper), "under": (4, 2), "west": (2, 2), "east": (2, 2)}
     mesh, tags = fem.build_mesh(
         Blocks({
@@ -537,13 +661,17 @@ def notch(gap: float = 0.0, upper: int = 2) -> tuple[Any, Any]:
 PAIRS = (("box_bottom", "under_top"), ("box_left", "west_right"), ("box_right", "east_left"))
 
 
-@pytest.mark.parametrize("matching", on_ranks((fem.NodeToNode(), fem.DualMortar()), fem.NodeToNode()), ids=repr)
+@pytest.mark.parametrize(
+    "matching", on_ranks((fem.NodeToNode(), fem.DualMortar()), fem.NodeToNode()), ids=repr
+)
 def test_a_pair_that_bends_round_corners(matching):
     """Box and notch as one pair and as three: the same conditions and the same equilibrium."""
     system, tags = notch(upper=2 if isinstance(matching, fem.NodeToNode) else 3)
     sides = [group(tags, *names) for names in zip(*PAIRS, strict=True)]
     one = fem.contact_pair(system, *sides, matching=matching)
-    pairs = [fem.contact_pair(system, *(tags[name] for name in p), matching=matching) for p in PAIRS]
+    pairs = [
+        fem.contact_pair(system, *(tags[name] for name in p), matching=matching) for p in PAIRS
+    ]
     several = fem.joined_surfaces(*pairs)
     same(one, several)
     assert [len(corner) for corner in seen(one).corners] == [2, 2]

@@ -31,7 +31,9 @@ from vi_contact.run.static import static_equilibrium
 COMM = MPI.COMM_WORLD
 Q = 1e6
 SOFT, STIFF = 1e8, 1e14  # a larger contrast is lost in the factors of a PETSc without CHOLMOD
-ROUNDED = 5.0 * SOFT / STIFF  # the ground gives way by their ratio, a little more where its facets are small
+ROUNDED = (
+    5.0 * SOFT / STIFF
+)  # the ground gives way by their ratio, a little more where its facets are small
 
 
 def pressed(mesh: Any, *, clamped: str, names: tuple[str, str]) -> tuple[ContactSurface, Array]:
@@ -70,10 +72,14 @@ def test_uniform_pressure_in_space(beyond, angle, simplices):
 
     def turned(x: Array) -> Array:
         cos, sin = np.cos(angle), np.sin(angle)
-        return np.column_stack([cos * x[:, 0] - sin * x[:, 2], x[:, 1], sin * x[:, 0] + cos * x[:, 2]])
+        return np.column_stack(
+            [cos * x[:, 0] - sin * x[:, 2], x[:, 1], sin * x[:, 0] + cos * x[:, 2]]
+        )
 
     at = -0.5 - 0.25 * beyond
-    lower = BlockMesh(lengths=(2.0, 0.5, 2.0), divisions=(8, 2, 8), corner=(-1.0, -0.5, -1.0), simplices=simplices)
+    lower = BlockMesh(
+        lengths=(2.0, 0.5, 2.0), divisions=(8, 2, 8), corner=(-1.0, -0.5, -1.0), simplices=simplices
+    )
     upper = BlockMesh(
         lengths=(1.0, 1.0, 1.0),
         divisions=(9, 2, 9),
@@ -93,9 +99,17 @@ def on_soil(cells: int, names: tuple[str, str]) -> tuple[ContactSurface, Array, 
     lower = BlockMesh(lengths=(10.0, 4.0), divisions=(cells, 8))
     upper = BlockMesh(lengths=(2.0, 4.0), divisions=(8, 16))
     mesh, tags = build_mesh(TwoBlocks(lower=lower, upper=upper, offset=(4.03,)), COMM)
-    soil, wall = (LinearElastic(E=1.5e8, nu=0.3, rho=1900.0), LinearElastic(E=2.5e10, nu=0.2, rho=2400.0))
+    soil, wall = (
+        LinearElastic(E=1.5e8, nu=0.3, rho=1900.0),
+        LinearElastic(E=2.5e10, nu=0.2, rho=2400.0),
+    )
     load = Traction(tags["upper_left"], (8e3, 0.0))
-    system = assemble(mesh, [(tags["lower"], soil), (tags["upper"], wall)], clamped=tags["lower_bottom"], loads=load)
+    system = assemble(
+        mesh,
+        [(tags["lower"], soil), (tags["upper"], wall)],
+        clamped=tags["lower_bottom"],
+        loads=load,
+    )
     system = with_weight(system, bodies=bodies_of(system, tags["upper"]))
     surface = contact_pair(system, tags[names[0]], tags[names[1]], matching=DualMortar())
     state = static_equilibrium(ContactProblem(system, surface, friction=Coulomb(0.6)))
@@ -112,7 +126,9 @@ def test_toe_of_a_wall_whichever_side_is_named_first(cells):
     for names in (("upper_bottom", "lower_top"), ("lower_top", "upper_bottom")):
         surface, r_n, pressures = on_soil(cells, names)
         ends = np.concatenate([[4.03], 4.03 + np.cumsum(surface.weights)])
-        force = np.interp(6.03, ends, np.cumsum([0.0, *r_n])) - np.interp(5.905, ends, np.cumsum([0.0, *r_n]))
+        force = np.interp(6.03, ends, np.cumsum([0.0, *r_n])) - np.interp(
+            5.905, ends, np.cumsum([0.0, *r_n])
+        )
         found[names[0]] = force / 0.125
         assert r_n.sum() == pytest.approx(188288.0, rel=1e-5)
         assert pressures.max() == pytest.approx(430e3, rel=0.3)

@@ -32,18 +32,26 @@ EVERY = packages.petsc_has
 def without(monkeypatch: Any, *missing: str) -> None:
     """Be a PETSc that was built without these packages, in a process that has asked for none yet."""
     gone = {*missing, *packages.OF_SUITESPARSE} if "suitesparse" in missing else {*missing}
-    monkeypatch.setattr(packages, "petsc_has", lambda package: package not in gone and EVERY(package))
+    monkeypatch.setattr(
+        packages, "petsc_has", lambda package: package not in gone and EVERY(package)
+    )
     compiled._without_cholmod.cache_clear()
 
 
 def falling_block(d: int, friction: bool) -> vc.ContactProblem:
     """A block that slides as it falls on an oblique plane."""
-    mesh, tags = fem.build_mesh(meshes.BlockMesh(lengths=(2.0, 1.0, 1.0)[:d], divisions=(4, 2, 2)[:d]), COMM)
+    mesh, tags = fem.build_mesh(
+        meshes.BlockMesh(lengths=(2.0, 1.0, 1.0)[:d], divisions=(4, 2, 2)[:d]), COMM
+    )
     soft = vc.LinearElastic(E=1.0e7, nu=0.3, rho=1000.0)
-    system = fem.assemble(mesh, soft, damping=vc.Rayleigh(1.0, 1e-4), initial_velocity=(1.0, -1.0, 0.2)[:d])
+    system = fem.assemble(
+        mesh, soft, damping=vc.Rayleigh(1.0, 1e-4), initial_velocity=(1.0, -1.0, 0.2)[:d]
+    )
     plane = vc.HalfSpace((0.0, -1e-3, 0.0)[:d], (0.2, 1.0, 0.1)[:d])
     surface = fem.contact_surface(system, tags["bottom"], obstacle=plane)
-    return vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3) if friction else vc.Frictionless())
+    return vc.ContactProblem(
+        system, surface, friction=vc.Coulomb(0.3) if friction else vc.Frictionless()
+    )
 
 
 def last_step(problem: vc.ContactProblem, solver: Any) -> tuple[Any, Any]:
@@ -66,7 +74,17 @@ SOLVERS = {
 MISSING = {
     "no SuiteSparse": ("suitesparse",),
     "no MUMPS": ("mumps",),
-    "nothing": ("suitesparse", "mumps", "superlu_dist", "superlu", "hypre", "scalapack", "ptscotch", "metis", "hdf5"),
+    "nothing": (
+        "suitesparse",
+        "mumps",
+        "superlu_dist",
+        "superlu",
+        "hypre",
+        "scalapack",
+        "ptscotch",
+        "metis",
+        "hdf5",
+    ),
 }
 
 
@@ -91,7 +109,9 @@ def test_friction_beside_missing_packages(name, missing, monkeypatch):
     u, _ = last_step(problem, SOLVERS[name])
     without(monkeypatch, *MISSING[missing])
     if name == "volume" and missing == "nothing":
-        with pytest.raises(InputError, match=r"this PETSc has none .*: take Condensed\(\) or Iterative\(\)"):
+        with pytest.raises(
+            InputError, match=r"this PETSc has none .*: take Condensed\(\) or Iterative\(\)"
+        ):
             last_step(problem, SOLVERS[name])
         return
     there, _ = last_step(problem, SOLVERS[name])
@@ -110,7 +130,10 @@ def test_the_log_says_what_is_taken(monkeypatch, caplog):
     last_step(problem, vc.Condensed())
     last_step(problem, vc.Volume(ReducedNewton()))
     if COMM.rank == 0:
-        assert "needs a C compiler and PETSc's CHOLMOD: this PETSc was built without CHOLMOD" in caplog.text
+        assert (
+            "needs a C compiler and PETSc's CHOLMOD: this PETSc was built without CHOLMOD"
+            in caplog.text
+        )
         copied = "" if COMM.size == 1 else ", with a copy on every rank,"
         own = f"PETSc's own Cholesky, ordered by 'nd'{copied} factorises"
         assert f"{own}, as this PETSc has no SuiteSparse" in caplog.text
@@ -156,14 +179,19 @@ def test_singular_is_said_of_singular_matrices(algebra, value, missing, monkeypa
     A[:, 30] = A[30].T
     A = sp.csr_matrix(A)
     A[30, 30] = value
-    with pytest.raises(InputError, match="the effective matrix cannot be factorised: it is singular or contains NaN"):
+    with pytest.raises(
+        InputError,
+        match="the effective matrix cannot be factorised: it is singular or contains NaN",
+    ):
         algebra(COMM).factor(rows(A))
 
 
 def test_no_cause_is_guessed(monkeypatch):
     """An order of elimination that PETSc does not know is what PETSc says, and no word of a singular matrix."""
     monkeypatch.setattr("vi_contact.fem.petsc_algebra.ordering", lambda: "of nobody")
-    with pytest.raises(InputError, match=r"cannot factorise the effective matrix \(error 63, .*of nobody") as said:
+    with pytest.raises(
+        InputError, match=r"cannot factorise the effective matrix \(error 63, .*of nobody"
+    ) as said:
         PetscAlgebra(COMM).factor(rows(chain(60)))
     assert "singular" not in str(said.value) and "NaN" not in str(said.value)
 
@@ -179,18 +207,28 @@ def test_errors_of_petsc_keep_their_causes():
 
     A = rows(chain(10)).mat
     for code, text, said in (
-        (55, "Memory requested 1", "there is not enough memory to factorise the effective matrix of 10 unknowns"),
+        (
+            55,
+            "Memory requested 1",
+            "there is not enough memory to factorise the effective matrix of 10 unknowns",
+        ),
         (71, "Zero pivot row 3", "it is singular or contains NaN"),
         (81, "Zero pivot row 3", "it is singular or contains NaN"),
         (73, "Matrix is missing diagonal entry 7", "it is singular or contains NaN"),
-        (92, "Could not locate solver type mumps", r"\(error 92, Could not locate solver type mumps"),
+        (
+            92,
+            "Could not locate solver type mumps",
+            r"\(error 92, Could not locate solver type mumps",
+        ),
         (76, "Error in external library", r"\(error 76, Error in external library"),
     ):
         with pytest.raises(InputError, match=said):
             raise direct.failure(None, A, error(code, text))
     assert "no memory left" in str(raised("Volume", error(55, "Memory requested 1")))
     assert "zero pivot" in str(raised("Volume", error(71, "Zero pivot row 3")))
-    assert "positive definite" not in str(raised("Volume", error(92, "Could not locate solver type mumps")))
+    assert "positive definite" not in str(
+        raised("Volume", error(92, "Could not locate solver type mumps"))
+    )
 
 
 def test_options_of_a_volume_solver(monkeypatch):
@@ -202,4 +240,7 @@ def test_options_of_a_volume_solver(monkeypatch):
     assert direct_of_volume("cholesky", 2)["redundant_pc_type"] == "cholesky"
     if EVERY("cholmod"):
         assert direct_of_volume("lu", 1, exchanges=True)["pc_factor_mat_solver_type"] == "umfpack"
-        assert direct_of_volume("lu", 2, exchanges=True)["redundant_pc_factor_mat_solver_type"] == "umfpack"
+        assert (
+            direct_of_volume("lu", 2, exchanges=True)["redundant_pc_factor_mat_solver_type"]
+            == "umfpack"
+        )

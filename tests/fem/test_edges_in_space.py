@@ -55,7 +55,11 @@ SHAPES = {  # edges of the cell as rows: faces at 90°, at 60° and 120° beside
     "prism": np.array([[1.0, 0.0, 0.0], [0.5, np.sqrt(0.75), 0.0], [0.0, 0.0, 1.0]]),
     "leaning": np.array([[1.0, 0.2, 0.1], [0.35, 1.0, -0.25], [-0.5, 0.3, 1.0]]),
 }
-PLACED = {"as it is": np.eye(3), "turned": rotation(1), "mirrored": np.eye(3)[[2, 0, 1]] @ np.diag([1.0, 1.0, -1.0])}
+PLACED = {
+    "as it is": np.eye(3),
+    "turned": rotation(1),
+    "mirrored": np.eye(3)[[2, 0, 1]] @ np.diag([1.0, 1.0, -1.0]),
+}
 PIT = {"under": ("bottom", "top", 1), "west": ("left", "right", 0), "rear": ("back", "front", 2)}
 
 
@@ -83,20 +87,35 @@ class Corner:
         boxes = {"box": ((0.0, 0.0, 0.0), 1)}
         if self.n:
             boxes |= {name: (tuple(-np.eye(3)[axis]), self.n) for name, (_, _, axis) in PIT.items()}
-        mesh = Blocks({name: BlockMesh(lengths=(1.0,) * 3, divisions=(k, k, k), corner=corner,
-                                       deform=lambda x: x @ self.map) for name, (corner, k) in boxes.items()})
+        mesh = Blocks(
+            {
+                name: BlockMesh(
+                    lengths=(1.0,) * 3,
+                    divisions=(k, k, k),
+                    corner=corner,
+                    deform=lambda x: x @ self.map,
+                )
+                for name, (corner, k) in boxes.items()
+            }
+        )
         built, tags = build_mesh(mesh, COMM)
         push = {"top": (-3e3, -9e3, 2e3), "right": (-8e3, 5e3, 0.0), "front": (0.0, 3e3, -4e3)}
-        loads = [Traction(tags[f"box_{face}"], tuple(PLACED[self.place] @ p)) for face, p in push.items()]
+        loads = [
+            Traction(tags[f"box_{face}"], tuple(PLACED[self.place] @ p)) for face, p in push.items()
+        ]
         system = assemble(built, SOFT, loads=loads)
         system = system.changed(K=system.algebra.combine([(1.0, system.K), (30.0**2, system.M)]))
         hull = group(tags, [f"box_{face}" for face, _, _ in PIT.values()])
         if self.n:
             walls = group(tags, [f"{name}_{face}" for name, (_, face, _) in PIT.items()], "pit")
-            surface = contact_pair(system, hull, walls, matching=NodeToNode() if self.n == 1 else DualMortar())
+            surface = contact_pair(
+                system, hull, walls, matching=NodeToNode() if self.n == 1 else DualMortar()
+            )
         else:
             back = np.linalg.inv(self.map)
-            surface = contact_surface(system, hull, obstacle=AnalyticGap(lambda x: gap_of(x @ back)))
+            surface = contact_surface(
+                system, hull, obstacle=AnalyticGap(lambda x: gap_of(x @ back))
+            )
         return ContactProblem(system, surface), self.rows(system)
 
     def rows(self, system: Any) -> Array:
@@ -114,8 +133,12 @@ class Corner:
                 for i, j in product(ways, ways):
                     place = np.zeros(3)
                     place[[one, other]] = i / self.n, j / self.n
-                    near = np.linalg.norm(x[first : first + (self.n + 1) ** 3] - place, axis=1).argmin()
-                    share = line(self.n)[int(x[node, one]), i] * line(self.n)[int(x[node, other]), j]
+                    near = np.linalg.norm(
+                        x[first : first + (self.n + 1) ** 3] - place, axis=1
+                    ).argmin()
+                    share = (
+                        line(self.n)[int(x[node, one]), i] * line(self.n)[int(x[node, other]), j]
+                    )
                     row[first + near] -= share * normal
                 rows.append(row.ravel())
         return np.array(rows)
@@ -144,16 +167,22 @@ def numbered(problem: ContactProblem, B: Array) -> Array:
     surface = seen(problem.surface)
     own = B[:, :24].reshape(-1, 8, 3)
     keys = [(int(np.abs(row).sum(axis=1).argmax()), row.sum(axis=0)) for row in own]
-    found = [[k for k, (node, n) in enumerate(keys) if node == at and n @ normal > 1.0 - 1e-12]
-             for at, normal in zip(surface.nodes, surface.normals, strict=True)]
+    found = [
+        [k for k, (node, n) in enumerate(keys) if node == at and n @ normal > 1.0 - 1e-12]
+        for at, normal in zip(surface.nodes, surface.normals, strict=True)
+    ]
     assert sorted(found) == [[k] for k in range(len(B))]
     return np.ravel(found)
 
 
-@pytest.mark.parametrize(("shape", "n"), [
-    pytest.param(shape, n, id=f"{shape}-{name}", marks=() if i == j else serial)
-    for i, shape in enumerate(SHAPES) for j, (n, name) in enumerate({1: "nodes", 2: "mortar", 0: "rigid"}.items())
-])
+@pytest.mark.parametrize(
+    ("shape", "n"),
+    [
+        pytest.param(shape, n, id=f"{shape}-{name}", marks=() if i == j else serial)
+        for i, shape in enumerate(SHAPES)
+        for j, (n, name) in enumerate({1: "nodes", 2: "mortar", 0: "rigid"}.items())
+    ],
+)
 def test_a_box_in_a_corner_by_enumeration(shape, n):
     """A vertex of three, edges of two conditions: reactions of all sets of contacts tried, on dense matrices along the
     axes; turned and mirrored as a whole they are the same to 1e-9."""
@@ -164,7 +193,9 @@ def test_a_box_in_a_corner_by_enumeration(shape, n):
     K, f = dense(COMM, system, system.K), field(system, system.load(0.0))[1].ravel()
     gap = gap_of(surface.points @ np.linalg.inv(SHAPES[shape])) if n == 0 else np.zeros(12)
     B = B[order]
-    expected = enumerate_lcp(B @ np.linalg.solve(K, B.T), gap - B @ np.linalg.solve(K, f), surface.bilateral)
+    expected = enumerate_lcp(
+        B @ np.linalg.solve(K, B.T), gap - B @ np.linalg.solve(K, f), surface.bilateral
+    )
     assert 3 <= np.count_nonzero(expected) <= 11
     u = np.linalg.solve(K, f - B.T @ expected).reshape(-1, 3)
     for place in PLACED:
@@ -184,17 +215,33 @@ def test_a_box_in_a_corner_by_enumeration(shape, n):
 def test_a_pit_of_one_body(shape, n):
     """Floor and wall of one body, whose nodes in the bend belong to both: every condition is the relative displacement
     along the normal of its face, exactly where both bodies deform linearly."""
-    places = {"box": (0.0, 0.0, 0.0), "below": (-1.0, -1.0, 0.0), "under": (0.0, -1.0, 0.0), "west": (-1.0, 0.0, 0.0)}
-    mesh: Any = Blocks({name: BlockMesh(lengths=(1.0,) * 3, divisions=(2 if name == "box" else n,) * 3, corner=corner,
-                                        deform=lambda x: x @ SHAPES[shape] @ PLACED["turned"].T)
-                        for name, corner in places.items()})
+    places = {
+        "box": (0.0, 0.0, 0.0),
+        "below": (-1.0, -1.0, 0.0),
+        "under": (0.0, -1.0, 0.0),
+        "west": (-1.0, 0.0, 0.0),
+    }
+    mesh: Any = Blocks(
+        {
+            name: BlockMesh(
+                lengths=(1.0,) * 3,
+                divisions=(2 if name == "box" else n,) * 3,
+                corner=corner,
+                deform=lambda x: x @ SHAPES[shape] @ PLACED["turned"].T,
+            )
+            for name, corner in places.items()
+        }
+    )
     mesh = Welded(Welded(mesh, "below_right", "under_left"), "below_top", "west_bottom")
     built, tags = build_mesh(mesh, COMM)
     system = assemble(built, SOFT)
     sides = group(tags, ["box_bottom", "box_left"]), group(tags, ["under_top", "west_right"], "pit")
     surface = contact_pair(system, *sides, matching=NodeToNode() if n == 2 else DualMortar())
     found, A = seen(surface), np.arange(9.0).reshape(3, 3)
-    u = relative(ContactProblem(system, surface), per_body(system, lambda x: x @ A + 1.0, lambda x: 2.0 * x @ A.T))
+    u = relative(
+        ContactProblem(system, surface),
+        per_body(system, lambda x: x @ A + 1.0, lambda x: 2.0 * x @ A.T),
+    )
     jump = found.points @ A + 1.0 - 2.0 * found.points @ A.T
     assert found.count == 18 and [len(corner) for corner in found.corners] == [2, 2, 2]
     assert found.normal_values(u) == pytest.approx(np.sum(jump * found.normals, axis=1), abs=1e-12)
@@ -221,25 +268,43 @@ def uniform(mesh: Any, rollers: list[str], tops: list[str], surface_of: Any) -> 
     problem = ContactProblem(system, surface_of(system, tags))
     state = static_equilibrium(problem, solver=Condensed())
     exact = system.space.restrict(pressed(system.space.points))
-    assert max_over_ranks(COMM, problem.cartesian(state.u) - exact) < 1e-10 * max_over_ranks(COMM, exact)
+    assert max_over_ranks(COMM, problem.cartesian(state.u) - exact) < 1e-10 * max_over_ranks(
+        COMM, exact
+    )
     pressures = seen(problem.surface).all(state.r_n) / seen(problem.surface).weights
     assert np.abs(pressures / PRESSURE - 1.0).max() < 1e-10
     return problem
 
 
 @pytest.mark.two_ranks
-@pytest.mark.parametrize(("kind", "n"), [("hexahedra", 3), pytest.param("tetrahedra", 3, marks=serial),
-                                         pytest.param("tetrahedra", 1, marks=serial), ("triangles", 3)])
+@pytest.mark.parametrize(
+    ("kind", "n"),
+    [
+        ("hexahedra", 3),
+        pytest.param("tetrahedra", 3, marks=serial),
+        pytest.param("tetrahedra", 1, marks=serial),
+        ("triangles", 3),
+    ],
+)
 def test_the_pressure_is_uniform_up_to_a_weld(kind, n):
     """Two bodies welded on one half of their interface, meshed unlike each other on the rest: nodes of the weld have no
     condition, and the pressure beside it is what it is elsewhere; also where every facet has nodes of the weld."""
     d = 2 if kind == "triangles" else 3
-    places = {"lower0": (0.0, 0.0, 0.0), "lower": (1.0, 0.0, 0.0), "upper0": (0.0, 1.0, 0.0), "upper": (1.0, 1.0, 0.0)}
+    places = {
+        "lower0": (0.0, 0.0, 0.0),
+        "lower": (1.0, 0.0, 0.0),
+        "upper0": (0.0, 1.0, 0.0),
+        "upper": (1.0, 1.0, 0.0),
+    }
     mesh: Any = Blocks({
         name: BlockMesh(lengths=(1.0,) * d, divisions=(n if name == "lower" else 2, 2, 2)[:d], corner=corner[:d],
                         simplices=kind != "hexahedra") for name, corner in places.items()
     })  # fmt: skip
-    for pair in (("lower0_right", "lower_left"), ("upper0_right", "upper_left"), ("lower0_top", "upper0_bottom")):
+    for pair in (
+        ("lower0_right", "lower_left"),
+        ("upper0_right", "upper_left"),
+        ("lower0_top", "upper0_bottom"),
+    ):
         mesh = Welded(mesh, *pair)
     found = []
 
@@ -248,24 +313,41 @@ def test_the_pressure_is_uniform_up_to_a_weld(kind, n):
         sides = tags["upper_bottom"], tags["lower_top"]
         return contact_pair(system, *(sides[::-1] if n == 1 else sides), matching=DualMortar())
 
-    rollers = ["lower0_left", "upper0_left", "lower0_bottom", "lower_bottom", *(f"{name}_back" for name in places)]
+    rollers = [
+        "lower0_left",
+        "upper0_left",
+        "lower0_bottom",
+        "lower_bottom",
+        *(f"{name}_back" for name in places),
+    ]
     problem = uniform(mesh, rollers[: 4 if d == 2 else 8], ["upper0_top", "upper_top"], pair)
     assert max(found) == 0 and seen(problem.surface).points[:, 0].min() > 1.0
     assert seen(problem.surface).count == (1 if n == 1 else 2) * 3 ** (d - 2)
 
 
 @pytest.mark.parametrize("simplices", [False, pytest.param(True, marks=serial)])
-@pytest.mark.parametrize("upper, lower", [((3, 2, 2), (2, 2, 3)), pytest.param((1, 1, 1), (10, 1, 10), marks=serial),
-                                          pytest.param((10, 1, 10), (1, 1, 1), marks=serial)])
+@pytest.mark.parametrize(
+    "upper, lower",
+    [
+        ((3, 2, 2), (2, 2, 3)),
+        pytest.param((1, 1, 1), (10, 1, 10), marks=serial),
+        pytest.param((10, 1, 10), (1, 1, 1), marks=serial),
+    ],
+)
 def test_the_pressure_is_uniform_up_to_symmetry_planes(simplices, upper, lower):
     """A quarter of a block on a quarter of another on rigid ground, facets of up to ten times the size of those
     opposite, one a side; distorted where there are several."""
+
     def moved(x: Array) -> Array:
         a, b = np.pi * x[:, 0] / 1.5, np.pi * x[:, 2] / 1.2
-        return x + 0.08 * np.column_stack([np.sin(2 * a) * np.cos(b), 0.0 * a, np.cos(a) * np.sin(2 * b)])
+        return x + 0.08 * np.column_stack(
+            [np.sin(2 * a) * np.cos(b), 0.0 * a, np.cos(a) * np.sin(2 * b)]
+        )
 
-    one, two = (BlockMesh(lengths=(1.5, 1.0, 1.2), divisions=n, simplices=simplices, deform=deform)
-                for n, deform in ((upper, moved if upper[0] == 3 else None), (lower, None)))
+    one, two = (
+        BlockMesh(lengths=(1.5, 1.0, 1.2), divisions=n, simplices=simplices, deform=deform)
+        for n, deform in ((upper, moved if upper[0] == 3 else None), (lower, None))
+    )
     mesh = TwoBlocks(upper=one, lower=two)
     rollers = [f"{body}_{side}" for side in ("left", "back") for body in ("upper", "lower")]
 
@@ -274,7 +356,9 @@ def test_the_pressure_is_uniform_up_to_symmetry_planes(simplices, upper, lower):
         return joined_surfaces(pair, contact_surface(system, tags["lower_bottom"]))
 
     problem = uniform(mesh, rollers, ["upper_top"], surfaces)
-    assert seen(problem.surface).count == (upper[0] + 1) * (upper[2] + 1) + (lower[0] + 1) * (lower[2] + 1)
+    assert seen(problem.surface).count == (upper[0] + 1) * (upper[2] + 1) + (lower[0] + 1) * (
+        lower[2] + 1
+    )
 
 
 def bent(x: Array, along: float) -> Array:
@@ -288,26 +372,41 @@ def half(way: float, two: bool) -> tuple[ContactProblem, Array]:
     """(problem, r_n by place and face, displacements of the box) of a box on a floor beside a wall, rigid or two other
     blocks; of the half z > 0 with way 0, of the whole with way 1."""
     n = round(1.0 + way)
-    places = {"box": ((0.0, 0.0), (2, 2, 2)), "under": ((0.0, -1.0), (3, 1, 3)), "west": ((-1.0, 0.0), (1, 3, 1))}
+    places = {
+        "box": ((0.0, 0.0), (2, 2, 2)),
+        "under": ((0.0, -1.0), (3, 1, 3)),
+        "west": ((-1.0, 0.0), (1, 3, 1)),
+    }
     mesh = Blocks({
         name: BlockMesh(lengths=(1.0, 1.0, 1.0 * n), divisions=(*k[:2], k[2] * n), corner=(*xy, -way),
                         deform=lambda x: bent(x, 0.0 if two else 1.0))
         for name, (xy, k) in places.items() if two or name == "box"
     })  # fmt: skip
     built, tags = build_mesh(mesh, COMM)
-    held = () if way else [Prescribed(tags[f"{name}_back"], components=(2,)) for name in mesh.blocks]
-    push = [Traction(tags[f"box_{side}"], p) for side, p in (("top", (-2e3, -6e3, 0.0)), ("right", (-5e3, 3e3, 0.0)))]
+    held = (
+        () if way else [Prescribed(tags[f"{name}_back"], components=(2,)) for name in mesh.blocks]
+    )
+    push = [
+        Traction(tags[f"box_{side}"], p)
+        for side, p in (("top", (-2e3, -6e3, 0.0)), ("right", (-5e3, 3e3, 0.0)))
+    ]
     system = assemble(built, SOFT, prescribed=held, loads=push)
     system = system.changed(K=system.algebra.combine([(1.0, system.K), (30.0**2, system.M)]))
     hull = group(tags, ["box_bottom", "box_left"])
     if two:
-        surface = contact_pair(system, hull, group(tags, ["under_top", "west_right"]), matching=DualMortar())
+        surface = contact_pair(
+            system, hull, group(tags, ["under_top", "west_right"]), matching=DualMortar()
+        )
     else:
-        surface = contact_surface(system, hull, obstacle=AnalyticGap(lambda x: 1e-3 * (x[:, 0] + x[:, 2] ** 2)))
+        surface = contact_surface(
+            system, hull, obstacle=AnalyticGap(lambda x: 1e-3 * (x[:, 0] + x[:, 2] ** 2))
+        )
     problem = ContactProblem(system, surface)
     state = static_equilibrium(problem, solver=Condensed())
     found = seen(surface)
-    rows = np.column_stack([found.points, found.normals, found.weights, found.gap0, found.all(state.r_n)])
+    rows = np.column_stack(
+        [found.points, found.normals, found.weights, found.gap0, found.all(state.r_n)]
+    )
     x, u = field(system, problem.cartesian(state.u))
     order = np.lexsort(np.round(rows[:, :6], 6).T)
     points = np.lexsort(np.round(x, 6).T)
@@ -337,7 +436,11 @@ def test_an_edge_between_tied_ends(two):
     """A box on a floor beside a wall, of which both ends move alike: one condition for each face of the nodes that are
     one, with the weight of both; loads that do not depend on z leave every plane, of uneven ones, with the same
     pressures, and a uniform pressure arrives at the blocks as the same forces in every plane."""
-    places = {"box": ((0.0, 0.0), (2, 2, 3)), "under": ((0.0, -1.0), (3, 1, 4)), "west": ((-1.0, 0.0), (1, 3, 4))}
+    places = {
+        "box": ((0.0, 0.0), (2, 2, 3)),
+        "under": ((0.0, -1.0), (3, 1, 4)),
+        "west": ((-1.0, 0.0), (1, 3, 4)),
+    }
     uneven = {"box": 0.4, "under": 0.0, "west": 0.0}
 
     def placed(x: Array, share: float) -> Array:
@@ -350,23 +453,31 @@ def test_an_edge_between_tied_ends(two):
     })  # fmt: skip
     built, tags = build_mesh(mesh, COMM)
     ends = [Tied(tags[f"{name}_back"], tags[f"{name}_front"]) for name in mesh.blocks]
-    push = [Traction(tags[f"box_{side}"], tuple(PLACED["turned"] @ p))
-            for side, p in (("top", (-2e3, -6e3, 1e3)), ("right", (-5e3, 3e3, 0.0)))]
+    push = [
+        Traction(tags[f"box_{side}"], tuple(PLACED["turned"] @ p))
+        for side, p in (("top", (-2e3, -6e3, 1e3)), ("right", (-5e3, 3e3, 0.0)))
+    ]
     system = assemble(built, SOFT, tied=ends, loads=push)
     system = system.changed(K=system.algebra.combine([(1.0, system.K), (30.0**2, system.M)]))
     hull = group(tags, ["box_bottom", "box_left"])
     if two:
-        surface = contact_pair(system, hull, group(tags, ["under_top", "west_right"]), matching=DualMortar())
+        surface = contact_pair(
+            system, hull, group(tags, ["under_top", "west_right"]), matching=DualMortar()
+        )
     else:
         surface = contact_surface(system, hull)
     problem = ContactProblem(system, surface)
     state = static_equilibrium(problem, solver=Condensed())
     found = seen(surface)
     x = found.points @ PLACED["turned"] @ np.linalg.inv(SHAPES["prism"])
-    rows = np.column_stack([x, found.normals, found.weights, found.all(state.r_n / surface.weights)])
+    rows = np.column_stack(
+        [x, found.normals, found.weights, found.all(state.r_n / surface.weights)]
+    )
     rows = rows[np.lexsort(np.round(rows[:, [0, 1, 3, 4, 2]], 6).T)].reshape(3, 6, 8)
     assert np.abs(rows - rows[0]).max(axis=(0, 1))[[0, 1, 3, 4, 5]].max() < 1e-12
-    shares = np.array([1.0, 17.0 / 15.0, 13.0 / 15.0])  # cells along z are 38, 30 and 22 ninetieths long
+    shares = np.array(
+        [1.0, 17.0 / 15.0, 13.0 / 15.0]
+    )  # cells along z are 38, 30 and 22 ninetieths long
     assert rows[:, :, 6] == pytest.approx(shares[:, None] * rows[0, :, 6], rel=1e-12)
     if two:
         push = forces(problem, found.reaction_load(found.weights, system.rows))
@@ -382,36 +493,72 @@ def test_an_edge_between_tied_ends(two):
 
 # Friction along edges -------------------------------------------------------------------------------------------------
 
+
 def trough(shape: str, kind: str) -> ContactProblem:
     """A block that slides along z in a trough of floor and wall, pressed on both: rigid ones, one group or two joined,
     or blocks with meshes of their own, held all over."""
     way = SHAPES[shape] @ PLACED["turned"].T
     places = {"box": ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 2)}
     if kind == "mortar":
-        places |= {"under": ((0.0, -1.0, -0.5), (1.0, 1.0, 2.0), 3), "west": ((-1.0, 0.0, -0.5), (1.0, 1.0, 2.0), 3)}
-    mesh = Blocks({name: BlockMesh(lengths=size, divisions=(n, n, n), corner=corner, deform=lambda x: x @ way)
-                   for name, (corner, size, n) in places.items()})
+        places |= {
+            "under": ((0.0, -1.0, -0.5), (1.0, 1.0, 2.0), 3),
+            "west": ((-1.0, 0.0, -0.5), (1.0, 1.0, 2.0), 3),
+        }
+    mesh = Blocks(
+        {
+            name: BlockMesh(
+                lengths=size, divisions=(n, n, n), corner=corner, deform=lambda x: x @ way
+            )
+            for name, (corner, size, n) in places.items()
+        }
+    )
     built, tags = build_mesh(mesh, COMM)
     along = way.T[:, 2]
     down = -np.linalg.inv(way)
-    pull = 3e4 * down[:, 1] / np.linalg.norm(down[:, 1]) + 2e4 * down[:, 0] / np.linalg.norm(down[:, 0])
-    held = [tags[f"{name}_{side}"] for name in list(places)[1:] for side in ("bottom", "top", "left", "right")]
+    pull = 3e4 * down[:, 1] / np.linalg.norm(down[:, 1]) + 2e4 * down[:, 0] / np.linalg.norm(
+        down[:, 0]
+    )
+    held = [
+        tags[f"{name}_{side}"]
+        for name in list(places)[1:]
+        for side in ("bottom", "top", "left", "right")
+    ]
     system = assemble(built, SOFT, clamped=held, loads=BodyForce(tuple(pull)))
-    system = thrown(system, *[lambda x: np.tile(along, (len(x), 1)), np.zeros_like, np.zeros_like][: len(places)])
+    system = thrown(
+        system,
+        *[lambda x: np.tile(along, (len(x), 1)), np.zeros_like, np.zeros_like][: len(places)],
+    )
     sides = ("box_left", "box_bottom") if kind == "wall first" else ("box_bottom", "box_left")
     if kind == "mortar":
         pairs = zip(sides, ("under_top", "west_right"), strict=True)
         parts = [contact_pair(system, tags[a], tags[b], matching=DualMortar()) for a, b in pairs]
     else:
         parts = [contact_surface(system, tags[side]) for side in sides]
-    surface = contact_surface(system, group(tags, list(sides))) if kind == "one group" else joined_surfaces(*parts)
-    return ContactProblem(system, surface.with_frictionless_corners(), friction=Coulomb(0.3), mass=ConsistentMass())
+    surface = (
+        contact_surface(system, group(tags, list(sides)))
+        if kind == "one group"
+        else joined_surfaces(*parts)
+    )
+    return ContactProblem(
+        system, surface.with_frictionless_corners(), friction=Coulomb(0.3), mass=ConsistentMass()
+    )
 
 
-@pytest.mark.parametrize(("shape", "kind"), [
-    ("prism", "mortar"), *(pytest.param(*one, marks=serial) for one in (
-        ("square", "one group"), ("prism", "one group"), ("prism", "wall first"), ("square", "mortar")))
-])
+@pytest.mark.parametrize(
+    ("shape", "kind"),
+    [
+        ("prism", "mortar"),
+        *(
+            pytest.param(*one, marks=serial)
+            for one in (
+                ("square", "one group"),
+                ("prism", "one group"),
+                ("prism", "wall first"),
+                ("square", "mortar"),
+            )
+        ),
+    ],
+)
 def test_edges_rub_along_themselves_by_one_face(shape, kind):
     """The first condition of a node on an edge rubs, along the edge, with its own r_n; the others do not. What the body
     loses of its momentum along the trough is the sum, step by step."""
@@ -419,7 +566,9 @@ def test_edges_rub_along_themselves_by_one_face(shape, kind):
     surface = seen(problem.surface)
     first, other = np.transpose(surface.corners)
     assert len(first) == 3
-    floor = surface.normals[np.argmax(surface.weights)] if kind == "one group" else surface.normals[0]
+    floor = (
+        surface.normals[np.argmax(surface.weights)] if kind == "one group" else surface.normals[0]
+    )
     if kind != "one group":
         assert np.allclose(surface.normals[first], floor, atol=1e-9)
     plain = np.setdiff1d(np.arange(surface.count), [*first, *other])
@@ -434,14 +583,22 @@ def test_edges_rub_along_themselves_by_one_face(shape, kind):
         assert r_t[first] == pytest.approx(0.3 * r_n[first], abs=1e-9 * r_n.max())
         assert r_t[plain] == pytest.approx(0.3 * r_n[plain], abs=1e-9 * r_n.max())
         now = equations.algebra.dot(rigid, equations.M @ state.v)
-        rubbed = forces(problem, problem.surface.reaction_load(0.0 * state.r_n, problem.system.rows, state.r_t))[:27]
+        rubbed = forces(
+            problem, problem.surface.reaction_load(0.0 * state.r_n, problem.system.rows, state.r_t)
+        )[:27]
         assert now - before == pytest.approx(-1e-3 * np.sum(rubbed @ along), abs=1e-11 * start)
-        assert np.sum(rubbed @ along) == pytest.approx(0.3 * (r_n.sum() - r_n[other].sum()), rel=1e-2)
-        assert np.abs(rubbed[surface.nodes[first]] @ np.delete(PLACED["turned"], 2, axis=1)).max() < 1e-9 * r_n.max()
+        assert np.sum(rubbed @ along) == pytest.approx(
+            0.3 * (r_n.sum() - r_n[other].sum()), rel=1e-2
+        )
+        assert (
+            np.abs(rubbed[surface.nodes[first]] @ np.delete(PLACED["turned"], 2, axis=1)).max()
+            < 1e-9 * r_n.max()
+        )
         before = now
 
 
 # Redistributed mass across meshes that do not match -------------------------------------------------------------------
+
 
 def inertia_of(problem: ContactProblem) -> Array:
     """RᵀMR (6, 6) of the rigid motions of each of two bodies: masses, centres, moments and products of inertia."""
@@ -449,8 +606,12 @@ def inertia_of(problem: ContactProblem) -> Array:
     for body in (0, 1):
         x = space.points
         motions = [np.tile(e, (len(x), 1)) for e in np.eye(3)] + [np.cross(e, x) for e in np.eye(3)]
-        R = np.column_stack([relative(problem, space.restrict(one) * (space.bodies == body)) for one in motions])
-        found.append(space.comm.sum(R.T @ np.column_stack([problem.equations.M @ one for one in R.T])))
+        R = np.column_stack(
+            [relative(problem, space.restrict(one) * (space.bodies == body)) for one in motions]
+        )
+        found.append(
+            space.comm.sum(R.T @ np.column_stack([problem.equations.M @ one for one in R.T]))
+        )
     return np.array(found)
 
 
@@ -459,19 +620,34 @@ def test_massless_nodes_between_meshes_that_do_not_match(simplices, mu):
     """Two bodies that touch and approach each other, curved sides of warped facets, partly covered: inertia of each to
     1e-12, no mass at the nodes of either side that meet, momenta to 1e-12; the impact starts without a jump, no
     energy is gained or unaccounted for (1e-10)."""
-    mesh = unlike(turn=2, upper=(0.8, 0.6, 0.7), offset=(0.5, 0.4), distorted=(0.05, 0.0), bent=0.2,
-                  divisions=((4, 4, 4), (5, 5, 4)), simplices=simplices)
+    mesh = unlike(
+        turn=2,
+        upper=(0.8, 0.6, 0.7),
+        offset=(0.5, 0.4),
+        distorted=(0.05, 0.0),
+        bent=0.2,
+        divisions=((4, 4, 4), (5, 5, 4)),
+        simplices=simplices,
+    )
     built, tags = build_mesh(mesh, COMM)
     down = rotation(2) @ [0.1, -2.0, 0.2]
-    system = thrown(assemble(built, SOFT), np.zeros_like, lambda x: np.outer(1.0 + 0.2 * x[:, 0], down))
+    system = thrown(
+        assemble(built, SOFT), np.zeros_like, lambda x: np.outer(1.0 + 0.2 * x[:, 0], down)
+    )
     surface = contact_pair(system, tags["upper_bottom"], tags["lower_top"], matching=DualMortar())
     friction = {"friction": Coulomb(mu)} if mu else {}
-    problem, consistent = (ContactProblem(system, surface, mass=mass, **friction)
-                           for mass in (Redistributed(), ConsistentMass()))
+    problem, consistent = (
+        ContactProblem(system, surface, mass=mass, **friction)
+        for mass in (Redistributed(), ConsistentMass())
+    )
     own, expected = inertia_of(problem), inertia_of(consistent)
     assert np.abs(own - expected).max() < 1e-12 * np.abs(expected).max()
     massless = problem.equations.massless
-    assert massless[surface.owned].all() and massless[surface.tangents].all() and seen(surface).gap0.min() == 0.0
+    assert (
+        massless[surface.owned].all()
+        and massless[surface.tangents].all()
+        and seen(surface).gap0.min() == 0.0
+    )
     assert 3 * surface.total < COMM.allreduce(int(massless.sum())) < 3 * (surface.total + 30)
     assert np.abs(problem.equations.M @ np.where(massless, 1.0, 0.0)).max() == 0.0
     recorded = simulate(problem, dt=1e-3, steps=30, record=[Energy(), Contact()], progress=False)
@@ -479,13 +655,16 @@ def test_massless_nodes_between_meshes_that_do_not_match(simplices, mu):
     start = history["energy_kinetic"][0]
     assert np.abs(history["energy_defect"]).max() < 1e-10 * start
     assert (history["energy_kinetic"] + history["energy_strain"]).max() < (1.0 + 1e-10) * start
-    before, after = (momenta(problem, v).sum(axis=0) for v in (problem.equations.v0, recorded.state.v))
+    before, after = (
+        momenta(problem, v).sum(axis=0) for v in (problem.equations.v0, recorded.state.v)
+    )
     assert after == pytest.approx(before, abs=1e-12 * np.abs(before).max())
     force = np.linalg.norm(np.array([history[f"contact_force_{axis}"] for axis in "xyz"]), axis=0)
     assert force[0] == 0.0 and 0.0 < force[1] < 0.2 * force.max()
 
 
 # Refusals, each with its sentence, on all ranks -----------------------------------------------------------------------
+
 
 def part(side: Facets, name: str, low: float, high: float) -> Facets:
     """Those facets of a side whose middles have x between these values."""
@@ -505,18 +684,32 @@ def test_refused_pairs():
         return contact_pair(system, one, two, matching=DualMortar())
 
     cases: dict[str, Any] = {
-        "facets1 is the cell group 'upper'; give a boundary group": lambda: pair(tags["upper"], lower),
-        "facets2 is 'lower_top'; give a boundary group, such as tags": lambda: pair(upper, "lower_top"),
-        "boundary group 'none' is empty: choose a group": lambda: pair(upper, part(lower, "none", 9, 9)),
-        "no part of 'upper_left' lies opposite 'upper_bottom', along": lambda: pair(upper, tags["upper_left"]),
-        r"'upper_top' lies 1 m behind 'upper_bottom' at \(.*\): the bod": lambda: pair(upper, tags["upper_top"]),
+        "facets1 is the cell group 'upper'; give a boundary group": lambda: pair(
+            tags["upper"], lower
+        ),
+        "facets2 is 'lower_top'; give a boundary group, such as tags": lambda: pair(
+            upper, "lower_top"
+        ),
+        "boundary group 'none' is empty: choose a group": lambda: pair(
+            upper, part(lower, "none", 9, 9)
+        ),
+        "no part of 'upper_left' lies opposite 'upper_bottom', along": lambda: pair(
+            upper, tags["upper_left"]
+        ),
+        r"'upper_top' lies 1 m behind 'upper_bottom' at \(.*\): the bod": lambda: pair(
+            upper, tags["upper_top"]
+        ),
         r"a facet of both 'hull' and 'lower_top' at \(.*\): a facet cannot": lambda: pair(
-            group(tags, ["upper_bottom", "lower_top"]), lower),
+            group(tags, ["upper_bottom", "lower_top"]), lower
+        ),
         "on several contact surfaces with one contact direction: list every boundary and every pair once, and "
         "join boundaries that continue one another": lambda: joined_surfaces(
-            pair(part(upper, "left", 0.0, 0.9), lower), pair(part(upper, "right", 0.9, 1.5), lower)),
+            pair(part(upper, "left", 0.0, 0.9), lower), pair(part(upper, "right", 0.9, 1.5), lower)
+        ),
         "is on side 1 of one contact pair and on side 2 of another: where cracks cross, give .* "
-        "once if both are the same": lambda: joined_surfaces(pair(upper, lower), pair(lower, upper)),
+        "once if both are the same": lambda: joined_surfaces(
+            pair(upper, lower), pair(lower, upper)
+        ),
     }
     for sentence, ask in cases.items():
         with pytest.raises(InputError, match=sentence):
@@ -531,18 +724,39 @@ def spoilt(corner: tuple[float, float, float], to: tuple[float, float, float]) -
 
 
 @pytest.mark.two_ranks
-@pytest.mark.parametrize(("simplices", "to", "sentence"), [
-    (False, (0.5, 1.0, np.nan), "TwoBlocks has nodes whose coordinates are not numbers"),
-    (False, (0.95, 1.0, 1.15), "1 cell of TwoBlocks has crossing sides, first at"),
-    (False, (0.75, 1.0, 0.9 - 1e-9), "a facet of 'upper_bottom' at .* is a sliver or not convex: its normal cannot"),
-    (True, (1e-9, 1.0, 0.6), "a facet of 'upper_bottom' at .* is a sliver or not convex: its normal cannot be trusted"),
-    (True, (0.5, 0.8, 0.6), r"'lower_top' lies 0\..* m behind 'upper_bottom' at \(.*\): the bodies overlap there, or"),
-])
+@pytest.mark.parametrize(
+    ("simplices", "to", "sentence"),
+    [
+        (False, (0.5, 1.0, np.nan), "TwoBlocks has nodes whose coordinates are not numbers"),
+        (False, (0.95, 1.0, 1.15), "1 cell of TwoBlocks has crossing sides, first at"),
+        (
+            False,
+            (0.75, 1.0, 0.9 - 1e-9),
+            "a facet of 'upper_bottom' at .* is a sliver or not convex: its normal cannot",
+        ),
+        (
+            True,
+            (1e-9, 1.0, 0.6),
+            "a facet of 'upper_bottom' at .* is a sliver or not convex: its normal cannot be trusted",
+        ),
+        (
+            True,
+            (0.5, 0.8, 0.6),
+            r"'lower_top' lies 0\..* m behind 'upper_bottom' at \(.*\): the bodies overlap there, or",
+        ),
+    ],
+)
 def test_refused_facets_of_a_mesh(simplices, to, sentence):
     """Nodes without a place, cells turned inside out, quadrilaterals with a straight corner, slivers, overlap."""
-    upper = BlockMesh(lengths=(1.5, 1.0, 1.2), divisions=(3, 2, 2), simplices=simplices,
-                      deform=spoilt((0.5, 1.0, 0.6), to))
+    upper = BlockMesh(
+        lengths=(1.5, 1.0, 1.2),
+        divisions=(3, 2, 2),
+        simplices=simplices,
+        deform=spoilt((0.5, 1.0, 0.6), to),
+    )
     lower = BlockMesh(lengths=(1.5, 1.0, 1.2), divisions=(2, 2, 3), simplices=simplices)
     with pytest.raises(InputError, match=sentence):
         built, tags = build_mesh(TwoBlocks(upper=upper, lower=lower), COMM)
-        contact_pair(assemble(built, SOFT), tags["upper_bottom"], tags["lower_top"], matching=DualMortar())
+        contact_pair(
+            assemble(built, SOFT), tags["upper_bottom"], tags["lower_top"], matching=DualMortar()
+        )

@@ -44,7 +44,9 @@ def problem(comm: Any, spec: dict[str, Any], solver: Any) -> ContactProblem:
     surface = contact_surface(system, tags["right"], obstacle=wall)
     friction = Coulomb(0.3) if d > 1 and not isinstance(solver, Volume) else Frictionless()
     shake = Harmonic(30.0, 40.0, direction=tuple(across + 0.3 * np.eye(d)[-1]))
-    return ContactProblem(system, surface, friction=friction, excitation=shake, mass=ConsistentMass())
+    return ContactProblem(
+        system, surface, friction=friction, excitation=shake, mass=ConsistentMass()
+    )
 
 
 def direction(spec: dict[str, Any]) -> Any:
@@ -53,19 +55,35 @@ def direction(spec: dict[str, Any]) -> Any:
     return np.array([np.cos(angle), np.sin(angle), 0.0][: len(spec["lengths"])])
 
 
-def shaken(body: ContactProblem, spec: dict[str, Any], out: Path | None, steps: int, **more: Any) -> Solution:
+def shaken(
+    body: ContactProblem, spec: dict[str, Any], out: Path | None, steps: int, **more: Any
+) -> Solution:
     """A run with all recorders."""
     record = [Energy(), Contact(), Probe({"end": tuple(2.0 * direction(spec))}, acceleration=True)]
     return simulate(
-        body, scheme=ZienkiewiczWoodTaylor(), dt=5e-4, steps=steps, record=record, out=out, progress=False,
-        fields=None if out is None else XDMF(every=10), **more,
+        body,
+        scheme=ZienkiewiczWoodTaylor(),
+        dt=5e-4,
+        steps=steps,
+        record=record,
+        out=out,
+        progress=False,
+        fields=None if out is None else XDMF(every=10),
+        **more,
     )
 
 
-CASES = [("bar", Condensed()), ("triangles", Condensed()), ("turned", Volume()), ("hexahedra", Condensed())]
+CASES = [
+    ("bar", Condensed()),
+    ("triangles", Condensed()),
+    ("turned", Volume()),
+    ("hexahedra", Condensed()),
+]
 
 
-@pytest.mark.parametrize(("name", "solver"), CASES, ids=[f"{name} {type(solver).__name__}" for name, solver in CASES])
+@pytest.mark.parametrize(
+    ("name", "solver"), CASES, ids=[f"{name} {type(solver).__name__}" for name, solver in CASES]
+)
 def test_a_rank_without_nodes(comm: Any, shared_tmp: Path, name: str, solver: Any) -> None:
     """Assembly, contact, recorders, fields, checkpoint and restart, as on one rank."""
     from mpi4py import MPI

@@ -40,11 +40,20 @@ DT = 1.0 / 560.0
 RUBBER = LinearElastic(E=3.0e6, nu=0.3, rho=1000.0)
 
 
-def run(problem: ContactProblem, out: Path | None, steps: int = 12, every: int = 5, **more: Any) -> Solution:
+def run(
+    problem: ContactProblem, out: Path | None, steps: int = 12, every: int = 5, **more: Any
+) -> Solution:
     """A run with fields."""
     fields = None if out is None else XDMF(every=every)
     return simulate(
-        problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=DT, steps=steps, out=out, fields=fields, **more
+        problem,
+        scheme=ZienkiewiczWoodTaylor(),
+        solver=Condensed(),
+        dt=DT,
+        steps=steps,
+        out=out,
+        fields=fields,
+        **more,
     )
 
 
@@ -54,7 +63,10 @@ def frames(folder: Path) -> list[dict[str, Any]]:
     for grid in ET.parse(folder / "fields.xdmf").getroot().iter("Grid"):
         if grid.get("GridType") != "Uniform":
             continue
-        arrays = {"t": float(grid.find("Time").get("Value")), "type": grid.find("Topology").get("TopologyType")}
+        arrays = {
+            "t": float(grid.find("Time").get("Value")),
+            "type": grid.find("Topology").get("TopologyType"),
+        }
         arrays["cells"] = read(folder, grid.find("Topology/DataItem"))
         arrays["points"] = read(folder, grid.find("Geometry/DataItem"))
         for attribute in grid.findall("Attribute"):
@@ -84,17 +96,30 @@ def measure(points: Any, cells: Any) -> Any:
         return 0.5 * np.sum(x[..., 0] * after[..., 1] - x[..., 1] * after[..., 0], axis=1)
     faces = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)]
     if cells.shape[1] == 8:
-        squares = [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
+        squares = [
+            (0, 3, 2, 1),
+            (4, 5, 6, 7),
+            (0, 1, 5, 4),
+            (1, 2, 6, 5),
+            (2, 3, 7, 6),
+            (3, 0, 4, 7),
+        ]
         faces = [triangle for a, b, c, d in squares for triangle in ((a, b, c), (a, c, d))]
-    return sum(np.einsum("ij,ij->i", np.cross(x[:, a], x[:, b]), x[:, c]) / 6.0 for a, b, c in faces)
+    return sum(
+        np.einsum("ij,ij->i", np.cross(x[:, a], x[:, b]), x[:, c]) / 6.0 for a, b, c in faces
+    )
 
 
 # Stresses ------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("section", [PlaneStrain(), PlaneStrain(0.25), PlaneStress(0.2), PlaneStress()], ids=repr)
+@pytest.mark.parametrize(
+    "section", [PlaneStrain(), PlaneStrain(0.25), PlaneStress(0.2), PlaneStress()], ids=repr
+)
 @pytest.mark.parametrize("simplices", [False, True])
-def test_von_mises_of_uniform_plane_stress_and_strain(comm: Any, section: Section, simplices: bool) -> None:
+def test_von_mises_of_uniform_plane_stress_and_strain(
+    comm: Any, section: Section, simplices: bool
+) -> None:
     """sigma_v² = s_x² + s_y² + s_z² - s_x s_y - s_y s_z - s_z s_x + 3 s_xy², with Hooke's law written out."""
     mesh, _ = block(comm, lengths=(2.0, 1.0), divisions=(3, 2), simplices=simplices, angle=0.4)
     system = assemble(mesh, RUBBER, section=section)
@@ -134,13 +159,17 @@ def test_von_mises_of_bending_is_a_cell_mean(comm: Any) -> None:
     x, y = system.space.points.T
     stress = VonMises(system.space.forms)(np.column_stack([x * y, 0.0 * x]))
     numbers = np.asarray(mesh.topology.original_cell_index)[: len(stress)]
-    values = [value for _, value in sorted(sum(comm.allgather(list(zip(numbers, stress, strict=True))), []))]
+    values = [
+        value
+        for _, value in sorted(sum(comm.allgather(list(zip(numbers, stress, strict=True))), []))
+    ]
     points, weights = np.polynomial.legendre.leggauss(20)
     s, w = 0.5 * (points + 1.0), 0.5 * weights
     for value, low in zip(values, (1.0, 1.5), strict=True):
         mean = sum(
             a * b * sqrt((low + 0.5 * t) ** 2 + 3.0 * (0.5 * r) ** 2)
-            for r, a in zip(s, w, strict=True) for t, b in zip(s, w, strict=True)
+            for r, a in zip(s, w, strict=True)
+            for t, b in zip(s, w, strict=True)
         )
         assert value == pytest.approx(mean, rel=2e-3)  # two Gauss points per axis
 
@@ -161,15 +190,24 @@ def test_frames_hold_the_run(comm: Any, shared_tmp: Path) -> None:
         _, v = field(problem.system, problem.cartesian(state.v))
         assert frame["t"] == state.t
         for name, exact in (("points", points), ("u", u), ("v", v)):
-            assert np.allclose(frame[name][:, :2], exact, rtol=0.0, atol=1e-10 * np.max(np.abs(exact), initial=1e-300))
+            assert np.allclose(
+                frame[name][:, :2],
+                exact,
+                rtol=0.0,
+                atol=1e-10 * np.max(np.abs(exact), initial=1e-300),
+            )
             assert frame[name].shape[1] == 3 and not frame[name][:, 2].any()
-        near = [int(np.argmin(np.linalg.norm(points - x, axis=1))) for x in seen(problem.surface).points]
+        near = [
+            int(np.argmin(np.linalg.norm(points - x, axis=1))) for x in seen(problem.surface).points
+        ]
         status, pressure = np.zeros(len(points), int), np.zeros(len(points))
         contact = seen(problem.surface)
         status[near] = np.where(contact.all(state.active), 2, 1)
         pressure[near] = contact.all(state.r_n) / contact.weights
         assert frame["contact_status"].tolist() == status.tolist()
-        assert np.allclose(frame["contact_pressure"], pressure, rtol=1e-9, atol=1e-9 * pressure.max())
+        assert np.allclose(
+            frame["contact_pressure"], pressure, rtol=1e-9, atol=1e-9 * pressure.max()
+        )
     assert not found[0]["a"].any() and found[1]["a"].any()
     assert (found[2]["contact_status"] == 2).any()
 
@@ -179,21 +217,41 @@ def test_friction_in_the_frames(comm: Any, shared_tmp: Path) -> None:
     """Status 2 where a point sticks and 3 where it slipped; traction and slip as vectors along the turned tangents."""
     problem = tipped(comm, ROUGH_ON_ONE_SIDE[0], simplices=True, angle=0.3)
     surface = seen(problem.surface)
-    simulate(problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=BOX_DT, steps=24, out=shared_tmp,
-             fields=XDMF(every=1))
+    simulate(
+        problem,
+        scheme=ZienkiewiczWoodTaylor(),
+        solver=Condensed(),
+        dt=BOX_DT,
+        steps=24,
+        out=shared_tmp,
+        fields=XDMF(every=1),
+    )
     found = frames(shared_tmp)
-    nodes = [int(np.argmin(np.linalg.norm(found[0]["points"][:, :2] - x, axis=1))) for x in surface.points]
+    nodes = [
+        int(np.argmin(np.linalg.norm(found[0]["points"][:, :2] - x, axis=1)))
+        for x in surface.points
+    ]
     others = np.setdiff1d(np.arange(len(found[0]["points"])), nodes)
-    tangents = np.column_stack([-surface.normals[:, 1], surface.normals[:, 0], np.zeros(surface.count)])
+    tangents = np.column_stack(
+        [-surface.normals[:, 1], surface.normals[:, 0], np.zeros(surface.count)]
+    )
     found_status = set()
-    for frame, (state, report) in zip(found[1:], march(problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(),
-                                                       dt=BOX_DT, steps=24), strict=True):
+    for frame, (state, report) in zip(
+        found[1:],
+        march(problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=BOX_DT, steps=24),
+        strict=True,
+    ):
         slips = (surface.tangential_values(report.result.x) != surface.all(report.step.slip0))[:, 0]
         status = np.where(surface.all(state.active), np.where(slips, 3, 2), 1)
         assert frame["contact_status"][nodes].tolist() == status.tolist()
-        traction, slip = surface.all(state.r_t) / surface.weights[:, None], surface.tangential_values(state.u)
+        traction, slip = (
+            surface.all(state.r_t) / surface.weights[:, None],
+            surface.tangential_values(state.u),
+        )
         for name, exact in (("contact_traction_t", traction * tangents), ("slip", slip * tangents)):
-            assert np.allclose(frame[name][nodes], exact, rtol=0.0, atol=1e-10 * np.abs(exact).max())
+            assert np.allclose(
+                frame[name][nodes], exact, rtol=0.0, atol=1e-10 * np.abs(exact).max()
+            )
             assert not frame[name][others].any()
         found_status |= set(frame["contact_status"].tolist())
         assert np.abs(frame["slip"]).max() > 0.0
@@ -229,7 +287,10 @@ def test_contact_beside_the_frames(comm: Any) -> None:
     for _, report in march(problem, scheme=ZienkiewiczWoodTaylor(), dt=BOX_DT, steps=12):
         row, exact = thin.row(report), whole.row(report)
         assert set(exact) - set(row) == {"pressure", "gap", "active", "traction_t", "slip"}
-        assert all(row[name] == pytest.approx(exact[name], rel=1e-10, abs=1e-300, nan_ok=True) for name in row)
+        assert all(
+            row[name] == pytest.approx(exact[name], rel=1e-10, abs=1e-300, nan_ok=True)
+            for name in row
+        )
     assert row["contact_active"] > 0 and row["contact_max_slip"] > 0.0
     assert 1 <= counting.most <= 12 < problem.surface.total
 
@@ -238,8 +299,15 @@ def test_friction_in_space(comm: Any, shared_tmp: Path) -> None:
     """Vectors lie in the plane of the obstacle and are as long as r_t / weight; without friction
     the frames are as before."""
     problem = replace(thrown_box(comm, angle=0.3, divisions=(2, 2, 2)), friction=Coulomb(0.3))
-    solution = simulate(problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=BOX_DT, steps=8,
-                        out=shared_tmp / "box", fields=XDMF(every=8))
+    solution = simulate(
+        problem,
+        scheme=ZienkiewiczWoodTaylor(),
+        solver=Condensed(),
+        dt=BOX_DT,
+        steps=8,
+        out=shared_tmp / "box",
+        fields=XDMF(every=8),
+    )
     last, surface = frames(shared_tmp / "box")[-1], seen(problem.surface)
     size = np.linalg.norm(surface.all(solution.state.r_t), axis=1) / surface.weights
     nodes = [int(np.argmin(np.linalg.norm(last["points"] - x, axis=1))) for x in surface.points]
@@ -259,7 +327,9 @@ def test_acceleration_is_that_of_the_step(comm: Any, shared_tmp: Path) -> None:
     problem = ContactProblem(system, empty_surface(system.space.comm, 2))
     run(problem, shared_tmp, 2, 1)
     _, before, after = frames(shared_tmp)
-    assert np.allclose(after["a"], (after["v"] - before["v"]) / DT, rtol=0.0, atol=1e-9 * np.abs(after["a"]).max())
+    assert np.allclose(
+        after["a"], (after["v"] - before["v"]) / DT, rtol=0.0, atol=1e-9 * np.abs(after["a"]).max()
+    )
 
 
 @pytest.mark.two_ranks
@@ -300,7 +370,11 @@ def test_cells_in_the_order_of_vtk(
     problem = ContactProblem(system, contact_surface(system, tags["right"]))
     run(problem, shared_tmp, 1, 1)
     frame = frames(shared_tmp)[-1]
-    sizes = np.abs(measure(frame["points"], frame["cells"])) if simplices else measure(frame["points"], frame["cells"])
+    sizes = (
+        np.abs(measure(frame["points"], frame["cells"]))
+        if simplices
+        else measure(frame["points"], frame["cells"])
+    )
     assert frame["type"] == kind
     assert sizes.min() > 0.0 and sizes.sum() == pytest.approx(np.prod(lengths), rel=1e-12)
     if not simplices:
@@ -319,8 +393,19 @@ def test_files_do_not_depend_on_the_ranks(comm: Any, shared_tmp: Path) -> None:
         run(wall(MPI.COMM_SELF), shared_tmp / "one", 36, 12)
     comm.Barrier()
     for together, alone in zip(frames(shared_tmp / "all"), frames(shared_tmp / "one"), strict=True):
-        assert np.array_equal(together["cells"], alone["cells"]) and np.array_equal(together["points"], alone["points"])
-        for name in ("u", "v", "a", "von_mises", "contact_pressure", "contact_status", "contact_traction_t", "slip"):
+        assert np.array_equal(together["cells"], alone["cells"]) and np.array_equal(
+            together["points"], alone["points"]
+        )
+        for name in (
+            "u",
+            "v",
+            "a",
+            "von_mises",
+            "contact_pressure",
+            "contact_status",
+            "contact_traction_t",
+            "slip",
+        ):
             size = np.max(np.abs(alone[name]), initial=0.0)
             assert np.allclose(together[name], alone[name], rtol=0.0, atol=1e-10 * size), name
 
@@ -335,7 +420,15 @@ def test_restart_goes_on_after_the_frames_it_keeps(comm: Any, shared_tmp: Path) 
         late.write_bytes(b"of a step after the checkpoint")
     comm.Barrier()
     run(problem, shared_tmp, 12, 2, restart=True)
-    assert not late.exists() and [round(frame["t"] / DT) for frame in frames(shared_tmp)] == [0, 2, 4, 6, 8, 10, 12]
+    assert not late.exists() and [round(frame["t"] / DT) for frame in frames(shared_tmp)] == [
+        0,
+        2,
+        4,
+        6,
+        8,
+        10,
+        12,
+    ]
     run(problem, shared_tmp, 16, 2, restart=True)
     assert [round(frame["t"] / DT) for frame in frames(shared_tmp)] == list(range(0, 17, 2))
     run(problem, shared_tmp, 2, 2)
@@ -346,14 +439,27 @@ def test_restart_goes_on_after_the_frames_it_keeps(comm: Any, shared_tmp: Path) 
 @pytest.mark.slow
 def test_several_frames_in_a_file(comm: Any, shared_tmp: Path) -> None:
     """What a reader finds is the same as with a file for each, also after a restart that drops some of a file."""
-    problem, folders = shaken_wall(comm, angle=0.3, gap=1e-7), (shared_tmp / "each", shared_tmp / "packed")
+    problem, folders = (
+        shaken_wall(comm, angle=0.3, gap=1e-7),
+        (shared_tmp / "each", shared_tmp / "packed"),
+    )
     for folder, many in zip(folders, (1, 3), strict=True):
         for steps, restart in ((10, False), (19, True)):
-            simulate(problem, scheme=ZienkiewiczWoodTaylor(), dt=DT, steps=steps, out=folder, restart=restart,
-                     fields=XDMF(every=2, frames_per_file=many), checkpoint_every=10)
+            simulate(
+                problem,
+                scheme=ZienkiewiczWoodTaylor(),
+                dt=DT,
+                steps=steps,
+                out=folder,
+                restart=restart,
+                fields=XDMF(every=2, frames_per_file=many),
+                checkpoint_every=10,
+            )
         assert [round(frame["t"] / DT) for frame in frames(folder)] == list(range(0, 20, 2))
     for one, packed in zip(*(frames(folder) for folder in folders), strict=True):
-        assert one.keys() == packed.keys() and all(np.array_equal(one[name], packed[name]) for name in one)
+        assert one.keys() == packed.keys() and all(
+            np.array_equal(one[name], packed[name]) for name in one
+        )
     kept = sorted(path.name for path in (folders[1] / "fields").iterdir())
     assert kept == ["frame_000018.h5", *(f"frames_{k:06d}.h5" for k in (0, 6, 12)), "mesh.h5"]
     stored = read_frames(folders[1])
@@ -366,14 +472,23 @@ def test_restart_drops_late_frames_of_a_file(comm: Any, shared_tmp: Path) -> Non
     """A run killed behind its checkpoint has later frames in a file with earlier ones: only those are kept."""
     problem, checkpoint, kept = shaken_wall(comm), shared_tmp / "checkpoint.npz", b""
     for steps in (8, 12, 9):
-        simulate(problem, scheme=ZienkiewiczWoodTaylor(), dt=DT, steps=steps, out=shared_tmp, restart=steps != 8,
-                 fields=XDMF(every=2, frames_per_file=6))
+        simulate(
+            problem,
+            scheme=ZienkiewiczWoodTaylor(),
+            dt=DT,
+            steps=steps,
+            out=shared_tmp,
+            restart=steps != 8,
+            fields=XDMF(every=2, frames_per_file=6),
+        )
         comm.Barrier()
         if comm.rank == 0:
             kept = kept or checkpoint.read_bytes()
             checkpoint.write_bytes(kept)
         comm.Barrier()
-        assert [round(frame["t"] / DT) for frame in frames(shared_tmp)] == list(range(0, steps + 1, 2))
+        assert [round(frame["t"] / DT) for frame in frames(shared_tmp)] == list(
+            range(0, steps + 1, 2)
+        )
         comm.Barrier()
     with h5py.File(shared_tmp / "fields" / "frames_000000.h5") as file:
         assert list(file) == [f"{k:06d}" for k in (0, 2, 4, 6, 8)]
@@ -396,7 +511,9 @@ def test_index_is_readable_after_every_frame(comm: Any, shared_tmp: Path, many: 
             comm.Barrier()
             return {"looks": 1.0}
 
-    simulate(shaken_wall(comm), dt=DT, steps=6, out=shared_tmp, fields=XDMF(2, many), record=[Looks()])
+    simulate(
+        shaken_wall(comm), dt=DT, steps=6, out=shared_tmp, fields=XDMF(2, many), record=[Looks()]
+    )
     assert seen == [1, 1, 2, 2, 3, 3]
 
 

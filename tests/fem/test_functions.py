@@ -45,11 +45,17 @@ def with_field(problem: ContactProblem, A: Any) -> vc.State:
     return replace(initial_state(problem), u=u, v=2.0 * u)
 
 
-def on_sides(comm: Any, A: Any, integration: Any = "full", degree: int = 1, **spec: Any) -> ContactProblem:
+def on_sides(
+    comm: Any, A: Any, integration: Any = "full", degree: int = 1, **spec: Any
+) -> ContactProblem:
     """A body whose left side is moved by the field A x, and whose right side may touch an obstacle that is oblique."""
     mesh, tags = block(comm, **spec)
-    grown = fem.Prescribed(tags["left"], displacement=lambda x, t: x @ A.T, velocity=lambda x, t: 2.0 * x @ A.T,
-                           acceleration=lambda x, t: 0.0 * x)
+    grown = fem.Prescribed(
+        tags["left"],
+        displacement=lambda x, t: x @ A.T,
+        velocity=lambda x, t: 2.0 * x @ A.T,
+        acceleration=lambda x, t: 0.0 * x,
+    )
     system = fem.assemble(mesh, CONCRETE, prescribed=grown, integration=integration, degree=degree)
     d = mesh.geometry.dim
     wall = vc.HalfSpace((3.0,) * d, (-1.0,) * d)
@@ -57,10 +63,16 @@ def on_sides(comm: Any, A: Any, integration: Any = "full", degree: int = 1, **sp
 
 
 @pytest.mark.two_ranks
-@pytest.mark.parametrize("body, options", [
-    *((name, {}) for name in BODIES if name != "bar"), ("quadrilaterals", {"integration": "selective"}),
-    ("triangles", {"degree": 2}), ("quadrilaterals", {"degree": 2}),
-], ids=str)
+@pytest.mark.parametrize(
+    "body, options",
+    [
+        *((name, {}) for name in BODIES if name != "bar"),
+        ("quadrilaterals", {"integration": "selective"}),
+        ("triangles", {"degree": 2}),
+        ("quadrilaterals", {"degree": 2}),
+    ],
+    ids=str,
+)
 def test_values_of_a_state(comm: Any, body: str, options: dict[str, Any]) -> None:
     """u and v are those of the state in Cartesian axes, though contact frames are turned, with the prescribed sides and
     with ghosts; the stress of a patch is Hooke's, in every cell and projected."""
@@ -84,8 +96,13 @@ def test_values_of_a_state(comm: Any, body: str, options: dict[str, Any]) -> Non
 def test_tied_sides_move_together(comm: Any) -> None:
     """A layer under its weight whose sides are tied: u is that of a column at every node, those that follow too."""
     mesh, tags = block(comm, lengths=(2.0, 1.0), divisions=(4, 3))
-    system = fem.assemble(mesh, vc.LinearElastic(1.0e6, 0.0, 1.0), clamped=tags["bottom"],
-                          tied=fem.Tied(tags["left"], tags["right"]), loads=fem.BodyForce((0.0, -600.0)))
+    system = fem.assemble(
+        mesh,
+        vc.LinearElastic(1.0e6, 0.0, 1.0),
+        clamped=tags["bottom"],
+        tied=fem.Tied(tags["left"], tags["right"]),
+        loads=fem.BodyForce((0.0, -600.0)),
+    )
     problem = linear(system)
     x, values = nodes(fem.as_function(problem, vc.static_equilibrium(problem), "u"))
     exact = -600.0 / 1.0e6 * (x[:, 1] - 0.5 * x[:, 1] ** 2)
@@ -97,10 +114,14 @@ def test_tied_sides_move_together(comm: Any) -> None:
 def test_stress_of_bending_is_in_the_space_of_a_quadrilateral(comm: Any, continuous: bool) -> None:
     """u = (x y, 0), nu = 0, E = 1, plane stress: sigma_xx = y, sigma_xy = x/2, sigma_yy = 0: bilinear in every cell."""
     mesh, _ = block(comm, lengths=(1.0, 1.0), divisions=(2, 3))
-    problem = linear(fem.assemble(mesh, vc.LinearElastic(1.0, 0.0, 1.0), section=vc.PlaneStress(0.2)))
+    problem = linear(
+        fem.assemble(mesh, vc.LinearElastic(1.0, 0.0, 1.0), section=vc.PlaneStress(0.2))
+    )
     x, y = problem.system.space.points.T
     u = problem.system.space.restrict(np.column_stack([x * y, 0.0 * x]))
-    stress = fem.as_function(problem, replace(initial_state(problem), u=u), "stress", continuous=continuous)
+    stress = fem.as_function(
+        problem, replace(initial_state(problem), u=u), "stress", continuous=continuous
+    )
     (x, y), values = nodes(stress)[0].T, nodes(stress)[1]
     assert ends(comm, np.abs(values - np.column_stack([y, 0.5 * x, 0.5 * x, 0.0 * x]))) < 1e-11
 
@@ -111,13 +132,22 @@ def test_projection_of_a_jump(comm: Any) -> None:
     mesh, _ = block(comm, lengths=(3.0,), divisions=(3,))
     problem = linear(fem.assemble(mesh, vc.LinearElastic(1.0, 0.0, 1.0)))
     x = problem.system.space.points[:, 0]
-    u = problem.system.space.restrict(np.interp(x, [0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 1.0, 3.0])[:, None])
+    u = problem.system.space.restrict(
+        np.interp(x, [0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 1.0, 3.0])[:, None]
+    )
     state = replace(initial_state(problem), u=u)
-    mass = np.array([[2.0, 1.0, 0.0, 0.0], [1.0, 4.0, 1.0, 0.0], [0.0, 1.0, 4.0, 1.0], [0.0, 0.0, 1.0, 2.0]]) / 6.0
+    mass = (
+        np.array(
+            [[2.0, 1.0, 0.0, 0.0], [1.0, 4.0, 1.0, 0.0], [0.0, 1.0, 4.0, 1.0], [0.0, 0.0, 1.0, 2.0]]
+        )
+        / 6.0
+    )
     exact = np.linalg.solve(mass, [0.5, 0.5, 1.0, 1.0])
     for continuous, values in (True, exact), (False, np.array([1.0, 0.0, 2.0])):
         stress = fem.as_function(problem, state, "stress", continuous=continuous)
-        x = compat.lagrange(mesh, int(continuous), continuous=continuous).tabulate_dof_coordinates()[:, 0]
+        x = compat.lagrange(
+            mesh, int(continuous), continuous=continuous
+        ).tabulate_dof_coordinates()[:, 0]
         places = np.rint(x) if continuous else np.floor(x)
         assert ends(comm, np.abs(stress.x.array - values[places.astype(int)])) < 1e-12
 
@@ -149,14 +179,18 @@ def test_stored_frames(comm: Any, shared_tmp: Path) -> None:
     """A frame by its time or number is what XDMF shows, in the numbers of the input; a restart ends in the same."""
     problem = shaken_wall(comm, angle=0.3)
     first = vc.simulate(problem, steps=22, out=shared_tmp, fields=fem.XDMF(11), **RUN)
-    solution = vc.simulate(problem, steps=33, out=shared_tmp, fields=fem.XDMF(11), restart=True, **RUN)
+    solution = vc.simulate(
+        problem, steps=33, out=shared_tmp, fields=fem.XDMF(11), restart=True, **RUN
+    )
     assert first.state.k == 22
     space = problem.system.space
     for number, k in enumerate((0, 11, 22, 33)):
         u, v = (solution.function(name, frame=number) for name in "uv")
         with h5py.File(shared_tmp / "fields" / f"frame_{k:06d}.h5") as file:
             for name, found in ("u", u), ("v", v):
-                assert np.array_equal(found.x.array[: space.free.size], file[name][:][space.nodes, :2].ravel())
+                assert np.array_equal(
+                    found.x.array[: space.free.size], file[name][:][space.nodes, :2].ravel()
+                )
         again = solution.function("u", t=solution.history["t"][k] * (1.0 + 1e-14))
         assert np.array_equal(u.x.array, again.x.array)
     for name in ("u", "v", "stress", "contact_pressure"):
@@ -179,9 +213,15 @@ def test_frames_of_one_rank_are_read_on_all(comm: Any, shared_tmp: Path) -> None
     expected = own.function("u").x.array
     assert ends(comm, np.abs(u.x.array - expected)) < 1e-9 * ends(comm, np.abs(expected))
     stored = r"the 3 frames are at t = 0, 0\.00357142857, 0\.00714285714 s"
-    for wanted, words in ({"t": 0.5}, f"no frame at t = 0.5 s: {stored}"), ({"frame": 3}, f"no frame 3: {stored}"), (
-            {"frame": -4}, "no frame -4"), ({}, "give either t or frame"), ({"t": 0.0, "frame": 0}, "and not both"), (
-            {"t": "now"}, "t is 'now'"), ({"frame": 0.5}, "frame is 0.5"):
+    for wanted, words in (
+        ({"t": 0.5}, f"no frame at t = 0.5 s: {stored}"),
+        ({"frame": 3}, f"no frame 3: {stored}"),
+        ({"frame": -4}, "no frame -4"),
+        ({}, "give either t or frame"),
+        ({"t": 0.0, "frame": 0}, "and not both"),
+        ({"t": "now"}, "t is 'now'"),
+        ({"frame": 0.5}, "frame is 0.5"),
+    ):
         with pytest.raises(vc.InputError, match=words):
             fem.read_function(problem, shared_tmp, "u", **wanted)
     with pytest.raises(vc.InputError, match="are of another mesh"):
@@ -190,7 +230,9 @@ def test_frames_of_one_rank_are_read_on_all(comm: Any, shared_tmp: Path) -> None
         fem.read_function(problem, shared_tmp / "none", "u", frame=0)
     with pytest.raises(vc.InputError, match="the run kept no frames"):
         own.function("u", frame=0)
-    with pytest.raises(vc.InputError, match="'w' is not a quantity; give one of 'u', 'v', 'stress', 'contact_p"):
+    with pytest.raises(
+        vc.InputError, match="'w' is not a quantity; give one of 'u', 'v', 'stress', 'contact_p"
+    ):
         own.function("w")
     with pytest.raises(vc.InputError, match="the state has u of shape"):
         fem.as_function(shaken_wall(comm, divisions=(8, 8)), own.state, "u")

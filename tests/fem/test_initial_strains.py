@@ -31,14 +31,29 @@ from vi_contact.solvers.volume.route import Volume
 
 COMM = MPI.COMM_WORLD
 E, NU, WARM = 2.0e10, 0.2, 3.0e-4  # WARM: alpha (T - T_0), 30 K of concrete
-WOOD = Orthotropic(E1=1.1e10, E2=0.9e9, E3=0.5e9, nu12=0.3, nu13=0.35, nu23=0.4, G12=0.7e9, G13=0.6e9, G23=0.1e9,
-                   rho=450.0, axes=0.4)
+WOOD = Orthotropic(
+    E1=1.1e10,
+    E2=0.9e9,
+    E3=0.5e9,
+    nu12=0.3,
+    nu13=0.35,
+    nu23=0.4,
+    G12=0.7e9,
+    G13=0.6e9,
+    G23=0.1e9,
+    rho=450.0,
+    axes=0.4,
+)
 
 
-def followed(d: int, exact: Any, load: Any, *, material: Any = CONCRETE, **options: Any) -> tuple[Any, State, float]:
+def followed(
+    d: int, exact: Any, load: Any, *, material: Any = CONCRETE, **options: Any
+) -> tuple[Any, State, float]:
     """(problem, state, largest error of u over the largest u) of a block whose left side moves as it would free."""
     simplices = options.pop("simplices", False)
-    mesh, tags = block(COMM, lengths=(2.0, 1.0, 1.5)[:d], divisions=(3, 2, 1)[:d], simplices=simplices)
+    mesh, tags = block(
+        COMM, lengths=(2.0, 1.0, 1.5)[:d], divisions=(3, 2, 1)[:d], simplices=simplices
+    )
     side = fem.Prescribed(tags["left"], displacement=lambda x, t: exact(x))
     system = fem.assemble(mesh, material, prescribed=side, loads=load, **options)
     problem = linear(system)
@@ -55,8 +70,15 @@ def stress(problem: ContactProblem, state: State) -> Array:
 
 @pytest.mark.parametrize(
     ("d", "options"),
-    [(1, {}), (2, {}), (2, {"degree": 2, "simplices": True}), (2, {"section": PlaneStress(0.2)}), (3, {}),
-     (2, {"integration": "selective"}), (2, {"material": WOOD, "section": PlaneStress(0.2)})],
+    [
+        (1, {}),
+        (2, {}),
+        (2, {"degree": 2, "simplices": True}),
+        (2, {"section": PlaneStress(0.2)}),
+        (3, {}),
+        (2, {"integration": "selective"}),
+        (2, {"material": WOOD, "section": PlaneStress(0.2)}),
+    ],
     ids=["bar", "Q1", "P2", "panel", "hexahedra", "selective", "wood"],
 )
 def test_uniform_warming_leaves_a_free_body_without_stress(d, options):
@@ -64,7 +86,9 @@ def test_uniform_warming_leaves_a_free_body_without_stress(d, options):
     (1 + nu)/(1 - nu) times in a bar, which is held sideways twice."""
     plane = d == 2 and not isinstance(options.get("section"), PlaneStress)
     share = 1.0 + NU if plane else (1.0 + NU) / (1.0 - NU) if d == 1 else 1.0
-    problem, state, error = followed(d, lambda x: share * WARM * x, fem.InitialStrain(WARM), **options)
+    problem, state, error = followed(
+        d, lambda x: share * WARM * x, fem.InitialStrain(WARM), **options
+    )
     assert error < 1e-11
     assert max_over_ranks(COMM, stress(problem, state)) < 1e-9 * E * WARM
     mises = VonMises(problem.system.space.forms)(problem.system.space.expand(state.u, 0.0))
@@ -72,7 +96,9 @@ def test_uniform_warming_leaves_a_free_body_without_stress(d, options):
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize(("d", "simplices"), [(2, False), (2, True), (3, True)], ids=["Q2", "P2", "P2 in space"])
+@pytest.mark.parametrize(
+    ("d", "simplices"), [(2, False), (2, True), (3, True)], ids=["Q2", "P2", "P2 in space"]
+)
 def test_warming_linear_in_space_bends_a_free_body_without_stress(d, simplices):
     """T - T_0 ~ 1 + x: u = e (x + (x² - y² - z²)/2, (1 + x) y, (1 + x) z), which degree 2 holds."""
     share = WARM * (1.0 + NU if d == 2 else 1.0)
@@ -93,12 +119,23 @@ def test_tensors_and_parts_of_a_body():
     gradient = WARM * np.array([[1.0, 3.0], [-0.5, -2.0]])
     problem, state, error = followed(2, lambda x: x @ gradient.T, fem.InitialStrain(gradient))
     sizes = [error, max_over_ranks(COMM, stress(problem, state)) / (E * WARM)]
-    across = np.diag([0.0, 0.0, WARM])  # sigma_xx = 0 again where the plane contracts as a bar that is pulled along z
+    across = np.diag(
+        [0.0, 0.0, WARM]
+    )  # sigma_xx = 0 again where the plane contracts as a bar that is pulled along z
     problem, state, error = followed(2, lambda x: NU * WARM * x, fem.InitialStrain(across))
     sizes += [error, max_over_ranks(COMM, stress(problem, state)) / (E * WARM)]
-    Q = WOOD._rotation[:2, :2]  # in plane strain wood takes sigma_zz = -E3 alpha dT, and contracts by nu_i3 / E_i of it
-    gradient = WARM * Q @ np.diag([1.0 + WOOD.nu13 * WOOD.E3 / WOOD.E1, 1.0 + WOOD.nu23 * WOOD.E3 / WOOD.E2]) @ Q.T
-    problem, state, error = followed(2, lambda x: x @ gradient, fem.InitialStrain(WARM), material=WOOD)
+    Q = WOOD._rotation[
+        :2, :2
+    ]  # in plane strain wood takes sigma_zz = -E3 alpha dT, and contracts by nu_i3 / E_i of it
+    gradient = (
+        WARM
+        * Q
+        @ np.diag([1.0 + WOOD.nu13 * WOOD.E3 / WOOD.E1, 1.0 + WOOD.nu23 * WOOD.E3 / WOOD.E2])
+        @ Q.T
+    )
+    problem, state, error = followed(
+        2, lambda x: x @ gradient, fem.InitialStrain(WARM), material=WOOD
+    )
     sizes += [error, max_over_ranks(COMM, stress(problem, state)) / (E * WARM)]
     mises = VonMises(problem.system.space.forms)(problem.system.space.expand(state.u, 0.0))
     sizes.append(max_over_ranks(COMM, mises / (WOOD.E3 * WARM) - 1.0))
@@ -109,7 +146,11 @@ def layer(h: float, d: int = 2) -> tuple[Any, Any, Any]:
     """(mesh, groups, cells between x = 1 and x = 1 + h) of a bar or block 2 m long."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0)[:d], divisions=(round(2.0 / h), 2)[:d])
     eps = 1e-6
-    return mesh, tags, fem.Cells.where("slip", mesh, lambda x: (x[0] > 1.0 - eps) & (x[0] < 1.0 + h + eps))
+    return (
+        mesh,
+        tags,
+        fem.Cells.where("slip", mesh, lambda x: (x[0] > 1.0 - eps) & (x[0] < 1.0 + h + eps)),
+    )
 
 
 @pytest.mark.parametrize("h", [0.5, 0.125])
@@ -124,9 +165,19 @@ def test_a_dislocation_moves_half_a_body_or_strains_one_that_is_held(h):
     u, x = free.system.space.expand(state.u, 0.0), free.system.space.points[:, :1]
     assert max_over_ranks(COMM, u - b * np.clip((x - 1.0) / h, 0.0, 1.0)) < 1e-10 * b[1]
     assert max_over_ranks(COMM, stress(free, state)) < 1e-8 * E * b[1]
-    level = fem.Prescribed(tags["top"], components=(1,)), fem.Prescribed(tags["bottom"], components=(1,))
-    held = linear(fem.assemble(mesh, LinearElastic(E, 0.0, 2400.0), clamped=[tags["left"], tags["right"]],
-                               prescribed=level, loads=fem.InitialStrain(np.diag([b[0], 0.0]) / h, cells=cells)))
+    level = (
+        fem.Prescribed(tags["top"], components=(1,)),
+        fem.Prescribed(tags["bottom"], components=(1,)),
+    )
+    held = linear(
+        fem.assemble(
+            mesh,
+            LinearElastic(E, 0.0, 2400.0),
+            clamped=[tags["left"], tags["right"]],
+            prescribed=level,
+            loads=fem.InitialStrain(np.diag([b[0], 0.0]) / h, cells=cells),
+        )
+    )
     found = stress(held, static_equilibrium(held, solver=Condensed())).reshape(-1, 4)[:, 0]
     assert max_over_ranks(COMM, found + E * b[0] / 2.0) < 1e-8 * E * b[0]
 
@@ -135,8 +186,15 @@ def between_walls(gap: float, history: Any = None) -> ContactProblem:
     """A block 1 m high on frictionless ground below a ceiling, warmed; its sides are free."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 3))
     load = fem.InitialStrain(WARM, history=history)
-    system = fem.assemble(mesh, CONCRETE, loads=load, prescribed=[
-        fem.Prescribed(tags["bottom"], components=(1,)), fem.Prescribed(tags["left"], components=(0,))])
+    system = fem.assemble(
+        mesh,
+        CONCRETE,
+        loads=load,
+        prescribed=[
+            fem.Prescribed(tags["bottom"], components=(1,)),
+            fem.Prescribed(tags["left"], components=(0,)),
+        ],
+    )
     ceiling = HalfSpace(point=(0.0, 1.0 + gap), normal=(0.0, -1.0))
     return ContactProblem(system, fem.contact_surface(system, tags["top"], obstacle=ceiling))
 
@@ -146,8 +204,12 @@ def test_warming_closes_a_gap_and_presses_by_both_routes():
     free, times, answers = (1.0 + NU) * WARM, [0.2, 0.6, 1.0], []
     for solver in (Condensed(), Volume()):
         problem = between_walls(0.4 * free, lambda t: t)
-        answers.append([problem.surface.everywhere(state.r_n / problem.surface.weights)
-                        for state in quasi_static(problem, times, solver=solver)])
+        answers.append(
+            [
+                problem.surface.everywhere(state.r_n / problem.surface.weights)
+                for state in quasi_static(problem, times, solver=solver)
+            ]
+        )
     expected = [max(0.0, E / (1.0 - NU**2) * (t - 0.4) * free) for t in times]
     for found in answers:
         for p, exact in zip(found, expected, strict=True):
@@ -157,7 +219,9 @@ def test_warming_closes_a_gap_and_presses_by_both_routes():
 def warmed_bar(n: int, gap: float) -> ContactProblem:
     """A bar of n cells, its left end held, the right one a gap before a wall, warmed all at once at t = 0."""
     mesh, tags = block(COMM, lengths=(2.0,), divisions=(n,))
-    system = fem.assemble(mesh, LinearElastic(E, 0.0, 2400.0), clamped=tags["left"], loads=fem.InitialStrain(WARM))
+    system = fem.assemble(
+        mesh, LinearElastic(E, 0.0, 2400.0), clamped=tags["left"], loads=fem.InitialStrain(WARM)
+    )
     wall = HalfSpace(point=(2.0 + gap,), normal=(-1.0,))
     return ContactProblem(system, fem.contact_surface(system, tags["right"], obstacle=wall))
 
@@ -174,13 +238,26 @@ def test_sudden_warming_sends_waves_of_its_stress():
         problem = warmed_bar(n, gap)
         foot = fem.Facets.where("foot", problem.system.space.mesh, lambda x: x[0] < 1e-9)
         held = fem.Reactions("support", foot, (0.0,))
-        runs.append(simulate(problem, scheme=Midpoint(), solver=solver, dt=0.5 * crossing / n, t_end=end * crossing,
-                             record=[Energy(), Contact(), held]).history)
+        runs.append(
+            simulate(
+                problem,
+                scheme=Midpoint(),
+                solver=solver,
+                dt=0.5 * crossing / n,
+                t_end=end * crossing,
+                record=[Energy(), Contact(), held],
+            ).history
+        )
     h = runs[0]
     t, push, pull = h["t"] / crossing, -h["contact_force_x"] / unit, h["reaction_x_support"] / unit
     impulse = float(np.sum(0.5 * (push[1:] + push[:-1]) * np.diff(t)))
-    assert impulse == pytest.approx(1.0, abs=0.045)  # 1.5 % here, 1.0 % and 0.6 % on 100 and 200 cells
-    middle = [np.mean(one[(t > a + 0.2) & (t < a + 0.8)]) for one, a in ((push, 1.0), (pull, 0.0), (pull, 1.0))]
+    assert impulse == pytest.approx(
+        1.0, abs=0.045
+    )  # 1.5 % here, 1.0 % and 0.6 % on 100 and 200 cells
+    middle = [
+        np.mean(one[(t > a + 0.2) & (t < a + 0.8)])
+        for one, a in ((push, 1.0), (pull, 0.0), (pull, 1.0))
+    ]
     assert middle == pytest.approx([1.0, 1.0, -1.0], abs=0.004)  # 0.12 %
     stored = 0.5 * E * WARM**2 * length
     assert h["energy_strain"][0] == pytest.approx(stored, rel=1e-12)
@@ -196,13 +273,26 @@ def test_histories_work_on_a_body_that_is_held():
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 3))
     level = [fem.Prescribed(tags[name], components=(1,)) for name in ("top", "bottom")]
     load = [fem.InitialStrain(np.diag([WARM, 0.0]), history=lambda t: t)]
-    system = fem.assemble(mesh, LinearElastic(E, 0.0, 2400.0), clamped=[tags["left"], tags["right"]], loads=load,
-                          prescribed=level)
+    system = fem.assemble(
+        mesh,
+        LinearElastic(E, 0.0, 2400.0),
+        clamped=[tags["left"], tags["right"]],
+        loads=load,
+        prescribed=level,
+    )
     cuts = {"on": ((1.0, 0.0), (1.0, 1.0)), "through": ((1.2, 0.0), (1.2, 1.0))}
-    record = [fem.SectionForces(cuts, loads=load), fem.Reactions("left", tags["left"], (0.0, 0.0)), Energy()]
-    h = simulate(linear(system), scheme=Midpoint(), solver=Condensed(), dt=0.25, t_end=1.0, record=record).history
+    record = [
+        fem.SectionForces(cuts, loads=load),
+        fem.Reactions("left", tags["left"], (0.0, 0.0)),
+        Energy(),
+    ]
+    h = simulate(
+        linear(system), scheme=Midpoint(), solver=Condensed(), dt=0.25, t_end=1.0, record=record
+    ).history
     late = [h[name][-1] / (E * WARM) for name in ("N_on", "N_through", "reaction_x_left")]
-    assert late == pytest.approx([-0.875, -0.875, 0.875], abs=1e-9)  # forces are those of mid-step, s = 7/8
+    assert late == pytest.approx(
+        [-0.875, -0.875, 0.875], abs=1e-9
+    )  # forces are those of mid-step, s = 7/8
     energy = [h[name][-1] / (E * WARM**2) for name in ("energy_strain", "work_input")]
     assert energy == pytest.approx([1.0, 1.0], abs=1e-9)
 
@@ -210,15 +300,30 @@ def test_histories_work_on_a_body_that_is_held():
 def test_outputs_know_the_strain_of_their_time(shared_tmp: Path):
     """A free panel warmed by t has no stress at any time; a frame gives the stresses of the state that it stored."""
     mesh, tags = block(COMM, lengths=(1.0, 1.0), divisions=(2, 2))
-    rollers = [fem.Prescribed(tags["left"], components=(0,)), fem.Prescribed(tags["bottom"], components=(1,))]
-    system = fem.assemble(mesh, CONCRETE, section=PlaneStress(), prescribed=rollers,
-                          loads=fem.InitialStrain(lambda x, t: WARM * t * np.ones(len(x))))
+    rollers = [
+        fem.Prescribed(tags["left"], components=(0,)),
+        fem.Prescribed(tags["bottom"], components=(1,)),
+    ]
+    system = fem.assemble(
+        mesh,
+        CONCRETE,
+        section=PlaneStress(),
+        prescribed=rollers,
+        loads=fem.InitialStrain(lambda x, t: WARM * t * np.ones(len(x))),
+    )
     problem = linear(system)
     for state in quasi_static(problem, [1.0, 3.0], solver=Condensed()):
         assert max_over_ranks(COMM, stress(problem, state)) < 1e-9 * E * WARM
     out = shared_tmp / "run"
-    solution = simulate(problem, scheme=Midpoint(), solver=Condensed(), dt=1e-4, t_end=2e-4, out=out,
-                        fields=fem.XDMF(every=1))
+    solution = simulate(
+        problem,
+        scheme=Midpoint(),
+        solver=Condensed(),
+        dt=1e-4,
+        t_end=2e-4,
+        out=out,
+        fields=fem.XDMF(every=1),
+    )
     ended = np.asarray(solution.function("stress").x.array)
     stored = np.asarray(fem.read_function(problem, out, "stress", t=2e-4).x.array)
     assert max_over_ranks(COMM, stored - ended) < 1e-12 * E * WARM * 2e-4
@@ -234,7 +339,11 @@ def test_outputs_know_the_strain_of_their_time(shared_tmp: Path):
 @pytest.mark.two_ranks
 def test_forms_of_the_user_and_wrong_values_are_refused():
     mesh, _ = block(COMM, lengths=(1.0, 1.0), divisions=(2, 2))
-    for value, text in (((1.0, 2.0, 3.0), "shape"), (np.full((2, 2), np.nan), "finite"), ("warm", "real numbers")):
+    for value, text in (
+        ((1.0, 2.0, 3.0), "shape"),
+        (np.full((2, 2), np.nan), "finite"),
+        ("warm", "real numbers"),
+    ):
         with pytest.raises(InputError, match=text):
             fem.assemble(mesh, CONCRETE, loads=fem.InitialStrain(value))
     for value in (lambda x, t: np.zeros((len(x), 5)), lambda x, t: np.nan * x[:, 0]):
@@ -253,26 +362,54 @@ def test_only_numbers_and_tensors_of_the_body_are_taken(d: int) -> None:
     mesh, tags = block(COMM, lengths=(2.0, 1.0, 1.5)[:d], divisions=(3, 2, 1)[:d])
     takes = [(), (d, d), *([(3, 3)] if d == 2 else [])]
     corner = fem.Cells.where("corner", mesh, lambda x: x[0] < 0.67)
-    for shape in [(), (1,), (2,), (0, 0), (1, 1), (1, 2), (2, 1), (2, 2), (3, 1), (3, 3), (1, 1, 1), (2, 2, 2)]:
+    for shape in [
+        (),
+        (1,),
+        (2,),
+        (0, 0),
+        (1, 1),
+        (1, 2),
+        (2, 1),
+        (2, 2),
+        (3, 1),
+        (3, 3),
+        (1, 1, 1),
+        (2, 2, 2),
+    ]:
         strain = np.full(shape, WARM)
         if shape == (3, 3):
             strain[2, :2] = strain[:2, 2] = 0.0  # shear across the plane is refused, see below
-        given: list[Any] = [strain, lambda x, t, strain=strain: np.broadcast_to(strain, (len(x), *strain.shape))]
+        given: list[Any] = [
+            strain,
+            lambda x, t, strain=strain: np.broadcast_to(strain, (len(x), *strain.shape)),
+        ]
         for number, value in enumerate(given):
             if shape in takes:
                 fem.assemble(mesh, CONCRETE, loads=fem.InitialStrain(value, cells=corner))
                 continue
-            with pytest.raises(InputError, match=r"InitialStrain.*: value .*d, d\) or in the plane \(.*3, 3\)"):
+            with pytest.raises(
+                InputError, match=r"InitialStrain.*: value .*d, d\) or in the plane \(.*3, 3\)"
+            ):
                 fem.assemble(mesh, CONCRETE, loads=fem.InitialStrain(value, cells=corner))
             if number == 0:
-                with pytest.raises(InputError, match=r"give a number, a tensor \(d, d\) or in the plane"):
+                with pytest.raises(
+                    InputError, match=r"give a number, a tensor \(d, d\) or in the plane"
+                ):
                     fem.InitialStrain(value, cells=corner)
-    for value in (lambda x, t: WARM, lambda x, t: None, lambda x, t: np.full((1, len(x)), WARM),
-                  lambda x, t: np.full(len(x), True), lambda x, t: np.full(len(x), 1j), lambda x, t: ["warm"] * len(x),
-                  lambda x, t: np.where(x[:, 0] > 1.5, np.nan, WARM)):
+    for value in (
+        lambda x, t: WARM,
+        lambda x, t: None,
+        lambda x, t: np.full((1, len(x)), WARM),
+        lambda x, t: np.full(len(x), True),
+        lambda x, t: np.full(len(x), 1j),
+        lambda x, t: ["warm"] * len(x),
+        lambda x, t: np.where(x[:, 0] > 1.5, np.nan, WARM),
+    ):
         with pytest.raises(InputError, match="InitialStrain at t = 0 s: value (has shape|is)"):
             fem.assemble(mesh, CONCRETE, clamped=tags["left"], loads=fem.InitialStrain(value))
-    with pytest.raises(InputError, match=r"value is \[\[1.0\], \[1.0, 2.0\]\]; give a number, a tensor"):
+    with pytest.raises(
+        InputError, match=r"value is \[\[1.0\], \[1.0, 2.0\]\]; give a number, a tensor"
+    ):
         fem.InitialStrain([[1.0], [1.0, 2.0]])
 
 
@@ -280,9 +417,16 @@ def test_only_numbers_and_tensors_of_the_body_are_taken(d: int) -> None:
 def test_a_function_with_a_history_is_that_of_the_start() -> None:
     """The load takes value(x, 0) s(t), as other loads do, and so must stresses: a panel that is free has none."""
     mesh, tags = block(COMM, lengths=(1.0, 1.0), divisions=(2, 2))
-    rollers = [fem.Prescribed(tags["left"], components=(0,)), fem.Prescribed(tags["bottom"], components=(1,))]
-    load = fem.InitialStrain(lambda x, t: WARM * (1.0 + t) * np.ones(len(x)), history=lambda t: 2.0 * t)
-    problem = linear(fem.assemble(mesh, CONCRETE, section=PlaneStress(), prescribed=rollers, loads=load))
+    rollers = [
+        fem.Prescribed(tags["left"], components=(0,)),
+        fem.Prescribed(tags["bottom"], components=(1,)),
+    ]
+    load = fem.InitialStrain(
+        lambda x, t: WARM * (1.0 + t) * np.ones(len(x)), history=lambda t: 2.0 * t
+    )
+    problem = linear(
+        fem.assemble(mesh, CONCRETE, section=PlaneStress(), prescribed=rollers, loads=load)
+    )
     for state in quasi_static(problem, [1.0, 3.0], solver=Condensed()):
         assert max_over_ranks(COMM, stress(problem, state)) < 1e-9 * E * WARM
         assert max_over_ranks(COMM, state.u) == pytest.approx(2.0 * state.t * WARM, rel=1e-10)
@@ -295,23 +439,33 @@ def test_energies_are_those_of_free_unknowns_where_a_support_moves() -> None:
     mesh, tags = block(COMM, lengths=(2.0,), divisions=(4,))
     moved = fem.Prescribed(tags["right"], displacement=lambda x, t: np.full(x.shape, 2.0 * WARM))
     bar = LinearElastic(E, 0.0, 2400.0)
-    problem = linear(fem.assemble(mesh, bar, clamped=tags["left"], prescribed=moved, loads=fem.InitialStrain(WARM)))
+    problem = linear(
+        fem.assemble(
+            mesh, bar, clamped=tags["left"], prescribed=moved, loads=fem.InitialStrain(WARM)
+        )
+    )
     state = static_equilibrium(problem, solver=Condensed())
     assert max_over_ranks(COMM, stress(problem, state)) < 1e-9 * E * WARM
-    assert Energy().start(problem, state)["energy_strain"] == pytest.approx(4.0 * E * WARM**2, rel=1e-10)
+    assert Energy().start(problem, state)["energy_strain"] == pytest.approx(
+        4.0 * E * WARM**2, rel=1e-10
+    )
 
 
 @pytest.mark.two_ranks
 def test_a_strain_that_never_changes_is_integrated_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its ledger is that of the same strain with a history of 1, which is integrated in every step."""
     sweeps, forces = [], InitialStrains.forces
-    monkeypatch.setattr(InitialStrains, "forces", lambda *a, **k: sweeps.append(1) or forces(*a, **k))
+    monkeypatch.setattr(
+        InitialStrains, "forces", lambda *a, **k: sweeps.append(1) or forces(*a, **k)
+    )
     runs = []
     for history in (None, lambda t: 1.0):
         mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 2))
         load = fem.InitialStrain(WARM, history=history)
         problem = linear(fem.assemble(mesh, CONCRETE, clamped=tags["left"], loads=load))
-        found = simulate(problem, scheme=Midpoint(), solver=Condensed(), dt=1e-4, t_end=1e-3, record=[Energy()]).history
+        found = simulate(
+            problem, scheme=Midpoint(), solver=Condensed(), dt=1e-4, t_end=1e-3, record=[Energy()]
+        ).history
         runs.append((len(sweeps), found))
         sweeps.clear()
     (few, one), (many, other) = runs

@@ -43,7 +43,9 @@ def distorted(x: Array) -> Array:
 def resting(simplices: bool, d: int) -> tuple[ContactProblem, State]:
     """A distorted block, 2 wide and 1 high, at rest on the ground under its weight."""
     lengths, divisions = ((2.0, 1.0), (6, 4)) if d == 2 else ((2.0, 1.0, 1.5), (4, 2, 3))
-    mesh, tags = block(COMM, lengths=lengths, divisions=divisions, simplices=simplices, deform=distorted)
+    mesh, tags = block(
+        COMM, lengths=lengths, divisions=divisions, simplices=simplices, deform=distorted
+    )
     down = np.array([0.0, -1.0, 0.0])[:d]
     system = assemble(mesh, CONCRETE, loads=BodyForce(tuple(CONCRETE.rho * G * down)))
     ground = HalfSpace(point=(0.0,) * d, normal=tuple(-down))
@@ -75,7 +77,9 @@ def test_rigid_rotation_lowers_the_centre_of_mass(simplices, d):
     problem, state = resting(simplices, d)
     K_G, system = added(problem, state), problem.system
     fall = 0.5 * 2400.0 * G * (2.0 if d == 2 else 3.0) * 0.5
-    tilts = [np.array([0.0, 0.0, 1.0])] + ([np.array([1.0, 0.0, 0.0]), np.array([0.6, 0.0, 0.8])] if d == 3 else [])
+    tilts = [np.array([0.0, 0.0, 1.0])] + (
+        [np.array([1.0, 0.0, 0.0]), np.array([0.6, 0.0, 0.8])] if d == 3 else []
+    )
     for about in (np.zeros(3), np.array([2.0, 0.0, 0.0]), np.array([1.0, 0.5, 0.7])):
         for axis in tilts:
             u = rotation(problem, about, axis)
@@ -85,7 +89,10 @@ def test_rigid_rotation_lowers_the_centre_of_mass(simplices, d):
             assert abs(system.algebra.dot(spin, K_G @ spin)) < 1e-9 * fall
     for shift in system.influence.T:
         assert max_over_ranks(COMM, K_G @ shift) < 1e-9 * fall
-    u, v = rotation(problem, np.zeros(3), tilts[0]), system.space.restrict(np.sin(3.0 * system.space.points))
+    u, v = (
+        rotation(problem, np.zeros(3), tilts[0]),
+        system.space.restrict(np.sin(3.0 * system.space.points)),
+    )
     assert system.algebra.dot(u, K_G @ v) == pytest.approx(system.algebra.dot(v, K_G @ u), rel=1e-9)
 
 
@@ -100,7 +107,9 @@ def test_tilted_block_restores_itself_less_and_less():
     for theta in (0.0, 0.1, 0.25):
         u = problem.cartesian(state.u) + theta * turn
         moments = [s.algebra.dot(turn, s.K @ u - s.load(0.0)) for s in (problem.system, second)]
-        assert moments == pytest.approx([0.5 * weight, weight * (0.5 - 2.0 * theta)], abs=1e-5 * weight)
+        assert moments == pytest.approx(
+            [0.5 * weight, weight * (0.5 - 2.0 * theta)], abs=1e-5 * weight
+        )
 
 
 @pytest.mark.parametrize("d", [2, 3])
@@ -123,7 +132,9 @@ def test_the_state_stays_an_equilibrium(d):
 def buckling_load(divisions: tuple[int, int]) -> float:
     """The pressure [Pa] on the top of a clamped column (1 x 10) that makes K + K_G singular."""
     mesh, tags = block(COMM, lengths=(1.0, 10.0), divisions=divisions)
-    system = assemble(mesh, COLUMN, clamped=tags["bottom"], loads=Traction(tags["top"], (0.0, -1.0)))
+    system = assemble(
+        mesh, COLUMN, clamped=tags["bottom"], loads=Traction(tags["top"], (0.0, -1.0))
+    )
     problem = linear(system)
     state = static_equilibrium(problem, solver=Condensed())
     K, K_G = dense(COMM, system, system.K), dense(COMM, system, added(problem, state))
@@ -144,12 +155,16 @@ def test_euler_column():
 def test_prescribed_displacements_pull_on_the_new_part():
     """A side that moves by U(t): the load of K + K_G is -Pᵀ (K + K_G) (U(t) - U(0)) beside what holds the start."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 3))
-    move = Prescribed(tags["left"], displacement=lambda x, t: np.column_stack([0.0 * x[:, 0], t * x[:, 1] + 1e-3]))
+    move = Prescribed(
+        tags["left"], displacement=lambda x, t: np.column_stack([0.0 * x[:, 0], t * x[:, 1] + 1e-3])
+    )
     system = assemble(mesh, CONCRETE, prescribed=move, loads=BodyForce((0.0, -CONCRETE.rho * G)))
     problem = linear(system)
     state = static_equilibrium(problem, solver=Condensed())
     second = geometric_stiffness(problem, state)
-    assert max_over_ranks(COMM, second.K @ state.u - second.load(0.0)) < 1e-9 * max_over_ranks(COMM, system.load(0.0))
+    assert max_over_ranks(COMM, second.K @ state.u - second.load(0.0)) < 1e-9 * max_over_ranks(
+        COMM, system.load(0.0)
+    )
     space = system.space
     full = PetscMatrix(initial_stress_matrix(space, space.expand(state.u, 0.0)))
     moved = np.zeros((len(space.nodes), 2))
@@ -166,7 +181,9 @@ def test_held_sides_keep_the_unknowns():
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 3))
     press = held_by(tags, "top", lambda x: 0.0 * x - 1e-4, 1)
     system = assemble(mesh, CONCRETE, prescribed=[press, Prescribed(tags["bottom"])])
-    second = geometric_stiffness(linear(system), static_equilibrium(linear(system), solver=Condensed()))
+    second = geometric_stiffness(
+        linear(system), static_equilibrium(linear(system), solver=Condensed())
+    )
     assert second.rows == system.rows and second.K.rows == system.K.rows
     assert second.C is None and second.M is system.M
 
@@ -180,7 +197,9 @@ def test_warming_of_a_held_block_is_a_pressure():
     space = system.space
     full = PetscMatrix(initial_stress_matrix(space, np.zeros_like(space.points), 2.0))
     up = np.column_stack([0.0 * space.points[:, 0], space.points[:, 0]]).ravel()
-    assert space.comm.sum(np.array([up @ (full @ up)])) == pytest.approx([-2.0e10 * 6e-4 * 2.0], rel=1e-12)
+    assert space.comm.sum(np.array([up @ (full @ up)])) == pytest.approx(
+        [-2.0e10 * 6e-4 * 2.0], rel=1e-12
+    )
 
 
 @pytest.mark.serial

@@ -53,7 +53,9 @@ def tower(angle: float = 0.4, d: int = 2) -> tuple[Any, Any]:
     """Three blocks, one on top of the other: "a" lowest."""
     lengths, divisions = (1.0, 0.5, 0.8)[:d], (4, 2, 3)[:d]
     parts = {
-        name: BlockMesh(lengths=lengths, divisions=divisions, corner=(0.0, 0.5 * i, 0.0)[:d], angle=angle)
+        name: BlockMesh(
+            lengths=lengths, divisions=divisions, corner=(0.0, 0.5 * i, 0.0)[:d], angle=angle
+        )
         for i, name in enumerate("abc")
     }
     mesh, tags = build_mesh(Blocks(parts), COMM)
@@ -67,8 +69,16 @@ def test_two_pairs_and_an_obstacle(d):
     system, tags = tower(d=d)
     up = np.zeros(d)
     up[:2] = turned((0.0, 1.0), 0.4)
-    ground = contact_surface(system, tags["a_bottom"], obstacle=HalfSpace(point=(0.0,) * d, normal=tuple(up)))
-    parts = [ground, *(contact_pair(system, tags[f"{one}_bottom"], tags[f"{two}_top"]) for one, two in ("ba", "cb"))]
+    ground = contact_surface(
+        system, tags["a_bottom"], obstacle=HalfSpace(point=(0.0,) * d, normal=tuple(up))
+    )
+    parts = [
+        ground,
+        *(
+            contact_pair(system, tags[f"{one}_bottom"], tags[f"{two}_top"])
+            for one, two in ("ba", "cb")
+        ),
+    ]
     surface = joined_surfaces(*parts)
     problem = ContactProblem(system, surface)
     m = parts[0].total
@@ -84,10 +94,14 @@ def test_two_pairs_and_an_obstacle(d):
         rows = slice(i * m, (i + 1) * m)
         assert seen(surface).normal_values(x)[rows] == pytest.approx(-jump @ up, abs=1e-12)
         along = np.linalg.norm(jump - np.outer(jump @ up, up), axis=1)
-        assert np.linalg.norm(seen(surface).tangential_values(x)[rows], axis=1) == pytest.approx(along, abs=1e-12)
+        assert np.linalg.norm(seen(surface).tangential_values(x)[rows], axis=1) == pytest.approx(
+            along, abs=1e-12
+        )
         assert np.array_equal(seen(surface).points[rows], parts[i].points)
     same = ContactProblem(system, empty_surface(system.space.comm, d))
-    assert problem.equations.strain_energy(x) == pytest.approx(same.equations.strain_energy(u), rel=1e-11)
+    assert problem.equations.strain_energy(x) == pytest.approx(
+        same.equations.strain_energy(u), rel=1e-11
+    )
 
 
 def leaning(x: Array) -> Array:
@@ -105,23 +119,37 @@ def test_corners(d, shape):
     mesh = blocks(d, deform=shape) if callable(shape) else blocks(d, angle=shape)
     system, tags = two_blocks(COMM, mesh)
     sides = ["left", "back"][: d - 1]
-    walls = [contact_surface(system, tags[f"{body}_{side}"]) for side in sides for body in ("upper", "lower")]
+    walls = [
+        contact_surface(system, tags[f"{body}_{side}"])
+        for side in sides
+        for body in ("upper", "lower")
+    ]
     pair = contact_pair(system, *(tags[side] for side in mesh.interface))
     surface = joined_surfaces(pair, *walls)
     problem = ContactProblem(system, surface)
     u = per_body(system, wavy, linear)
     x = relative(problem, u)
     assert max_over_ranks(COMM, problem.cartesian(x) - u) < 1e-12
-    expected = [np.sum((linear(seen(pair).points) - wavy(seen(pair).points)) * seen(pair).normals, axis=1)]
+    expected = [
+        np.sum((linear(seen(pair).points) - wavy(seen(pair).points)) * seen(pair).normals, axis=1)
+    ]
     for i, wall in enumerate(walls):
-        expected.append(np.sum((wavy if i % 2 else linear)(seen(wall).points) * seen(wall).normals, axis=1))
+        expected.append(
+            np.sum((wavy if i % 2 else linear)(seen(wall).points) * seen(wall).normals, axis=1)
+        )
     assert seen(surface).normal_values(x) == pytest.approx(np.concatenate(expected), abs=1e-12)
     if surface.basis is not None:
         T = dense(COMM, system, surface.basis)
-        assert (np.abs(T.T @ T - np.eye(len(T))).max() < 1e-14) == (shape is not leaning) == (surface.dual is None)
+        assert (
+            (np.abs(T.T @ T - np.eye(len(T))).max() < 1e-14)
+            == (shape is not leaning)
+            == (surface.dual is None)
+        )
     places = np.round(seen(surface).points, 9) + 0.0
     body = np.repeat([1, *[1, 0] * len(sides)], [seen(pair).count, *(wall.total for wall in walls)])
-    _, place, count = np.unique(np.column_stack([places, body]), axis=0, return_inverse=True, return_counts=True)
+    _, place, count = np.unique(
+        np.column_stack([places, body]), axis=0, return_inverse=True, return_counts=True
+    )
     free = seen(surface).all(surface.tangents >= 0)
     assert np.array_equal(free.all(axis=1), count[place.ravel()] == 1)
     assert free.sum() == sum((d - n) for n in count)
@@ -131,24 +159,36 @@ def test_corners(d, shape):
     r_n[: seen(pair).count] = 1.0
     push = forces(problem, seen(surface).reaction_load(r_n, system.rows))
     upper = field(system, (system.space.bodies == 1).astype(float))[1][:, 0] > 0.0
-    assert push[upper].sum(axis=0) == pytest.approx(seen(pair).count * seen(pair).normals[0], abs=1e-12)
-    assert push[~upper].sum(axis=0) == pytest.approx(-seen(pair).count * seen(pair).normals[0], abs=1e-12)
+    assert push[upper].sum(axis=0) == pytest.approx(
+        seen(pair).count * seen(pair).normals[0], abs=1e-12
+    )
+    assert push[~upper].sum(axis=0) == pytest.approx(
+        -seen(pair).count * seen(pair).normals[0], abs=1e-12
+    )
 
 
 def corner_run(angle: float, **how: Any) -> tuple[ContactSurface, Array, Array]:
     """(surface, r_n, active of every step) of a block thrown into the corner of a wall and another block."""
     mesh = blocks(2, upper=(8, 6), lower=(8, 6), angle=angle, gap=1e-3)
     system, tags = two_blocks(COMM, mesh, loads=BodyForce(tuple(turned((-2e3, -9.81e3), angle))))
-    system = thrown(system, np.zeros_like, lambda x: np.tile(turned((-1.0, -2.0), angle), (len(x), 1)))
+    system = thrown(
+        system, np.zeros_like, lambda x: np.tile(turned((-1.0, -2.0), angle), (len(x), 1))
+    )
     near = AnalyticGap(lambda x: np.full(len(x), 1e-3))
-    walls = [contact_surface(system, tags[f"{name}_left"], obstacle=near) for name in ("upper", "lower")]
+    walls = [
+        contact_surface(system, tags[f"{name}_left"], obstacle=near) for name in ("upper", "lower")
+    ]
     ground = contact_surface(system, tags["lower_bottom"])
-    surface = joined_surfaces(contact_pair(system, *(tags[side] for side in mesh.interface)), *walls, ground)
+    surface = joined_surfaces(
+        contact_pair(system, *(tags[side] for side in mesh.interface)), *walls, ground
+    )
     problem = ContactProblem(system, surface.with_frictionless_corners(), friction=Coulomb(0.3))
     reports = [report for _, report in march(problem, dt=1e-3, steps=60, **how)]
     assert max(report.certificate.worst for report in reports) <= 1e-9
     everything = seen(surface).all
-    r_n, active = ([everything(getattr(r.new, name)) for r in reports] for name in ("r_n", "active"))
+    r_n, active = (
+        [everything(getattr(r.new, name)) for r in reports] for name in ("r_n", "active")
+    )
     return surface, np.array(r_n), np.array(active)
 
 
@@ -158,7 +198,9 @@ def test_a_block_thrown_into_a_corner(scheme):
     """Gravity, speed and friction: every step certified, both conditions of the corner node active in some steps."""
     surface, _, active = corner_run(0.0, scheme=scheme)
     corner = [0, 9]  # first node of the pair, first node of the wall: the same
-    assert seen(surface).points[corner[0]] == pytest.approx(seen(surface).points[corner[1]], abs=1e-12)
+    assert seen(surface).points[corner[0]] == pytest.approx(
+        seen(surface).points[corner[1]], abs=1e-12
+    )
     assert np.any(active[:, corner].all(axis=1)) and not active.all()
 
 
@@ -177,16 +219,25 @@ def test_what_surfaces_know_is_kept():
     mesh = blocks(2, gap=0.125)
     system, tags = two_blocks(COMM, mesh)
     pair = contact_pair(system, *(tags[side] for side in mesh.interface)).bilateral_everywhere()
-    ground = contact_surface(system, tags["lower_bottom"]).on_springs(1e6).moving(towards=lambda t: 2.0 * t)
+    ground = (
+        contact_surface(system, tags["lower_bottom"])
+        .on_springs(1e6)
+        .moving(towards=lambda t: 2.0 * t)
+    )
     wall = contact_surface(system, tags["upper_right"])
-    once, twice = joined_surfaces(pair, ground, wall), joined_surfaces(joined_surfaces(pair, ground), wall)
+    once, twice = (
+        joined_surfaces(pair, ground, wall),
+        joined_surfaces(joined_surfaces(pair, ground), wall),
+    )
     for surface in (once, twice):
         assert seen(surface).bilateral.tolist() == [True] * 5 + [False] * (5 + 4)
         assert seen(surface).gap(0.5).tolist() == [0.125] * 5 + [-1.0] * 5 + [0.0] * 4
         assert np.array_equal(seen(surface).compliance[5:10], seen(ground).compliance)
         assert np.count_nonzero(seen(surface).compliance) == 5
         assert seen(surface).sliding(0.0, 1.0) is None
-        assert np.array_equal(surface.owned, once.owned) and np.array_equal(surface.tangents, once.tangents)
+        assert np.array_equal(surface.owned, once.owned) and np.array_equal(
+            surface.tangents, once.tangents
+        )
 
 
 def test_redistributed_mass_at_corners():
@@ -195,7 +246,9 @@ def test_redistributed_mass_at_corners():
     system, tags = two_blocks(COMM, mesh)
     sides = [tags[f"{body}_{side}"] for side in ("left", "back") for body in ("upper", "lower")]
     walls = [contact_surface(system, side) for side in sides]
-    surface = joined_surfaces(contact_pair(system, *(tags[side] for side in mesh.interface)), *walls)
+    surface = joined_surfaces(
+        contact_pair(system, *(tags[side] for side in mesh.interface)), *walls
+    )
     surface = surface.with_frictionless_corners()
     for friction in (Frictionless(), Coulomb(0.3)):
         problem = ContactProblem(system, surface, friction=friction, mass=Redistributed())
@@ -212,22 +265,30 @@ def test_redistributed_mass_at_corners():
 def test_sliding_obstacles_at_corners():
     """A floor that slides along the edge and across: corner nodes feel the part along the edge."""
     system, tags = two_blocks(COMM, blocks(3, angle=0.0))
-    floor = contact_surface(system, tags["lower_bottom"]).moving(along=lambda t: np.array([2.0 * t, 3.0 * t]))
+    floor = contact_surface(system, tags["lower_bottom"]).moving(
+        along=lambda t: np.array([2.0 * t, 3.0 * t])
+    )
     wall = contact_surface(system, tags["lower_left"])
     surface = joined_surfaces(floor, wall)
     x = system.influence @ np.array([0.0, 0.0, 1.0])  # the edge runs along z
     along = seen(surface).tangential_values(x)
-    edge = np.flatnonzero(np.isclose(seen(surface).points[:, 0], 0.0) & np.isclose(seen(surface).points[:, 1], 0.0))
+    edge = np.flatnonzero(
+        np.isclose(seen(surface).points[:, 0], 0.0) & np.isclose(seen(surface).points[:, 1], 0.0)
+    )
     slide, alone = seen(surface).sliding(0.0, 1.0), seen(floor).sliding(0.0, 1.0)[0]
     z = seen(floor).tangential_values(x)[0]  # components of the z axis in the floor's own tangents
     for slot in edge[: len(edge) // 2]:
-        assert np.sum(along[slot] * slide[slot]) == pytest.approx(alone @ z) and np.count_nonzero(slide[slot]) == 1
+        assert (
+            np.sum(along[slot] * slide[slot]) == pytest.approx(alone @ z)
+            and np.count_nonzero(slide[slot]) == 1
+        )
     assert not slide[edge[len(edge) // 2 :]].any() and not along[edge[len(edge) // 2 :]].any()
     inside = np.setdiff1d(np.arange(seen(floor).count), edge)
     assert np.array_equal(slide[inside], np.tile(alone, (len(inside), 1)))
 
 
 # Refusals -------------------------------------------------------------------------------------------------------------
+
 
 @pytest.mark.two_ranks
 def test_refusals():
@@ -236,7 +297,10 @@ def test_refusals():
     one, two = (tags[side] for side in mesh.interface)
     pair, wall = contact_pair(system, one, two), contact_surface(system, tags["upper_left"])
     slope = contact_surface(
-        system, tags["upper_left"], obstacle=HalfSpace(point=(-9.0, 0.0), normal=(1.0, 0.5)), points=[(0.0, 1.0)]
+        system,
+        tags["upper_left"],
+        obstacle=HalfSpace(point=(-9.0, 0.0), normal=(1.0, 0.5)),
+        points=[(0.0, 1.0)],
     )
     nearly = contact_surface(
         system, one, obstacle=HalfSpace(point=(0.0, -9.0), normal=(0.005, 1.0)), points=[(0.0, 1.0)]
@@ -244,11 +308,23 @@ def test_refusals():
     other, names = two_blocks(COMM, mesh)
     chain = contact_surface(system, two)
     for surfaces, sentence in (
-        ((pair, pair), r"contact node \(0, 1\) is on several contact surfaces with one contact direction: list every"),
+        (
+            (pair, pair),
+            r"contact node \(0, 1\) is on several contact surfaces with one contact direction: list every",
+        ),
         ((wall, wall), "list every boundary and every pair once"),
-        ((pair, nearly), r"contact node \(0, 1\) has 2 contact directions, not independent in its 2 dimensions: treat"),
-        ((pair, wall, slope), r"contact node \(0, 1\) has 3 contact directions, more than its 2 dimensions: treat"),
-        ((pair, contact_surface(other, names["lower_bottom"])), "joined_surfaces: give surfaces of .* of one system"),
+        (
+            (pair, nearly),
+            r"contact node \(0, 1\) has 2 contact directions, not independent in its 2 dimensions: treat",
+        ),
+        (
+            (pair, wall, slope),
+            r"contact node \(0, 1\) has 3 contact directions, more than its 2 dimensions: treat",
+        ),
+        (
+            (pair, contact_surface(other, names["lower_bottom"])),
+            "joined_surfaces: give surfaces of .* of one system",
+        ),
         ((), "joined_surfaces: give surfaces of"),
         ((pair, empty_surface(system.space.comm, 2)), "joined_surfaces: give surfaces of"),
     ):
@@ -268,8 +344,10 @@ def test_a_node_on_both_sides():
     mesh, tags = build_mesh(Blocks(parts), COMM)
     system = assemble(mesh, SOFT)
     first = contact_pair(system, tags["sw_right"], tags["se_left"])
-    sentence = (r"node \(1, 1\) is on side 1 of one contact pair and on side 2 of another: where cracks cross, "
-                "give each arm")
+    sentence = (
+        r"node \(1, 1\) is on side 1 of one contact pair and on side 2 of another: where cracks cross, "
+        "give each arm"
+    )
     good = joined_surfaces(first, contact_pair(system, tags["ne_bottom"], tags["se_top"]))
     assert good.total == 6
     with pytest.raises(InputError, match=sentence):

@@ -20,7 +20,9 @@ SHEAR[0, 1], AXIAL[1, 1] = 1.0, 1.0
 
 def followed(comm, d, strains, *, begin=None, **spec):
     """Values after states of uniform gradients: strains are 1e-3 times those."""
-    mesh, _ = fem.build_mesh(BlockMesh(lengths=(2.0, 1.0, 1.0)[:d], divisions=(3, 2, 2)[:d], **spec), comm)
+    mesh, _ = fem.build_mesh(
+        BlockMesh(lengths=(2.0, 1.0, 1.0)[:d], divisions=(3, 2, 2)[:d], **spec), comm
+    )
     problem = linear(fem.assemble(mesh, SOIL))
     points = problem.system.space.points
 
@@ -41,8 +43,13 @@ def followed(comm, d, strains, *, begin=None, **spec):
 def test_uniform_strains(comm, d, axial, simplices):
     """Simple shear is gamma_xy; along one axis it is the difference of principal strains in the plane, and in space
     sqrt(2 dev:dev); turned bodies are not strained; the largest one stays."""
-    for gradients, value in (([SHEAR], 1.0), ([-SHEAR], 1.0), ([AXIAL], axial), ([SHEAR - SHEAR.T], 0.0),
-                             ([0.5 * SHEAR, 2.0 * AXIAL, SHEAR], 2.0 * axial)):
+    for gradients, value in (
+        ([SHEAR], 1.0),
+        ([-SHEAR], 1.0),
+        ([AXIAL], axial),
+        ([SHEAR - SHEAR.T], 0.0),
+        ([0.5 * SHEAR, 2.0 * AXIAL, SHEAR], 2.0 * axial),
+    ):
         each, largest = followed(comm, d, gradients, simplices=simplices)
         assert np.allclose(each, value, atol=1e-12) and abs(largest - value) < 1e-12
 
@@ -55,7 +62,9 @@ def test_strains_of_the_start_do_not_count(comm):
 def test_what_it_refuses(comm):
     mesh, _ = fem.build_mesh(BlockMesh(lengths=(2.0,), divisions=(3,)), comm)
     problem = linear(fem.assemble(mesh, SOIL))
-    zero = vc.State(0.0, 0, problem.system.u0, problem.system.v0, np.zeros(0), np.zeros(0, dtype=bool))
+    zero = vc.State(
+        0.0, 0, problem.system.u0, problem.system.v0, np.zeros(0), np.zeros(0, dtype=bool)
+    )
     with pytest.raises(InputError, match="on a line has no shear strain"):
         fem.LargestStrain().start(problem, zero)
     with pytest.raises(InputError, match="run from the start"):

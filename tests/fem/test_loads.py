@@ -64,8 +64,12 @@ def test_constant_history_and_function_of_time_are_one_load(kind):
     shaped = load(value=lambda x, t: np.tile(value, (len(x), 1)), history=sin)
     for t in (0.0, 0.3, 1.1):
         for one in (separable, general, shaped):
-            assert max_over_ranks(COMM, one(t) - sin(t) * still) < 1e-13 * max_over_ranks(COMM, still)
-    both = assemble(mesh, CONCRETE, loads=[kind(**where, value=tuple(value)), kind(**where, value=(1.0, 0.0))])
+            assert max_over_ranks(COMM, one(t) - sin(t) * still) < 1e-13 * max_over_ranks(
+                COMM, still
+            )
+    both = assemble(
+        mesh, CONCRETE, loads=[kind(**where, value=tuple(value)), kind(**where, value=(1.0, 0.0))]
+    )
     assert resultant(both, both.load(0.0)) == pytest.approx(
         resultant(both, still) * (value + [1.0, 0.0]) / value, rel=1e-13
     )
@@ -82,12 +86,18 @@ def test_weight(name):
     assert resultant(system, system.load(0.0)) == pytest.approx(-weight * g, abs=1e-12 * weight)
 
 
-@pytest.mark.parametrize("name, side", [("triangles", "right"), ("tetrahedra", "right"), ("quadrilaterals", "top")])
+@pytest.mark.parametrize(
+    "name, side", [("triangles", "right"), ("tetrahedra", "right"), ("quadrilaterals", "top")]
+)
 def test_tangential_traction_keeps_its_part_along_the_facet(name, side):
     """S_T = C_T of eq. 6: of a traction on a turned side only the part along the side acts."""
     mesh, tags = block(COMM, **BODIES[name])
     d, angle = len(BODIES[name]["lengths"]), BODIES[name].get("angle", 0.0)
-    n = np.array([np.cos(angle), np.sin(angle), 0.0]) if side == "right" else np.array([0.0, 1.0, 0.0])
+    n = (
+        np.array([np.cos(angle), np.sin(angle), 0.0])
+        if side == "right"
+        else np.array([0.0, 1.0, 0.0])
+    )
     area = np.prod(np.delete(BODIES[name]["lengths"], 0 if side == "right" else 1))
     value = np.array([3.0, 8.0, -2.0])
     system = assemble(mesh, CONCRETE, loads=TangentialTraction(tags[side], tuple(value[:d])))
@@ -99,7 +109,9 @@ def test_tangential_traction_keeps_its_part_along_the_facet(name, side):
 
 def only_there(x: Array, t: float) -> Array:
     """NaN at one corner of the body: on one rank only, when there are several."""
-    return np.where((x > 1.9).all(axis=1)[:, None] if x.shape[1] > 1 else x > 1.9, np.nan, 1.0) * np.ones_like(x)
+    return np.where(
+        (x > 1.9).all(axis=1)[:, None] if x.shape[1] > 1 else x > 1.9, np.nan, 1.0
+    ) * np.ones_like(x)
 
 
 def fails_there(x: Array, t: float) -> Array:
@@ -117,16 +129,32 @@ def test_nan_and_shapes_are_refused_on_all_ranks():
         ("Traction contains NaN", {"loads": Traction(tags["top"], (0.0, nan))}),
         ("Traction contains NaN", {"loads": Traction(tags["top"], only_there, history=sin)}),
         ("TangentialTraction contains NaN", {"loads": TangentialTraction(tags["top"], (0.0, nan))}),
-        ("BodyForce contains NaN or infinite values at t = 0 s", {"loads": BodyForce((0.0, float("inf")))}),
-        ("initial displacement contains NaN", {"initial_displacement": lambda x: only_there(x, 0.0)}),
+        (
+            "BodyForce contains NaN or infinite values at t = 0 s",
+            {"loads": BodyForce((0.0, float("inf")))},
+        ),
+        (
+            "initial displacement contains NaN",
+            {"initial_displacement": lambda x: only_there(x, 0.0)},
+        ),
         ("initial velocity contains NaN", {"initial_velocity": (nan, 0.0)}),
-        (r"Traction at t = 0 s ended in ZeroDivisionError: no such place \(test_loads.py, line \d+\): correct",
-         {"loads": Traction(tags["top"], fails_there, history=sin)}),
-        ("initial velocity at t = 0 s ended in Zero", {"initial_velocity": lambda x: fails_there(x, 0.0)}),
-        (r"BodyForce returned shape \(\d+, 3\) .* return 2 components", {"loads": BodyForce((0.0, 0.0, 1.0))}),
+        (
+            r"Traction at t = 0 s ended in ZeroDivisionError: no such place \(test_loads.py, line \d+\): correct",
+            {"loads": Traction(tags["top"], fails_there, history=sin)},
+        ),
+        (
+            "initial velocity at t = 0 s ended in Zero",
+            {"initial_velocity": lambda x: fails_there(x, 0.0)},
+        ),
+        (
+            r"BodyForce returned shape \(\d+, 3\) .* return 2 components",
+            {"loads": BodyForce((0.0, 0.0, 1.0))},
+        ),
         (r"initial velocity returned shape \(\d+,\)", {"initial_velocity": lambda x: x[:, 0]}),
-        ("prescribed component 2 does not exist: give numbers from 0 to 1",
-         {"prescribed": Prescribed(tags["top"], components=(2,))}),
+        (
+            "prescribed component 2 does not exist: give numbers from 0 to 1",
+            {"prescribed": Prescribed(tags["top"], components=(2,))},
+        ),
     ]
     for sentence, data in cases:
         with pytest.raises(InputError, match=sentence):
@@ -141,12 +169,20 @@ def test_nan_that_comes_with_time():
         return only_there(x, t) if t > 0.0025 else np.zeros_like(x)
 
     for sentence, data in (
-        ("Traction contains NaN or infinite values at t = 0.0035 s", {"loads": Traction(tags["top"], late)}),
+        (
+            "Traction contains NaN or infinite values at t = 0.0035 s",
+            {"loads": Traction(tags["top"], late)},
+        ),
         ("BodyForce contains NaN or infinite values at t = 0.0035 s", {"loads": BodyForce(late)}),
         ("prescribed motion on 'top' contains NaN", {"prescribed": Prescribed(tags["top"], late)}),
-        ("prescribed motion on 'top' at t = .* ended in Zero", {"prescribed": Prescribed(tags["top"], fails_there)}),
+        (
+            "prescribed motion on 'top' at t = .* ended in Zero",
+            {"prescribed": Prescribed(tags["top"], fails_there)},
+        ),
     ):
         problem = linear(assemble(mesh, CONCRETE, clamped=tags["bottom"], **data))
         with pytest.raises(InputError, match=sentence):
-            for _ in march(problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=1e-3, steps=9):
+            for _ in march(
+                problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=1e-3, steps=9
+            ):
                 pass

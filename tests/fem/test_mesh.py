@@ -23,7 +23,9 @@ from vi_contact import fem  # noqa: E402
 from vi_contact.fem import compat  # noqa: E402
 
 
-@pytest.mark.parametrize("options", [{}, {"triangles": True}, {"size": 1.1}, {"size": 1.1, "triangles": True}], ids=str)
+@pytest.mark.parametrize(
+    "options", [{}, {"triangles": True}, {"size": 1.1}, {"size": 1.1, "triangles": True}], ids=str
+)
 def test_wall_and_its_sides_have_their_exact_sizes(options, comm):
     mesh, tags = fem.build_mesh(WallMesh(**options), comm)
     assert sizes(tags) == {"wall": 54.0, "base": 6.0, "face": 9.0, "top": 6.0, "back": 9.0}
@@ -41,7 +43,9 @@ def test_a_script_of_gmsh_is_meshed_refined_and_cut(comm, shared_tmp):
             "Line(4) = {4, 1}; Line(5) = {3, 5}; Line(6) = {5, 6}; Line(7) = {6, 4};\n"
             "Curve Loop(1) = {1:4}; Plane Surface(1) = {1}; Curve Loop(2) = {5, 6, 7, -3}; Plane Surface(2) = {2};\n"
             'MeshSize{:} = 0.5;\nPhysical Curve("joint") = {3}; Physical Curve("foot") = {1};\n'
-            'Physical Surface("rock") = {1}; Physical Surface("dam") = {2};\n', encoding="utf-8")
+            'Physical Surface("rock") = {1}; Physical Surface("dam") = {2};\n',
+            encoding="utf-8",
+        )
     comm.Barrier()
     cells = []
     for refine in (0, 1):
@@ -56,7 +60,9 @@ def test_a_script_of_gmsh_is_meshed_refined_and_cut(comm, shared_tmp):
 @pytest.mark.parametrize("d", [1, 2, 3])
 def test_blocks_and_their_sides_have_their_exact_sizes_also_turned(d, simplices, comm):
     lengths = (2.0, 3.0, 5.0)[:d]
-    block = BlockMesh(lengths=lengths, divisions=(3, 2, 4)[:d], simplices=simplices, angle=0.7 if d > 1 else 0.0)
+    block = BlockMesh(
+        lengths=lengths, divisions=(3, 2, 4)[:d], simplices=simplices, angle=0.7 if d > 1 else 0.0
+    )
     mesh, tags = fem.build_mesh(block, comm)
     sides = [math.prod(lengths) / length for length in lengths for _ in range(2)]
     names = ["left", "right", "bottom", "top", "back", "front"][: 2 * d]
@@ -67,7 +73,9 @@ def test_blocks_and_their_sides_have_their_exact_sizes_also_turned(d, simplices,
 @pytest.mark.parametrize("d", [2, 3])
 def test_sides_face_outwards(d, simplices, comm):
     """Mean outward normal of the side of highest x, turned by an angle, is (cos, sin)."""
-    mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0,) * d, divisions=(2,) * d, simplices=simplices, angle=0.7), comm)
+    mesh, tags = fem.build_mesh(
+        BlockMesh(lengths=(1.0,) * d, divisions=(2,) * d, simplices=simplices, angle=0.7), comm
+    )
     normal, ds = ufl.FacetNormal(mesh), compat.measure(mesh, d - 1, tags["right"].indices)
     assert integral(mesh, normal[0], ds) == pytest.approx(math.cos(0.7), rel=1e-13)
     assert integral(mesh, normal[1], ds) == pytest.approx(math.sin(0.7), rel=1e-13)
@@ -86,7 +94,10 @@ def test_groups_are_ascending_local_indices_on_every_rank_even_where_empty(comm)
 
 @pytest.mark.parametrize(
     "script",
-    [WallMesh(size=1.3, triangles=True), BlockMesh(lengths=(1.0,) * 3, divisions=(2, 3, 2), angle=0.3)],
+    [
+        WallMesh(size=1.3, triangles=True),
+        BlockMesh(lengths=(1.0,) * 3, divisions=(2, 3, 2), angle=0.3),
+    ],
     ids=["triangles", "hexahedra"],
 )
 def test_nodes_keep_their_input_numbers(script, comm):
@@ -145,7 +156,9 @@ def test_a_missing_group_is_named_with_those_there_are(comm):
 
 
 def test_a_missing_file_is_refused_on_all_ranks(comm, shared_tmp):
-    assert "nowhere.msh does not exist" in refusal(comm, lambda: fem.read_mesh(shared_tmp / "nowhere.msh", comm))
+    assert "nowhere.msh does not exist" in refusal(
+        comm, lambda: fem.read_mesh(shared_tmp / "nowhere.msh", comm)
+    )
     assert "does not exist" in refusal(comm, lambda: fem.read_mesh(shared_tmp, comm))
 
 
@@ -154,7 +167,9 @@ def test_a_defect_of_a_script_reaches_all_ranks(comm):
         def build(self, gmsh):
             raise ZeroDivisionError("of the script")
 
-    with pytest.raises(ZeroDivisionError if comm.rank == 0 else ViContactError, match="of the script"):
+    with pytest.raises(
+        ZeroDivisionError if comm.rank == 0 else ViContactError, match="of the script"
+    ):
         fem.build_mesh(Faulty(), comm)
     _, tags = fem.build_mesh(BlockMesh(), comm)  # and nothing is left behind
     assert size(tags["block"]) == pytest.approx(1.0, rel=1e-13)

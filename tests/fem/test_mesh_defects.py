@@ -65,7 +65,9 @@ def test_node_tags_may_start_anywhere_have_holes_and_come_unsorted(comm, shared_
     """dolfinx#2460."""
     new = {1: 70, 2: 12, 3: 1000003, 4: 40}
     nodes = {new[tag]: SQUARE[tag] for tag in (3, 1, 4, 2)}
-    elements = [(kind, p, e, [new[tag] for tag in tags]) for kind, p, e, tags in TWO_TRIANGLES + BASE]
+    elements = [
+        (kind, p, e, [new[tag] for tag in tags]) for kind, p, e, tags in TWO_TRIANGLES + BASE
+    ]
     mesh, tags = read_text(msh(nodes, elements, NAMES), comm, shared_tmp)
     assert sizes(tags) == {"body": 1.0, "base": 1.0}
     by_tag = np.array([nodes[tag][:2] for tag in sorted(nodes)])
@@ -90,7 +92,9 @@ def test_a_half_disk_whose_named_arc_is_a_copy_of_its_boundary(comm):
     owned = mesh.topology.index_map(1).size_local
     n = comm.allreduce(int((tags["arc"].indices < owned).sum()))
     assert n >= 8
-    assert size(tags["arc"]) == pytest.approx(2 * n * math.sin(math.pi / (2 * n)), rel=1e-6)  # Gmsh spaces to 1e-9
+    assert size(tags["arc"]) == pytest.approx(
+        2 * n * math.sin(math.pi / (2 * n)), rel=1e-6
+    )  # Gmsh spaces to 1e-9
 
 
 def test_a_facet_may_be_in_two_groups_and_a_cell_too(comm, shared_tmp):
@@ -99,7 +103,10 @@ def test_a_facet_may_be_in_two_groups_and_a_cell_too(comm, shared_tmp):
     class Shared:
         def build(self, gmsh):
             geo = gmsh.model.geo
-            points = [geo.addPoint(x, y, 0, 0.5) for x, y in ((0, 0), (1, 0), (2, 0), (2, 1), (1, 1), (0, 1))]
+            points = [
+                geo.addPoint(x, y, 0, 0.5)
+                for x, y in ((0, 0), (1, 0), (2, 0), (2, 1), (1, 1), (0, 1))
+            ]
             ring = [geo.addLine(points[i], points[(i + 1) % 6]) for i in range(6)]
             middle = geo.addLine(points[1], points[4])
             left = geo.addPlaneSurface([geo.addCurveLoop([ring[0], middle, ring[4], ring[5]])])
@@ -107,14 +114,18 @@ def test_a_facet_may_be_in_two_groups_and_a_cell_too(comm, shared_tmp):
             geo.synchronize()
             lines = {"base": ring[:2], "outer": ring, "middle": [middle]}
             surfaces = {"body": [left, right], "half": [left]}
-            named = [(1, *group) for group in lines.items()] + [(2, *group) for group in surfaces.items()]
+            named = [(1, *group) for group in lines.items()] + [
+                (2, *group) for group in surfaces.items()
+            ]
             for dim, name, entities in named:
                 gmsh.model.setPhysicalName(dim, gmsh.model.addPhysicalGroup(dim, entities), name)
             gmsh.model.mesh.generate(2)
 
     expected = {"base": 2.0, "outer": 6.0, "middle": 0.0, "body": 2.0, "half": 1.0}
     _, tags = fem.build_mesh(Shared(), comm)
-    assert sizes(tags) == expected  # ds leaves out the inner facets of "middle", though they are there
+    assert (
+        sizes(tags) == expected
+    )  # ds leaves out the inner facets of "middle", though they are there
     assert comm.allreduce(len(tags["middle"].indices)) > 0
     for version in (2.2, 4.1):
         if comm.rank == 0:
@@ -130,18 +141,26 @@ def test_a_facet_may_be_in_two_groups_and_a_cell_too(comm, shared_tmp):
 
 def test_a_mesh_without_groups_is_one_group_of_cells(comm, shared_tmp):
     """dolfinx#3859."""
-    _, tags = read_text(msh(SQUARE, [(kind, 0, e, n) for kind, _, e, n in TWO_TRIANGLES + BASE]), comm, shared_tmp)
+    _, tags = read_text(
+        msh(SQUARE, [(kind, 0, e, n) for kind, _, e, n in TWO_TRIANGLES + BASE]), comm, shared_tmp
+    )
     assert sizes(tags) == {"all": 1.0}
-    assert "its boundary groups are none, its cell groups all" in refusal(comm, lambda: tags["base"])
+    assert "its boundary groups are none, its cell groups all" in refusal(
+        comm, lambda: tags["base"]
+    )
 
 
-def test_boundary_groups_may_come_without_a_group_of_cells_and_the_other_way_round(comm, shared_tmp):
+def test_boundary_groups_may_come_without_a_group_of_cells_and_the_other_way_round(
+    comm, shared_tmp
+):
     """dolfinx#3860."""
     cells = [(kind, 0, e, n) for kind, _, e, n in TWO_TRIANGLES]
     _, tags = read_text(msh(SQUARE, cells + BASE, NAMES), comm, shared_tmp)
     assert sizes(tags) == {"base": 1.0, "all": 1.0}
     comm.barrier()
-    _, tags = read_text(msh(SQUARE, TWO_TRIANGLES + [(LINE, 0, 1, (1, 2))], NAMES), comm, shared_tmp)
+    _, tags = read_text(
+        msh(SQUARE, TWO_TRIANGLES + [(LINE, 0, 1, (1, 2))], NAMES), comm, shared_tmp
+    )
     assert sizes(tags) == {"body": 1.0}
 
 
@@ -178,10 +197,14 @@ def test_two_bodies_in_touch_keep_their_own_nodes_and_sides(comm, shared_tmp):
     assert mesh.geometry.index_map().size_global == 8
     assert sizes(tags) == {"lower": 1.0, "upper": 1.0, "lower side": 1.0, "upper side": 1.0}
     y = ufl.SpatialCoordinate(mesh)[1]
-    assert integral(mesh, y, compat.measure(mesh, 2, tags["upper"].indices)) == pytest.approx(1.5, rel=1e-13)
+    assert integral(mesh, y, compat.measure(mesh, 2, tags["upper"].indices)) == pytest.approx(
+        1.5, rel=1e-13
+    )
     normal = ufl.FacetNormal(mesh)[1]
     for name, upwards in {"lower side": 1.0, "upper side": -1.0}.items():
-        assert integral(mesh, normal, compat.measure(mesh, 1, tags[name].indices)) == pytest.approx(upwards, rel=1e-13)
+        assert integral(mesh, normal, compat.measure(mesh, 1, tags[name].indices)) == pytest.approx(
+            upwards, rel=1e-13
+        )
 
 
 # Refused --------------------------------------------------------------------------------------------------------------
@@ -193,7 +216,9 @@ def turned_quadrangle(order):
 
 REFUSED = {
     "mixed cells": (
-        msh(SQUARE | {5: (2, 0, 0)}, [(QUADRANGLE, 1, 1, (1, 2, 3, 4)), (TRIANGLE, 1, 1, (2, 5, 3))]),
+        msh(
+            SQUARE | {5: (2, 0, 0)}, [(QUADRANGLE, 1, 1, (1, 2, 3, 4)), (TRIANGLE, 1, 1, (2, 5, 3))]
+        ),
         "mixes cells (Quadrilateral 4, Triangle 3): mesh it with cells of one type",
     ),
     "serendipity": (
@@ -205,13 +230,22 @@ REFUSED = {
     ),
     "folded between curved sides": (
         msh(
-            {1: (0, 0, 0), 2: (1, 0, 0), 3: (0, 1, 0), 4: (0.5, 0.6, 0), 5: (0.5, 0.5, 0), 6: (0, 0.5, 0)},
+            {
+                1: (0, 0, 0),
+                2: (1, 0, 0),
+                3: (0, 1, 0),
+                4: (0.5, 0.6, 0),
+                5: (0.5, 0.5, 0),
+                6: (0, 0.5, 0),
+            },
             [(9, 1, 1, (1, 2, 3, 4, 5, 6))],
         ),
         "has a fold between its curved sides",
     ),
     "prisms": (
-        msh(SQUARE | {5: (0, 0, 1), 6: (1, 0, 1), 7: (1, 1, 1)}, [(PRISM, 1, 1, (1, 2, 3, 5, 6, 7))]),
+        msh(
+            SQUARE | {5: (0, 0, 1), 6: (1, 0, 1), 7: (1, 1, 1)}, [(PRISM, 1, 1, (1, 2, 3, 5, 6, 7))]
+        ),
         "cells of type Prism 6: use interval, triangle",
     ),
     "shell": (msh({**SQUARE, 3: (1, 1, 0.25)}, TWO_TRIANGLES), "leaves the plane z = 0 by 0.25 m"),
@@ -219,14 +253,26 @@ REFUSED = {
         msh(SQUARE, BASE + [(LINE, 2, 1, (2, 3))], NAMES),
         "name the surface as a physical group",
     ),
-    "no area": (msh({**SQUARE, 2: (0.5, 0.5, 0)}, TWO_TRIANGLES), "mesh.msh has no volume, first at"),
+    "no area": (
+        msh({**SQUARE, 2: (0.5, 0.5, 0)}, TWO_TRIANGLES),
+        "mesh.msh has no volume, first at",
+    ),
     "no area, far away": (
-        msh({1: (1e3, 1 / 3, 0), 2: (1e3 + 0.1, 1 / 3 + 0.1, 0), 3: (1e3 + 0.3, 1 / 3 + 0.3, 0)}, TWO_TRIANGLES[:1]),
+        msh(
+            {1: (1e3, 1 / 3, 0), 2: (1e3 + 0.1, 1 / 3 + 0.1, 0), 3: (1e3 + 0.3, 1 / 3 + 0.3, 0)},
+            TWO_TRIANGLES[:1],
+        ),
         "has no volume",
     ),
     "crossed": (turned_quadrangle((1, 2, 4, 3)), "has crossing sides, first at (0.5, 0.5)"),
-    "re-entrant": (msh({**SQUARE, 3: (0.3, 0.3, 0)}, [(QUADRANGLE, 1, 1, (1, 2, 3, 4))]), "has crossing sides"),
-    "folded": (msh({**SQUARE, 4: (2, 0.5, 0)}, TWO_TRIANGLES), "have a neighbour on the same side of a common facet"),
+    "re-entrant": (
+        msh({**SQUARE, 3: (0.3, 0.3, 0)}, [(QUADRANGLE, 1, 1, (1, 2, 3, 4))]),
+        "has crossing sides",
+    ),
+    "folded": (
+        msh({**SQUARE, 4: (2, 0.5, 0)}, TWO_TRIANGLES),
+        "have a neighbour on the same side of a common facet",
+    ),
     "three cells on a side": (
         msh(SQUARE | {5: (-1, 2, 0)}, [*TWO_TRIANGLES, (TRIANGLE, 1, 1, (1, 3, 5))]),
         "a neighbour on the same side of a common facet",
@@ -249,11 +295,16 @@ def test_refused(text, words, comm, shared_tmp):
 
 
 def test_an_inner_diagonal_is_a_side_but_the_other_diagonal_is_not(comm, shared_tmp):
-    _, tags = read_text(msh(SQUARE, [*TWO_TRIANGLES, (LINE, 2, 1, (3, 1))], NAMES), comm, shared_tmp)
+    _, tags = read_text(
+        msh(SQUARE, [*TWO_TRIANGLES, (LINE, 2, 1, (3, 1))], NAMES), comm, shared_tmp
+    )
     assert comm.allreduce(len(tags["base"].indices)) >= 1
     comm.barrier()
     sentence = refusal(
-        comm, lambda: read_text(msh(SQUARE, [*TWO_TRIANGLES, (LINE, 2, 1, (2, 4))], NAMES), comm, shared_tmp)
+        comm,
+        lambda: read_text(
+            msh(SQUARE, [*TWO_TRIANGLES, (LINE, 2, 1, (2, 4))], NAMES), comm, shared_tmp
+        ),
     )
     assert "has 1 facet that is no side of a cell" in sentence
 
@@ -266,12 +317,16 @@ def test_a_flawed_box_is_refused_in_three_dimensions(comm):
         def build(self, gmsh):
             BlockMesh(lengths=(1.0,) * 3, divisions=(2, 2, 2), **self.moves).build(gmsh)
             if "simplices" in self.moves:
-                gmsh.model.mesh.setNode(14, [-0.7, 0.5, 0.5], [])  # the middle, out through the left side
+                gmsh.model.mesh.setNode(
+                    14, [-0.7, 0.5, 0.5], []
+                )  # the middle, out through the left side
             else:
                 gmsh.model.mesh.setNode(27, [0.4, 0.4, 0.4], [])  # a corner, in past the middle
 
     assert "crossing sides" in refusal(comm, lambda: fem.build_mesh(Flawed(), comm))
-    assert "the same side of a common facet" in refusal(comm, lambda: fem.build_mesh(Flawed(simplices=True), comm))
+    assert "the same side of a common facet" in refusal(
+        comm, lambda: fem.build_mesh(Flawed(simplices=True), comm)
+    )
 
 
 @pytest.mark.parametrize(

@@ -48,7 +48,12 @@ def uneven(x: Array) -> Array:
 
 
 def unlike(
-    *, upper: int = 7, lower: int = 5, lengths: tuple[float, float] = (1.5, 1.5), simplices: bool = False, **data: Any
+    *,
+    upper: int = 7,
+    lower: int = 5,
+    lengths: tuple[float, float] = (1.5, 1.5),
+    simplices: bool = False,
+    **data: Any,
 ) -> TwoBlocks:
     """Blocks of height 1 with so many cells along the interface."""
     one, two = (
@@ -58,7 +63,9 @@ def unlike(
     return TwoBlocks(upper=one, lower=two, **data)
 
 
-def sides(mesh: TwoBlocks, comm: Any = COMM, swapped: bool = False, **data: Any) -> tuple[Any, Any, Any]:
+def sides(
+    mesh: TwoBlocks, comm: Any = COMM, swapped: bool = False, **data: Any
+) -> tuple[Any, Any, Any]:
     """(system, sides of the pair)"""
     system, tags = two_blocks(comm, mesh, **data)
     one, two = (tags[side] for side in mesh.interface)
@@ -66,10 +73,13 @@ def sides(mesh: TwoBlocks, comm: Any = COMM, swapped: bool = False, **data: Any)
 
 
 def matched(system: Any, one: Any, two: Any) -> Any:
-    return DualMortar().match(side_of(system.space, one), side_of(system.space, two), system.space.size)
+    return DualMortar().match(
+        side_of(system.space, one), side_of(system.space, two), system.space.size
+    )
 
 
 # The matrix P ---------------------------------------------------------------------------------------------------------
+
 
 @pytest.mark.two_ranks
 @shapes
@@ -82,7 +92,9 @@ def test_linear_fields_and_uniform_pressure(angle, swapped, simplices):
     found = matched(system, one, two)
     nodes1, nodes2 = side_of(system.space, one).nodes, side_of(system.space, two).nodes
     assert np.array_equal(found.rows, np.arange(len(nodes1.numbers)))
-    assert np.asarray(found.P.sum(axis=1)).ravel() == pytest.approx(np.ones(len(found.rows)), rel=1e-13)
+    assert np.asarray(found.P.sum(axis=1)).ravel() == pytest.approx(
+        np.ones(len(found.rows)), rel=1e-13
+    )
     assert found.P @ nodes2.points == pytest.approx(nodes1.points, abs=1e-13)
     assert found.weights == pytest.approx(nodes1.weights, rel=1e-13)
     assert found.P.T @ found.weights == pytest.approx(nodes2.weights, rel=1e-12)
@@ -150,10 +162,15 @@ def test_curved_sides(gap):
 # V2.1 -----------------------------------------------------------------------------------------------------------------
 
 P = 1.0e8
-STEEL, BRASS = LinearElastic(E=2.1e11, nu=0.3, rho=7850.0), LinearElastic(E=1.0e11, nu=0.2, rho=8400.0)
+STEEL, BRASS = (
+    LinearElastic(E=2.1e11, nu=0.3, rho=7850.0),
+    LinearElastic(E=1.0e11, nu=0.2, rho=8400.0),
+)
 
 
-@pytest.mark.parametrize("solver", [Condensed(), Volume(method=ReducedNewton())], ids=["condensed", "volume"])
+@pytest.mark.parametrize(
+    "solver", [Condensed(), Volume(method=ReducedNewton())], ids=["condensed", "volume"]
+)
 @pytest.mark.parametrize("swapped", [False, pytest.param(True, marks=pytest.mark.slow)])
 @shapes
 def test_v2_1_pressure_through_meshes_that_do_not_match(simplices, swapped, solver):
@@ -183,7 +200,10 @@ def test_v2_1_pressure_through_meshes_that_do_not_match(simplices, swapped, solv
     problem = ContactProblem(system, surface)
     state = static_equilibrium(problem, solver=solver)
     exact, found = per_body(system, lower, upper), problem.cartesian(state.u)
-    error, size = (float(COMM.allreduce(float(np.abs(x).max(initial=0.0)), op=MPI.MAX)) for x in (found - exact, exact))
+    error, size = (
+        float(COMM.allreduce(float(np.abs(x).max(initial=0.0)), op=MPI.MAX))
+        for x in (found - exact, exact)
+    )
     assert error < 1e-10 * size and seen(surface).all(state.active).all()
     assert np.abs(seen(surface).all(state.r_n) / seen(surface).weights / P - 1.0).max() < 1e-10
 
@@ -197,7 +217,9 @@ def meeting(comm: Any, *, friction: Any = None, mass: Any = None) -> ContactProb
     mesh = TwoBlocks(
         upper=BlockMesh(lengths=(0.8, 0.6), divisions=(9, 7), simplices=True),
         lower=BlockMesh(lengths=(1.5, 1.0), divisions=(10, 7), simplices=True, deform=uneven),
-        offset=(0.4,), gap=1e-3, angle=angle,
+        offset=(0.4,),
+        gap=1e-3,
+        angle=angle,
     )
     system, tags = two_blocks(comm, mesh)
     down = turned((1.5, -2.0), angle)
@@ -237,7 +259,9 @@ def test_action_is_reaction():
     surface = contact_pair(system, one, two, matching=DualMortar())
     random = np.random.default_rng(3)
     r_n, r_t = random.random(seen(surface).count), random.standard_normal((seen(surface).count, 1))
-    push = forces(ContactProblem(system, surface), seen(surface).reaction_load(r_n, system.rows, r_t))
+    push = forces(
+        ContactProblem(system, surface), seen(surface).reaction_load(r_n, system.rows, r_t)
+    )
     points = field(system, system.u0)[0]
     moment = np.einsum("ki,kj->ij", points, push)
     assert np.abs(push.sum(axis=0)).max() < 1e-12 and np.abs(moment - moment.T).max() < 1e-12
@@ -247,24 +271,37 @@ def test_action_is_reaction():
 def test_condensed_and_volume_agree(scheme, mass):
     """Every step from the same state, to 1e-9."""
     solvers = (Condensed(), Volume(method=ReducedNewton()))
-    assert cross_check(meeting(COMM, mass=mass), scheme=scheme, solvers=solvers, dt=1e-3, steps=20).worst <= 1e-9
+    assert (
+        cross_check(
+            meeting(COMM, mass=mass), scheme=scheme, solvers=solvers, dt=1e-3, steps=20
+        ).worst
+        <= 1e-9
+    )
 
 
 # Refusals -------------------------------------------------------------------------------------------------------------
+
 
 @pytest.mark.two_ranks
 def test_refusals():
     system, tags = two_blocks(COMM, unlike())
     for one, two, sentence in (
         ("upper_bottom", "lower_bottom", "'lower_bottom' does not face 'upper_bottom' at"),
-        ("upper_bottom", "lower_left", "no part of 'lower_left' lies opposite 'upper_bottom', along the normals"),
+        (
+            "upper_bottom",
+            "lower_left",
+            "no part of 'lower_left' lies opposite 'upper_bottom', along the normals",
+        ),
         ("upper_top", "lower_bottom", "'lower_bottom' lies 2 m behind 'upper_top' at"),
     ):
         with pytest.raises(InputError, match=sentence):
             contact_pair(system, tags[one], tags[two], matching=DualMortar())
     bar = BlockMesh(lengths=(1.0,), divisions=(2,))
     system, one, two = sides(TwoBlocks(lower=bar, upper=bar))
-    with pytest.raises(InputError, match=r"DualMortar joins sides of plane and solid bodies: use matching=NodeToNode"):
+    with pytest.raises(
+        InputError,
+        match=r"DualMortar joins sides of plane and solid bodies: use matching=NodeToNode",
+    ):
         contact_pair(system, one, two, matching=DualMortar())
     with pytest.raises(InputError, match="'lower_top' lies 0.1 m behind 'upper_bottom'"):
         system, one, two = sides(unlike(gap=-0.1))

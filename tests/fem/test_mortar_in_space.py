@@ -60,31 +60,51 @@ TURN = rotation(1)
 
 
 def face(
-    kind: str, divisions: tuple[int, int], *, up: bool, size: tuple[float, float] = (1.0, 1.0), height: float = 0.0,
-    corner: tuple[float, float] = (0.0, 0.0), distorted: float = 0.3, bend: Any = None, name: str = "face",
+    kind: str,
+    divisions: tuple[int, int],
+    *,
+    up: bool,
+    size: tuple[float, float] = (1.0, 1.0),
+    height: float = 0.0,
+    corner: tuple[float, float] = (0.0, 0.0),
+    distorted: float = 0.3,
+    bend: Any = None,
+    name: str = "face",
 ) -> Side:
     """A side of triangles ("t") or quadrilaterals ("q") in the plane z = height, bent, then turned; nodal normals are
     means over the facets, weights ∫ phi_i where it is plane."""
-    x = np.stack(np.meshgrid(*(np.linspace(0.0, 1.0, n + 1) for n in divisions), indexing="ij"), axis=-1)
+    x = np.stack(
+        np.meshgrid(*(np.linspace(0.0, 1.0, n + 1) for n in divisions), indexing="ij"), axis=-1
+    )
     moved = distorted * (np.random.default_rng(sum(divisions)).random(x.shape) - 0.5) / divisions
     moved[[0, -1], :, 0] = moved[:, [0, -1], 1] = 0.0
     plane = (x + moved).reshape(-1, 2) * size + corner
     points = np.column_stack([plane, np.full(len(plane), height)])
     points = (points if bend is None else bend(points)) @ TURN.T
     ids = np.arange(len(points)).reshape(x.shape[:2])
-    quads = np.stack([ids[:-1, :-1], ids[1:, :-1], ids[1:, 1:], ids[:-1, 1:]], axis=-1).reshape(-1, 4)
+    quads = np.stack([ids[:-1, :-1], ids[1:, :-1], ids[1:, 1:], ids[:-1, 1:]], axis=-1).reshape(
+        -1, 4
+    )
     rows = quads if kind == "q" else np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     corners = points[rows]
     normals, weights = np.zeros_like(points), np.zeros(len(points))
     for i in range(rows.shape[1]):
-        turned = np.cross(np.roll(corners, -1, axis=1)[:, i] - corners[:, i], corners[:, i - 1] - corners[:, i])
+        turned = np.cross(
+            np.roll(corners, -1, axis=1)[:, i] - corners[:, i], corners[:, i - 1] - corners[:, i]
+        )
         np.add.at(normals, rows[:, i], turned if up else -turned)
-        for j in range(rows.shape[1]):  # ∫ phi_i of bilinear functions: 4/36, 2/36, 1/36, 2/36 of the parallelograms
+        for j in range(
+            rows.shape[1]
+        ):  # ∫ phi_i of bilinear functions: 4/36, 2/36, 1/36, 2/36 of the parallelograms
             share = 1.0 / 18.0 if kind == "t" else (4.0, 2.0, 1.0, 2.0)[j - i] / 36.0
             np.add.at(weights, rows[:, j], share * np.linalg.norm(turned, axis=1))
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     numbers, held = np.arange(len(points)) + 1000 * up, np.zeros(points.shape, dtype=bool)
-    return Side(name, Nodes(numbers, points, normals, weights, held, np.zeros(points.shape, dtype=np.int64)), rows)
+    return Side(
+        name,
+        Nodes(numbers, points, normals, weights, held, np.zeros(points.shape, dtype=np.int64)),
+        rows,
+    )
 
 
 def faced(kinds: str, one: dict[str, Any], two: dict[str, Any]) -> tuple[Side, Side, Matched]:
@@ -103,6 +123,7 @@ def offset(one: Side, two: Side, found: Matched) -> tuple[Array, Array]:
 
 # Polygons -------------------------------------------------------------------------------------------------------------
 
+
 @serial
 def test_polygons():
     """Areas of what random quadrilaterals and triangles share, and of what is outside, make up the whole; what they
@@ -118,12 +139,15 @@ def test_polygons():
     assert not areas(overlaps(one, two + 9.0)).any()
     places, weights = rule(3)
     x, y = places[:, 0], places[:, 1]
-    assert weights @ (x**2 * y**2) == pytest.approx(2.0 * 4.0 / 720.0, rel=1e-14)  # 2 a! b! / (a + b + 2)!
+    assert weights @ (x**2 * y**2) == pytest.approx(
+        2.0 * 4.0 / 720.0, rel=1e-14
+    )  # 2 a! b! / (a + b + 2)!
     inner = np.einsum("qc,kcx->kqx", places, one[:, :3])
     assert np.einsum("kqv,kvx->kqx", hats(one, inner), one) == pytest.approx(inner, abs=1e-14)
 
 
 # The matrix P ---------------------------------------------------------------------------------------------------------
+
 
 @serial
 @facets
@@ -164,21 +188,28 @@ def test_partly_covered_sides(kinds, corner):
 def test_only_what_is_nearest_counts(kinds, length):
     """A slanting step above a part of side 2: weights arrive there, and on the rest as before, also where side 2 ends
     below the step."""
+
     def slanting(x: Array) -> Array:
         return x + np.outer(0.3 * x[:, 0], [0.0, 0.0, 1.0])
 
     low = face(kinds[1], (3, 6), up=True, size=(length, 1.0), bend=slanting)
-    step = face(kinds[1], (4, 2), up=True, size=(0.5, 0.4), corner=(0.3, 0.2), height=0.1, bend=slanting)
+    step = face(
+        kinds[1], (4, 2), up=True, size=(0.5, 0.4), corner=(0.3, 0.2), height=0.1, bend=slanting
+    )
     count = len(low.nodes.numbers)
     upper = replace(step.nodes, numbers=step.nodes.numbers + count)
-    two = Side("both", joined_nodes([low.nodes, upper]), np.concatenate([low.facets, step.facets + count]))
+    two = Side(
+        "both", joined_nodes([low.nodes, upper]), np.concatenate([low.facets, step.facets + count])
+    )
     one = face(kinds[0], (5, 4), up=False, height=0.5)
     found = DualMortar().match(one, two, 1.0)
     force = found.P.T @ found.weights
     below = length - 0.4 * (min(length, 0.8) - 0.3)
     assert force[count:].sum() == pytest.approx(0.2, rel=1e-12)
     assert force[:count].sum() == pytest.approx(below, rel=1e-12)
-    assert force[count:] @ step.nodes.points == pytest.approx(0.2 * TURN @ [0.55, 0.4, 0.1 + 0.3 * 0.55], abs=1e-12)
+    assert force[count:] @ step.nodes.points == pytest.approx(
+        0.2 * TURN @ [0.55, 0.4, 0.1 + 0.3 * 0.55], abs=1e-12
+    )
     assert np.abs(offset(one, two, found)[1]).max() < 1e-12
 
 
@@ -189,11 +220,18 @@ def test_a_hidden_layer_of_the_same_outline_is_not_felt(kinds):
     near, far = (face(kinds[1], (4, 4), up=True, height=height) for height in (-0.05, -0.1))
     count = len(near.nodes.numbers)
     behind = replace(far.nodes, numbers=far.nodes.numbers + count)
-    two = Side("both", joined_nodes([near.nodes, behind]), np.concatenate([near.facets, far.facets + count]))
+    two = Side(
+        "both",
+        joined_nodes([near.nodes, behind]),
+        np.concatenate([near.facets, far.facets + count]),
+    )
     one = face(kinds[0], (4, 4), up=False)
     found, alone = (DualMortar().match(one, side, 1.0) for side in (two, near))
     assert found.weights == pytest.approx(alone.weights, rel=1e-12)
-    assert np.abs((found.P[:, :count] - alone.P).toarray()).max() < 1e-12 and abs(found.P[:, count:]).max() < 1e-12
+    assert (
+        np.abs((found.P[:, :count] - alone.P).toarray()).max() < 1e-12
+        and abs(found.P[:, count:]).max() < 1e-12
+    )
 
 
 @pytest.mark.two_ranks
@@ -202,12 +240,18 @@ def test_sides_of_a_block_do_not_see_the_ground_beside_it(gap):
     """Side 1 is the bottom of a block, or the bottom and all vertical sides: the same conditions."""
     upper = BlockMesh(lengths=(1.0,) * 3, divisions=(3,) * 3)
     lower = BlockMesh(lengths=(2.0, 1.0, 2.0), divisions=(4, 2, 5))
-    mesh, tags = build_mesh(TwoBlocks(upper=upper, lower=lower, offset=(0.5, 0.5), gap=gap), MPI.COMM_WORLD)
+    mesh, tags = build_mesh(
+        TwoBlocks(upper=upper, lower=lower, offset=(0.5, 0.5), gap=gap), MPI.COMM_WORLD
+    )
     system = assemble(mesh, LinearElastic(E=1e6, nu=0.3, rho=1e3), clamped=tags["lower_bottom"])
     sides = [tags[f"upper_{name}"].indices for name in ("bottom", "left", "right", "front", "back")]
     bottom, all_sides = (
-        contact_pair(system, Facets("block", np.unique(np.concatenate(some)), mesh), tags["lower_top"],
-                     matching=DualMortar())
+        contact_pair(
+            system,
+            Facets("block", np.unique(np.concatenate(some)), mesh),
+            tags["lower_top"],
+            matching=DualMortar(),
+        )
         for some in (sides[:1], sides)
     )
     assert all_sides.total == bottom.total == 16
@@ -233,7 +277,9 @@ def test_curved_sides(kinds, gap):
     one, two, found = faced(kinds, {"bend": dome(1.0)}, {"bend": dome(1.0 + gap)})
     along, beside = offset(one, two, found)
     assert len(found.rows) == 30 and np.abs(beside).max() < 1e-14 * (1.0 + gap)
-    longest = [np.ptp(side.nodes.points[side.facets], axis=1).max() * np.sqrt(3.0) for side in (one, two)]
+    longest = [
+        np.ptp(side.nodes.points[side.facets], axis=1).max() * np.sqrt(3.0) for side in (one, two)
+    ]
     assert np.abs(along - gap).max() < longest[0] ** 2 / 8.0 + longest[1] ** 2 / 8.0 / (1.0 + gap)
     assert np.asarray(found.P.sum(axis=1)).ravel() == pytest.approx(np.ones(30), abs=1e-13)
     assert (along + found.overlap).min() > 0.0
@@ -255,19 +301,30 @@ LENGTHS, FINER = (1.5, 1.0, 1.2), ((3, 5, 4), (5, 5, 4))
 
 def placed(number: int, distorted: float = 0.0, bent: float = 0.0) -> Any:
     """Turn points, whose x and z, and y where they are to be bent, are moved before."""
+
     def deform(x: Array) -> Array:
         a, b = np.pi * x[:, 0] / LENGTHS[0], np.pi * x[:, 2] / LENGTHS[2]
-        shift = distorted * np.column_stack([np.sin(2 * a) * np.cos(b), 0.0 * a, np.cos(a) * np.sin(2 * b)])
+        shift = distorted * np.column_stack(
+            [np.sin(2 * a) * np.cos(b), 0.0 * a, np.cos(a) * np.sin(2 * b)]
+        )
         moved = x + shift
-        moved[:, 1] += bent * ((moved[:, 0] - 0.9) ** 2 + moved[:, 0] * moved[:, 2])  # nodes of both sides on one face
+        moved[:, 1] += bent * (
+            (moved[:, 0] - 0.9) ** 2 + moved[:, 0] * moved[:, 2]
+        )  # nodes of both sides on one face
         return np.asarray(moved @ rotation(number).T)
 
     return deform
 
 
 def unlike(
-    *, turn: int = 0, simplices: bool = False, distorted: tuple[float, float] = (0.0, 0.0),
-    upper: tuple[float, float, float] = LENGTHS, divisions: Any = ((3, 2, 2), (2, 2, 3)), bent: float = 0.0, **data: Any
+    *,
+    turn: int = 0,
+    simplices: bool = False,
+    distorted: tuple[float, float] = (0.0, 0.0),
+    upper: tuple[float, float, float] = LENGTHS,
+    divisions: Any = ((3, 2, 2), (2, 2, 3)),
+    bent: float = 0.0,
+    **data: Any,
 ) -> TwoBlocks:
     """Blocks on top of one another with meshes of their own, turned in space."""
     one, two = (
@@ -283,11 +340,16 @@ def paired(mesh: TwoBlocks, comm: Any = COMM, swapped: bool = False, **data: Any
     system, tags = two_blocks(comm, mesh, **data)
     sides = [tags[side] for side in mesh.interface]
     surface = contact_pair(system, *(sides[::-1] if swapped else sides), matching=DualMortar())
-    return ContactProblem(system, surface, mass=mass, **({} if friction is None else {"friction": friction}))
+    return ContactProblem(
+        system, surface, mass=mass, **({} if friction is None else {"friction": friction})
+    )
 
 
 P = 1.0e8
-STEEL, BRASS = LinearElastic(E=2.1e11, nu=0.3, rho=7850.0), LinearElastic(E=1.0e11, nu=0.2, rho=8400.0)
+STEEL, BRASS = (
+    LinearElastic(E=2.1e11, nu=0.3, rho=7850.0),
+    LinearElastic(E=1.0e11, nu=0.2, rho=8400.0),
+)
 
 
 @shapes
@@ -310,7 +372,9 @@ def test_v2_1_pressure_through_meshes_that_do_not_match(simplices, swapped):
     problem = ContactProblem(system, surface)
     state = static_equilibrium(problem, solver=Condensed())
     exact = per_body(system, lower, upper)
-    assert max_over_ranks(COMM, problem.cartesian(state.u) - exact) < 1e-10 * max_over_ranks(COMM, exact)
+    assert max_over_ranks(COMM, problem.cartesian(state.u) - exact) < 1e-10 * max_over_ranks(
+        COMM, exact
+    )
     assert seen(surface).all(state.active).all() and surface.total == 12
     assert np.abs(seen(surface).all(state.r_n) / seen(surface).weights / P - 1.0).max() < 1e-10
 
@@ -334,7 +398,11 @@ def sliding(comm: Any, turn: int, mu: float) -> ContactProblem:
     down = 9.81e3 * rotation(turn) @ [0.5, -np.sqrt(0.75), 0.0]
     mesh = unlike(turn=turn, upper=(0.8, 0.5, 0.7), offset=(0.2, 0.3), divisions=FINER)
     problem = paired(
-        mesh, comm, friction=Coulomb(mu), mass=Redistributed(), loads=BodyForce(tuple(down)),
+        mesh,
+        comm,
+        friction=Coulomb(mu),
+        mass=Redistributed(),
+        loads=BodyForce(tuple(down)),
         clamped=lambda tags: tags["lower_bottom"],
     )
     push = rotation(turn) @ [0.5, -0.3, 0.1]
@@ -351,19 +419,31 @@ def test_a_block_slides_down_a_plane_alike_in_any_orientation():
     )
     assert first.active.any() and first.certificate.max() <= 1e-9
     friction = sliding(MPI.COMM_SELF, 0, 0.3).surface.everywhere(first.state.r_t)
-    assert np.linalg.norm(friction, axis=1) == pytest.approx(0.3 * first.r_n[-1], rel=1e-9)  # all of it slides
+    assert np.linalg.norm(friction, axis=1) == pytest.approx(
+        0.3 * first.r_n[-1], rel=1e-9
+    )  # all of it slides
     assert np.abs(found.u @ rotation(4) - first.u).max() < 1e-9 * np.abs(first.u).max()
     assert np.abs(found.r_n - first.r_n).max() < 1e-9 * first.r_n.max()
 
 
 @pytest.mark.two_ranks
-@pytest.mark.parametrize("scheme", [(Midpoint(), ConsistentMass()), (Trapezoidal(), Redistributed())], ids=["midpoint",
-                                                                                                          "trapezoidal"])
+@pytest.mark.parametrize(
+    "scheme",
+    [(Midpoint(), ConsistentMass()), (Trapezoidal(), Redistributed())],
+    ids=["midpoint", "trapezoidal"],
+)
 def test_what_one_body_gains_the_other_loses(scheme):
     """V9.8: momentum and angular momentum of two bodies thrown at each other, with curved sides of warped facets, are
     kept to 1e-12 over the collision."""
-    mesh = unlike(turn=2, upper=(0.8, 0.6, 0.7), offset=(0.5, 0.4), gap=0.05, distorted=(0.05, 0.0), divisions=FINER,
-                  bent=0.2)
+    mesh = unlike(
+        turn=2,
+        upper=(0.8, 0.6, 0.7),
+        offset=(0.5, 0.4),
+        gap=0.05,
+        distorted=(0.05, 0.0),
+        divisions=FINER,
+        bent=0.2,
+    )
     problem = paired(mesh, mass=scheme[1])
     down, points = rotation(2) @ [0.0, -2.0, 0.0], problem.system.space.points
     system = thrown(problem.system, np.zeros_like, lambda x: np.outer(1.0 + 0.2 * x[:, 0], down))
@@ -382,7 +462,9 @@ def test_what_one_body_gains_the_other_loses(scheme):
     assert np.abs(momenta(problem, state.v) - before).max() > 0.1 * np.abs(before).max()
 
 
-@pytest.mark.parametrize("moves", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["rest", "moving"])
+@pytest.mark.parametrize(
+    "moves", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["rest", "moving"]
+)
 def test_a_body_held_everywhere_is_an_obstacle(moves):
     """A block thrown on a block that is prescribed all over rubs as on the half-space, at rest and moving: same
     displacements (1e-10) and reactions (1e-9)."""
@@ -391,20 +473,36 @@ def test_a_body_held_everywhere_is_an_obstacle(moves):
     built, tags = build_mesh(mesh, COMM)
     along, up = turn @ [0.3, 0.7, 0.2], turn @ [0.0, 1.0, 0.0]
     motion = {
-        name: lambda x, t, n=n: np.tile(1e-2 * 20.0**n * np.sin(20.0 * t + 0.5 * np.pi * n) * along, (len(x), 1))
+        name: lambda x, t, n=n: np.tile(
+            1e-2 * 20.0**n * np.sin(20.0 * t + 0.5 * np.pi * n) * along, (len(x), 1)
+        )
         for n, name in enumerate(("displacement", "velocity", "acceleration") if moves else ())
     }
-    hold = [Prescribed(tags[f"lower_{side}"], **motion) for side in ("left", "right", "bottom", "top", "back", "front")]
+    hold = [
+        Prescribed(tags[f"lower_{side}"], **motion)
+        for side in ("left", "right", "bottom", "top", "back", "front")
+    ]
     system = assemble(built, SOFT, prescribed=hold)
-    system = thrown(system, np.zeros_like, lambda x: np.outer(2.0 + x[:, 0], turn @ [0.3, -1.0, 0.1]))
+    system = thrown(
+        system, np.zeros_like, lambda x: np.outer(2.0 + x[:, 0], turn @ [0.3, -1.0, 0.1])
+    )
     one, two = (tags[side] for side in mesh.interface)
     alone = contact_surface(system, one, obstacle=HalfSpace(point=tuple(up), normal=tuple(up)))
     if moves:
-        t0 = alone.tangential_values(relative(ContactProblem(system, alone), system.influence @ along))[:1]
-        alone = alone.moving(towards=lambda t: 1e-2 * np.sin(20.0 * t) * float(along @ up),
-                             along=lambda t: 1e-2 * np.sin(20.0 * t) * t0)
+        t0 = alone.tangential_values(
+            relative(ContactProblem(system, alone), system.influence @ along)
+        )[:1]
+        alone = alone.moving(
+            towards=lambda t: 1e-2 * np.sin(20.0 * t) * float(along @ up),
+            along=lambda t: 1e-2 * np.sin(20.0 * t) * t0,
+        )
     found, expected = (
-        run(ContactProblem(system, surface, friction=Coulomb(0.4)), scheme=Trapezoidal(), dt=2e-3, steps=20)
+        run(
+            ContactProblem(system, surface, friction=Coulomb(0.4)),
+            scheme=Trapezoidal(),
+            dt=2e-3,
+            steps=20,
+        )
         for surface in (contact_pair(system, one, two, matching=DualMortar()), alone)
     )
     assert expected.active.any() and not expected.active.all() and found.certificate.max() <= 1e-9
@@ -416,34 +514,61 @@ def test_a_body_held_everywhere_is_an_obstacle(moves):
 def test_a_side_that_bends_round_an_edge():
     """The bottom and a side of a box in a step of two others, as one pair and as two: the same conditions; nodes on
     the edge have two."""
-    boxes = {"box": ((0, 0, 0), (1, 1, 1), (3, 3, 2)), "under": ((0, -1, 0), (1, 1, 1), (2, 2, 3)),
-             "west": ((-1, 0, 0), (1, 1, 1), (2, 4, 3))}
-    mesh = Blocks({
-        name: BlockMesh(lengths=lengths, divisions=n, corner=corner, simplices=True, deform=lambda x: x @ TURN.T)
-        for name, (corner, lengths, n) in boxes.items()
-    })
+    boxes = {
+        "box": ((0, 0, 0), (1, 1, 1), (3, 3, 2)),
+        "under": ((0, -1, 0), (1, 1, 1), (2, 2, 3)),
+        "west": ((-1, 0, 0), (1, 1, 1), (2, 4, 3)),
+    }
+    mesh = Blocks(
+        {
+            name: BlockMesh(
+                lengths=lengths,
+                divisions=n,
+                corner=corner,
+                simplices=True,
+                deform=lambda x: x @ TURN.T,
+            )
+            for name, (corner, lengths, n) in boxes.items()
+        }
+    )
     built, tags = build_mesh(mesh, COMM)
     system, pairs = assemble(built, SOFT), (("box_bottom", "under_top"), ("box_left", "west_right"))
-    sides = [Facets("side", np.concatenate([tags[name].indices for name in names]), built) for names in
-             zip(*pairs, strict=True)]
+    sides = [
+        Facets("side", np.concatenate([tags[name].indices for name in names]), built)
+        for names in zip(*pairs, strict=True)
+    ]
     one = contact_pair(system, *sides, matching=DualMortar())
-    apart = [contact_pair(system, *(tags[name] for name in pair), matching=DualMortar()) for pair in pairs]
+    apart = [
+        contact_pair(system, *(tags[name] for name in pair), matching=DualMortar())
+        for pair in pairs
+    ]
     two = joined_surfaces(*apart)
-    assert [len(corner) for corner in seen(one).corners] == [2, 2, 2] and one.total == two.total == 24
+    assert [len(corner) for corner in seen(one).corners] == [
+        2,
+        2,
+        2,
+    ] and one.total == two.total == 24
     u = system.space.restrict(np.cos(system.space.points) + system.space.points[:, ::-1] ** 2)
     rows = []
     for surface in (one, two):
         x = relative(ContactProblem(system, surface), u)
         found = seen(surface)
-        columns = np.column_stack([found.points, found.normals, found.weights, found.normal_values(x)])
+        columns = np.column_stack(
+            [found.points, found.normals, found.weights, found.normal_values(x)]
+        )
         rows.append(columns[np.lexsort(np.round(columns[:, :6], 9).T)])
     assert rows[0] == pytest.approx(rows[1], abs=1e-12)
 
 
-@pytest.mark.parametrize(("scheme", "mass", "friction"), [
-    (Midpoint(), ConsistentMass(), None), pytest.param(Trapezoidal(), Redistributed(), None, marks=serial),
-    pytest.param(Trapezoidal(), Redistributed(), Coulomb(0.3), marks=serial),
-], ids=["midpoint", "trapezoidal", "rough"])
+@pytest.mark.parametrize(
+    ("scheme", "mass", "friction"),
+    [
+        (Midpoint(), ConsistentMass(), None),
+        pytest.param(Trapezoidal(), Redistributed(), None, marks=serial),
+        pytest.param(Trapezoidal(), Redistributed(), Coulomb(0.3), marks=serial),
+    ],
+    ids=["midpoint", "trapezoidal", "rough"],
+)
 def test_routes_agree(scheme, mass, friction):
     """Condensed, volume and iterative route, every step from the same state, partly covered sides: to 1e-9."""
     mesh = unlike(turn=2, upper=(0.8, 0.6, 0.7), offset=(1.0, -0.4), gap=1e-3, divisions=FINER)
@@ -457,6 +582,7 @@ def test_routes_agree(scheme, mass, friction):
 
 # Refusals -------------------------------------------------------------------------------------------------------------
 
+
 @pytest.mark.two_ranks
 def test_refusals():
     mesh = unlike(gap=-0.1)
@@ -466,14 +592,24 @@ def test_refusals():
     system = assemble(built, SOFT)
     for one, two, sentence in (
         ("upper_bottom", "lower_bottom", "'lower_bottom' does not face 'upper_bottom' at"),
-        ("upper_bottom", "lower_left", "no part of 'lower_left' lies opposite 'upper_bottom', along the normals"),
+        (
+            "upper_bottom",
+            "lower_left",
+            "no part of 'lower_left' lies opposite 'upper_bottom', along the normals",
+        ),
         ("upper_top", "lower_bottom", "'lower_bottom' lies 2 m behind 'upper_top' at"),
         ("upper_top", "upper_top", "are the same nodes, so that nothing can part there"),
     ):
         with pytest.raises(InputError, match=sentence):
             contact_pair(system, tags[one], tags[two], matching=DualMortar())
-    with pytest.raises(InputError, match=r"a facet of both 'twice' and 'lower_top' at \(.*\): a facet cannot touch"):
-        twice = Facets("twice", np.concatenate([tags[name].indices for name in ("upper_bottom", "lower_top")]), built)
+    with pytest.raises(
+        InputError, match=r"a facet of both 'twice' and 'lower_top' at \(.*\): a facet cannot touch"
+    ):
+        twice = Facets(
+            "twice",
+            np.concatenate([tags[name].indices for name in ("upper_bottom", "lower_top")]),
+            built,
+        )
         contact_pair(system, twice, tags["lower_top"], matching=DualMortar())
 
 
@@ -481,10 +617,19 @@ def test_refusals():
 def test_refused_facets():
     """Facets that are so thin that their normals mean nothing, and quadrilaterals with a corner that points inwards."""
     for kind, moved in (("t", 1e-9), ("q", 0.7)):
-        one, two = face(kind, (5, 4), up=False, distorted=0.0, name="bad"), face("t", (3, 6), up=True)
+        one, two = (
+            face(kind, (5, 4), up=False, distorted=0.0, name="bad"),
+            face("t", (3, 6), up=True),
+        )
         points = one.nodes.points.copy()
-        points[6] += (1.0 - moved) * (points[0] - points[6]) if kind == "t" else moved * (points[12] - points[6])
+        points[6] += (
+            (1.0 - moved) * (points[0] - points[6])
+            if kind == "t"
+            else moved * (points[12] - points[6])
+        )
         bad = replace(one, nodes=replace(one.nodes, points=points))
         for sides in ((bad, two), (two, bad)):
-            with pytest.raises(InputError, match="a facet of 'bad' at .* is a sliver or not convex: its normal"):
+            with pytest.raises(
+                InputError, match="a facet of 'bad' at .* is a sliver or not convex: its normal"
+            ):
                 DualMortar().match(*sides, 1.0)

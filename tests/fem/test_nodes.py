@@ -30,11 +30,15 @@ COMM = MPI.COMM_WORLD
 
 
 def wavy(x: Array) -> Array:
-    return np.column_stack([x[:, 0], x[:, 1] + 0.05 * np.sin(3.0 * x[:, 0]) * np.cos(2.0 * x[:, 2]), x[:, 2]])
+    return np.column_stack(
+        [x[:, 0], x[:, 1] + 0.05 * np.sin(3.0 * x[:, 0]) * np.cos(2.0 * x[:, 2]), x[:, 2]]
+    )
 
 
 def body(divisions: tuple[int, ...] = (12, 2, 12)) -> tuple[Any, Any]:
-    mesh, tags = build_mesh(BlockMesh(lengths=(1.0, 0.3, 1.0), divisions=divisions, deform=wavy), COMM)
+    mesh, tags = build_mesh(
+        BlockMesh(lengths=(1.0, 0.3, 1.0), divisions=divisions, deform=wavy), COMM
+    )
     return assemble(mesh, SOFT), tags
 
 
@@ -59,19 +63,29 @@ def test_numbers_alone_are_gathered():
     assert not len(boundary(space, tags["bottom"], beyond=0.5).vertices)
     space.comm = system.algebra.comm = weighed = Weighed(COMM)
     surface = contact_surface(system, tags["bottom"])
-    shared = 0 if COMM.size == 1 else 4 * 13 * 8 * (1 + 2 * 3)  # up to two cuts, seen from both sides: number and box
+    shared = (
+        0 if COMM.size == 1 else 4 * 13 * 8 * (1 + 2 * 3)
+    )  # up to two cuts, seen from both sides: number and box
     shared *= 4  # facets round these nodes, and their parts, in the search for hinges
     own = len(nodes_on(space, tags["bottom"]).numbers)
     assert 48 * own <= weighed.gathered <= 48 * own + shared
     weighed.gathered = 0
-    assert ContactProblem(system, surface, friction=friction, mass=Redistributed()).equations.massless.any()
-    neighbours = 0 if COMM.size == 1 else 4 * 3 * 13 * 3 * 8 * (1 + 8)  # columns asked for, then unknowns told of
+    assert ContactProblem(
+        system, surface, friction=friction, mass=Redistributed()
+    ).equations.massless.any()
+    neighbours = (
+        0 if COMM.size == 1 else 4 * 3 * 13 * 3 * 8 * (1 + 8)
+    )  # columns asked for, then unknowns told of
     assert weighed.gathered <= neighbours
 
 
 def test_slots_do_not_depend_on_the_ranks():
     """Keys of all ranks in one order, those of one node after one another."""
-    keys = np.sort(np.concatenate([np.arange(COMM.rank, 20, COMM.size), np.arange(COMM.rank, 20, 5 * COMM.size)]))
+    keys = np.sort(
+        np.concatenate(
+            [np.arange(COMM.rank, 20, COMM.size), np.arange(COMM.rank, 20, 5 * COMM.size)]
+        )
+    )
     found = slots_of(MpiComm(COMM), keys)
     every = np.sort(np.concatenate(COMM.allgather(keys)))
     assert np.array_equal(every[found], keys) and np.all(np.diff(found) > 0)

@@ -21,7 +21,9 @@ COMM = MPI.COMM_WORLD
 GROUND = vc.HalfSpace(point=(0.0, -2.0), normal=(0.0, 1.0))
 
 
-def surface_of(name: str, obstacle: Any, lengths: tuple[float, float] = (2.0, 1.0)) -> vc.ContactSurface:
+def surface_of(
+    name: str, obstacle: Any, lengths: tuple[float, float] = (2.0, 1.0)
+) -> vc.ContactSurface:
     """A side of a block before an obstacle."""
     mesh, tags = fem.build_mesh(BlockMesh(lengths=lengths, divisions=(4, 3)), COMM)
     system = fem.assemble(mesh, vc.LinearElastic(E=1e9, nu=0.3, rho=2000.0))
@@ -30,10 +32,16 @@ def surface_of(name: str, obstacle: Any, lengths: tuple[float, float] = (2.0, 1.
 
 @pytest.mark.parametrize(
     ("name", "angle", "words"),
-    [("left", 90, "is along the boundary"), ("top", 180, "points into the body"), ("right", 90, "is along")],
+    [
+        ("left", 90, "is along the boundary"),
+        ("top", 180, "points into the body"),
+        ("right", 90, "is along"),
+    ],
 )
 def test_a_face_that_the_obstacle_never_reaches_is_refused_once(name, angle, words):
-    with pytest.raises(InputError, match=rf"of '{name}' {words}.* at {angle} degrees to its mean outward normal"):
+    with pytest.raises(
+        InputError, match=rf"of '{name}' {words}.* at {angle} degrees to its mean outward normal"
+    ):
         surface_of(name, GROUND)
 
 
@@ -45,7 +53,9 @@ def test_a_direction_of_ones_own_along_the_face_is_refused():
         def gap(self, points: Array, normals: Array) -> Array:
             return np.zeros(len(points))
 
-    with pytest.raises(InputError, match=r"Sideways: .* 'bottom' is along the boundary.* 90 degrees"):
+    with pytest.raises(
+        InputError, match=r"Sideways: .* 'bottom' is along the boundary.* 90 degrees"
+    ):
         surface_of("bottom", Sideways())
 
 
@@ -55,7 +65,9 @@ def test_the_far_side_of_a_round_body_is_let_be():
     def bend(x: Array) -> Array:
         return np.column_stack([x[:, 0] * np.cos(x[:, 1]), x[:, 0] * np.sin(x[:, 1])])
 
-    ring = BlockMesh(lengths=(0.5, 1.5 * np.pi), divisions=(3, 24), corner=(1.0, -0.75 * np.pi), deform=bend)
+    ring = BlockMesh(
+        lengths=(0.5, 1.5 * np.pi), divisions=(3, 24), corner=(1.0, -0.75 * np.pi), deform=bend
+    )
     mesh, tags = fem.build_mesh(ring, COMM)
     system = fem.assemble(mesh, vc.LinearElastic(E=1e9, nu=0.3, rho=2000.0))
     surface = fem.contact_surface(system, tags["right"], obstacle=GROUND)

@@ -36,7 +36,9 @@ def beam(count: int = 6, **given):
     h = L / count
     force = np.zeros(3 * (count + 1))
     for i in range(count):
-        force[3 * i + 1 : 3 * i + 6] += -100.0 * np.array([h / 2, h**2 / 12, 0.0, h / 2, -(h**2) / 12])
+        force[3 * i + 1 : 3 * i + 6] += -100.0 * np.array(
+            [h / 2, h**2 / 12, 0.0, h / 2, -(h**2) / 12]
+        )
     return vc.system_from_arrays(**(parts | {"clamped": [0, 1, 2], "load": force} | given))
 
 
@@ -55,13 +57,20 @@ def marched(problem, steps=60, **options):
 
 @pytest.mark.parametrize("scheme", [vc.MoreauJean(), vc.ContactStabilisedNewmark()])
 def test_chain_between_walls_is_that_made_by_hand(scheme):
-    by_hand = chain_problem(8, gap=0.01, left_gap=0.02, damping=1e-4, v0=np.linspace(-1.0, 2.0, 8), floating=True)
+    by_hand = chain_problem(
+        8, gap=0.01, left_gap=0.02, damping=1e-4, v0=np.linspace(-1.0, 2.0, 8), floating=True
+    )
     M, C, K = by_hand.system.M.csr, by_hand.system.C.csr, by_hand.system.K.csr
-    system = vc.system_from_arrays(M, C.toarray(), K, coordinates=np.arange(1.0, 9.0)[:, None], v0=by_hand.system.v0)
+    system = vc.system_from_arrays(
+        M, C.toarray(), K, coordinates=np.arange(1.0, 9.0)[:, None], v0=by_hand.system.v0
+    )
     surface = vc.contact_points(system, [7, 0], [[2.0], [-1.0]], weights=0.5, gap0=[0.01, 0.02])
     problem = vc.ContactProblem(system, surface, mass=vc.ConsistentMass())
     ours, theirs = (marched(one, steps=300, scheme=scheme, dt=2e-3) for one in (problem, by_hand))
-    assert all(np.array_equal(a.u, b.u) and np.array_equal(a.r_n, b.r_n) for a, b in zip(ours, theirs, strict=True))
+    assert all(
+        np.array_equal(a.u, b.u) and np.array_equal(a.r_n, b.r_n)
+        for a, b in zip(ours, theirs, strict=True)
+    )
     assert any(a.active[0] for a in ours) and any(a.active[1] for a in ours)
     assert system.floating and system.space.bodies.max() == 0
 
@@ -70,7 +79,9 @@ def test_thrown_bar():
     """Force rho c v while the wave goes forth and back, 2L/c, then the speed it came with (E = 900 Pa, L = 10 m)."""
     n, v, c, gap = 200, 2.0, 30.0, 0.1
     M, K = bar_matrices(n, length=10.0, E=900.0, rho=1.0)
-    system = vc.system_from_arrays(M, None, K, coordinates=line([0.0], [10.0], n), v0=np.full(n + 1, -v))
+    system = vc.system_from_arrays(
+        M, None, K, coordinates=line([0.0], [10.0], n), v0=np.full(n + 1, -v)
+    )
     surface = vc.contact_points(system, [0], [-1.0], gap0=gap)
     start, end, dt = gap / v, gap / v + 20.0 / c, 1e-3
     states = marched(vc.ContactProblem(system, surface), steps=round((end + 0.1) / dt), dt=dt)
@@ -88,21 +99,27 @@ def test_two_bars_exchange_their_speeds():
     M, K = bar_matrices(n, length=10.0, E=900.0, rho=1.0)
     points = np.concatenate([line([0.0], [10.0], n), line([10.02], [20.02], n)])
     speeds = np.repeat([v, 0.0], n + 1)
-    system = vc.system_from_arrays(*(sp.block_diag([M, M]), None, sp.block_diag([K, K])), coordinates=points, v0=speeds)
+    system = vc.system_from_arrays(
+        *(sp.block_diag([M, M]), None, sp.block_diag([K, K])), coordinates=points, v0=speeds
+    )
     assert system.space.bodies.tolist() == [0] * (n + 1) + [1] * (n + 1)
     surface = vc.contact_points(system, [n], [1.0], opposite=[n + 1])
     assert surface.gap0 == pytest.approx(0.02, rel=1e-12)
     problem = vc.ContactProblem(system, surface)
     dt = 1e-3
     states = marched(problem, steps=round((0.02 / v + 20.0 / c + 0.1) / dt), dt=dt)
-    assert problem.cartesian(states[-1].v).reshape(2, -1).mean(axis=1) == pytest.approx([0.0, v], abs=0.02 * v)
+    assert problem.cartesian(states[-1].v).reshape(2, -1).mean(axis=1) == pytest.approx(
+        [0.0, v], abs=0.02 * v
+    )
 
 
 def test_corner_of_two_oblique_walls():
     """A mass on springs is pressed into a corner of 60°: it stays, and the two reactions are the force's components."""
     way = np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])
     force = np.array([3.0, 2.0])
-    system = vc.system_from_arrays([1.0, 1.0], None, 10.0 * np.eye(2), coordinates=[[0.0, 0.0]], load=force)
+    system = vc.system_from_arrays(
+        [1.0, 1.0], None, 10.0 * np.eye(2), coordinates=[[0.0, 0.0]], load=force
+    )
     surface = vc.contact_points(system, [0, 0], way)
     state = vc.static_equilibrium(vc.ContactProblem(system, surface))
     assert state.r_n == pytest.approx(np.linalg.solve(way.T, force), rel=1e-12)
@@ -133,7 +150,9 @@ def test_load_steps_of_a_cantilever():
     problem = vc.ContactProblem(system, vc.contact_points(system, [6], [0.0, -1.0], gap0=0.1))
     times, touch = np.linspace(0.0, 1.0, 11), 3 * EI * 0.1 / L**3
     found = [state.r_n[0] for state in vc.quasi_static(problem, times)]
-    assert found == pytest.approx(np.maximum(1000.0 * times - touch, 0.0), rel=1e-9, abs=1e-9 * touch)
+    assert found == pytest.approx(
+        np.maximum(1000.0 * times - touch, 0.0), rel=1e-9, abs=1e-9 * touch
+    )
 
 
 @pytest.mark.parametrize("normal", [(0.0, -1.0), (0.6, -0.8)])
@@ -172,7 +191,9 @@ def test_beam_strikes_a_stop_and_rubs(scheme):
     surface = vc.contact_points(system, [6, 3], [0.3, -1.0], gap0=0.002, weights=0.01)
     problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.4), mass=vc.ConsistentMass())
     probe = vc.Probe({"tip": (L, 0.0), "foot": (0.0, 0.0)})
-    found = vc.simulate(problem, scheme=scheme, dt=2e-4, steps=150, record=[vc.Energy(), vc.Contact(), probe])
+    found = vc.simulate(
+        problem, scheme=scheme, dt=2e-4, steps=150, record=[vc.Energy(), vc.Contact(), probe]
+    )
     assert found.facts["energy_defect"] <= 1e-10 and found.history["certificate"].max() <= 1e-9
     assert found.history["contact_active"].max() >= 1 and found.history["loss_friction"][-1] > 0.0
     assert not found.history["u_y_foot"].any() and found.history["u_y_tip"].min() < -0.001
@@ -188,10 +209,14 @@ def test_matrices_that_are_not_symmetric(name):
     v0, dt = np.array([1.0, 0.5]), 0.01
     system = vc.system_from_arrays([1.0, 2.0], **skew, coordinates=[[0.0, 0.0]], v0=v0)
     assert f"{name} not symmetric: for Volume() and Condensed(Lemke())" in system.notes[0]
-    problem = vc.ContactProblem(system, vc.contact_points(system, [0], [1.0, 0.0]), mass=vc.ConsistentMass())
+    problem = vc.ContactProblem(
+        system, vc.contact_points(system, [0], [1.0, 0.0]), mass=vc.ConsistentMass()
+    )
     rubbing = replace(problem, friction=vc.Coulomb(0.1))
     for one, solver in ((problem, vc.Condensed()), (rubbing, vc.Condensed(Lemke(), NSGS()))):
-        with pytest.raises(InputError, match=r"Condensed needs symmetric .*Condensed\(Lemke\(\)\), or Volume"):
+        with pytest.raises(
+            InputError, match=r"Condensed needs symmetric .*Condensed\(Lemke\(\)\), or Volume"
+        ):
             marched(one, steps=1, scheme=vc.MoreauJean(theta=1.0), dt=dt, solver=solver)
     A = np.diag([1.0, 2.0]) + dt * skew["C"] + dt**2 * skew["K"]
     for solver in (vc.Volume(), vc.Condensed(Lemke())):
@@ -212,7 +237,9 @@ def hung(stiff, load, *, soft=1.0):
     """A chain of five masses on stiff springs, hung at its first node on a soft one, with a stop 0.3 m from its end."""
     K = stiff * (2.0 * np.eye(5) - np.eye(5, k=1) - np.eye(5, k=-1))
     K[0, 0], K[4, 4] = stiff + soft, stiff
-    system = vc.system_from_arrays(np.ones(5), None, K, coordinates=np.arange(5.0)[:, None], load=[0, 0, 0, 0, load])
+    system = vc.system_from_arrays(
+        np.ones(5), None, K, coordinates=np.arange(5.0)[:, None], load=[0, 0, 0, 0, load]
+    )
     return vc.ContactProblem(system, vc.contact_points(system, [4], [1.0], gap0=0.3))
 
 
@@ -225,7 +252,9 @@ def test_a_soft_spring_holds_a_stiff_body(stiff):
     assert not off.system.floating and lost.system.floating
     assert state.u == pytest.approx(np.full(5, -0.5), rel=1e-3) and state.r_n[0] == 0.0
     state = vc.static_equilibrium(on)
-    assert state.u == pytest.approx(np.full(5, 0.3), rel=1e-8) and state.r_n == pytest.approx([0.2], rel=1e-3)
+    assert state.u == pytest.approx(np.full(5, 0.3), rel=1e-8) and state.r_n == pytest.approx(
+        [0.2], rel=1e-3
+    )
 
 
 @pytest.mark.parametrize("stiffness", [1.0e3, 0.0])
@@ -237,7 +266,9 @@ def test_a_mass_without_stiffness_floats(stiffness):
     problem = vc.ContactProblem(system, surface, mass=vc.ConsistentMass())
     state = vc.static_equilibrium(problem)
     u = problem.cartesian(state.u)
-    assert system.floating and u == pytest.approx([-1.0e-3 if stiffness else -0.01, -0.01], rel=1e-9)
+    assert system.floating and u == pytest.approx(
+        [-1.0e-3 if stiffness else -0.01, -0.01], rel=1e-9
+    )
     assert state.r_n == pytest.approx([0.0 if stiffness else 1.0, 2.0], rel=1e-9, abs=1e-12)
 
 
@@ -245,7 +276,10 @@ def test_a_mass_without_stiffness_floats(stiffness):
 @pytest.mark.parametrize("digits", [3, 16])
 def test_free_motions_in_any_units(size, digits):
     """A frame of bars at an angle, free, pinned, on rollers, held and on springs of a millionth; rounded places too."""
-    X, K = np.round([[0.1, 0.2], [1 / 3, 1 / 7], [0.4, 0.9], [0.05, 2 / 3]], digits) * size, np.zeros((8, 8))
+    X, K = (
+        np.round([[0.1, 0.2], [1 / 3, 1 / 7], [0.4, 0.9], [0.05, 2 / 3]], digits) * size,
+        np.zeros((8, 8)),
+    )
     for i in range(4):
         for j in range(i):
             way = (X[i] - X[j]) / np.linalg.norm(X[i] - X[j])
@@ -264,7 +298,9 @@ def test_products_do_not_grow_with_bodies(monkeypatch):
     counts, product = [], SerialMatrix.__matmul__
     monkeypatch.setattr(SerialMatrix, "__matmul__", lambda A, x: counts.append(A) or product(A, x))
     for n in (10, 1000):
-        system = vc.system_from_arrays(np.ones(n), None, np.eye(n), coordinates=np.arange(float(n))[:, None])
+        system = vc.system_from_arrays(
+            np.ones(n), None, np.eye(n), coordinates=np.arange(float(n))[:, None]
+        )
         counts.append(n)
         assert not system.floating
     assert counts.index(10) == len(counts) - counts.index(10) - 2
@@ -279,8 +315,12 @@ def test_mass_of_rotations():
     lumped = beam(M=np.tile([1.0, 1.0, 0.0], 7))
     assert lumped.massless.sum() == 6
     for scheme in (vc.MoreauJean(), vc.Trapezoidal()):
-        problem = vc.ContactProblem(lumped, vc.contact_points(lumped, [6], [0.0, -1.0]), mass=vc.ConsistentMass())
-        with pytest.raises(InputError, match="rows of M are zero while contact nodes have mass: condense"):
+        problem = vc.ContactProblem(
+            lumped, vc.contact_points(lumped, [6], [0.0, -1.0]), mass=vc.ConsistentMass()
+        )
+        with pytest.raises(
+            InputError, match="rows of M are zero while contact nodes have mass: condense"
+        ):
             marched(problem, scheme=scheme, dt=1e-3)
 
 
@@ -293,7 +333,11 @@ def test_rotations_and_tip_without_mass():
     problem = vc.ContactProblem(system, surface, mass=vc.ConsistentMass())
     found = vc.simulate(problem, scheme=vc.Trapezoidal(), dt=5e-4, steps=200)
     assert found.facts["energy_defect"] <= 1e-10 and found.history["contact_active"].max() == 1
-    total = found.history["energy_kinetic"] + found.history["energy_strain"] - found.history["work_input"]
+    total = (
+        found.history["energy_kinetic"]
+        + found.history["energy_strain"]
+        - found.history["work_input"]
+    )
     assert total == pytest.approx(total[0], rel=1e-2)  # 0.3 % at the impacts, of the time step
 
 
@@ -302,13 +346,17 @@ def test_weight_counts_the_mass_shared_with_the_clamp():
     system = beam(load=None)
     heavy = vc.with_weight(system, acceleration=100.0 / RHO_A)
     assert heavy.load.constant == pytest.approx(beam().load.constant, rel=1e-12)
-    assert system.inertia(np.array([0.0, -100.0 / RHO_A])) == pytest.approx(beam().load.constant, rel=1e-12)
+    assert system.inertia(np.array([0.0, -100.0 / RHO_A])) == pytest.approx(
+        beam().load.constant, rel=1e-12
+    )
 
 
 def test_loads_with_histories_lose_the_clamped_rows():
     vector = np.arange(21.0)
     load = Load(vector, ((2.0 * vector, np.sin),), (lambda t: t * vector,))
-    assert beam(load=load).load(0.5) == pytest.approx((1.0 + 2.0 * np.sin(0.5) + 0.5) * vector[3:], rel=1e-15)
+    assert beam(load=load).load(0.5) == pytest.approx(
+        (1.0 + 2.0 * np.sin(0.5) + 0.5) * vector[3:], rel=1e-15
+    )
 
 
 def test_restart_is_the_straight_run(tmp_path):
@@ -319,7 +367,9 @@ def test_restart_is_the_straight_run(tmp_path):
     straight = run(steps=80)
     run(steps=40, out=tmp_path)
     again = run(steps=80, out=tmp_path, restart=True)
-    assert np.array_equal(again.state.u, straight.state.u) and np.array_equal(again.state.r_n, straight.state.r_n)
+    assert np.array_equal(again.state.u, straight.state.u) and np.array_equal(
+        again.state.r_n, straight.state.r_n
+    )
     for name, values in straight.history.items():
         np.testing.assert_array_equal(again.history[name], values)
 
@@ -330,19 +380,41 @@ def test_frames_for_paraview(tmp_path):
     system = beam(v0=np.tile([0.1, -1.0, 0.0], 7))
     surface = vc.contact_points(system, [6], [0.3, -1.0], gap0=0.002, weights=0.01)
     problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.4), mass=vc.ConsistentMass())
-    run = partial(vc.simulate, problem, scheme=vc.MoreauJean(), dt=2e-4, out=tmp_path, fields=fem.XDMF(every=5))
+    run = partial(
+        vc.simulate,
+        problem,
+        scheme=vc.MoreauJean(),
+        dt=2e-4,
+        out=tmp_path,
+        fields=fem.XDMF(every=5),
+    )
     run(steps=10)
     found = run(steps=20, restart=True)
-    assert sorted(path.name for path in (tmp_path / "fields").iterdir())[-2:] == ["frame_000020.h5", "mesh.h5"]
-    assert (tmp_path / "fields.xdmf").read_text().count('TopologyType="Polyvertex" NumberOfElements="7"') == 5
-    with h5py.File(tmp_path / "fields/mesh.h5") as mesh, h5py.File(tmp_path / "fields/frame_000020.h5") as frame:
+    assert sorted(path.name for path in (tmp_path / "fields").iterdir())[-2:] == [
+        "frame_000020.h5",
+        "mesh.h5",
+    ]
+    assert (tmp_path / "fields.xdmf").read_text().count(
+        'TopologyType="Polyvertex" NumberOfElements="7"'
+    ) == 5
+    with (
+        h5py.File(tmp_path / "fields/mesh.h5") as mesh,
+        h5py.File(tmp_path / "fields/frame_000020.h5") as frame,
+    ):
         assert np.array_equal(mesh["points"][:, :2], system.space.points)
         assert mesh["cells"][:, 0].tolist() == [*range(7)]
         u = np.zeros((7, 3))
         u[1:, :2] = problem.cartesian(found.state.u).reshape(-1, 3)[:, :2]
         assert np.array_equal(frame["u"][:], u) and frame["v"].shape == frame["a"].shape == (7, 3)
-        assert frame["contact_pressure"][6] == found.state.r_n[0] / 0.01 and not frame["contact_pressure"][:6].any()
-        assert frame["contact_status"][:6].tolist() == [0] * 6 and frame["contact_status"][6] in (1, 2, 3)
+        assert (
+            frame["contact_pressure"][6] == found.state.r_n[0] / 0.01
+            and not frame["contact_pressure"][:6].any()
+        )
+        assert frame["contact_status"][:6].tolist() == [0] * 6 and frame["contact_status"][6] in (
+            1,
+            2,
+            3,
+        )
     with pytest.raises(InputError, match="has bars or points only"):
         plots.plot_deformed(vc.read_run(tmp_path), tmp_path / "deformed.png")
 
@@ -352,45 +424,57 @@ def test_frames_for_paraview(tmp_path):
 ONE, POINTS = np.eye(2), [[0.0, 0.0]]
 
 
-@pytest.mark.parametrize(("given", "said"), [
-    ({"K": np.ones((2, 3))}, r"M has shape \(2, 2\) and K has 2 rows|K has shape \(2, 3\)"),
-    ({"M": np.eye(3)}, r"M has shape \(3, 3\) and K has 2 rows; give square matrices of one size"),
-    ({"K": 1j * ONE}, "K is .*give real numbers"),
-    ({"K": sp.csr_matrix(1j * ONE)}, "K has entries of type complex128; give real numbers"),
-    ({"K": [[1.0, np.nan], [np.nan, 1.0]]}, "K is nan at"),
-    ({"K": sp.csr_matrix([[1.0, np.inf], [np.inf, 1.0]])}, "K has NaN or infinite entries"),
-    ({"M": [[1.0, 0.1], [0.0, 1.0]]}, "M is not symmetric"),
-    ({"M": [1.0, -1.0]}, "M has a diagonal entry below zero"),
-    ({"M": [[0.0, 1.0], [1.0, 0.0]]}, "M has a zero on its diagonal beside other entries"),
-    ({"M": None}, "M is None"),
-    ({"coordinates": np.zeros((1, 4))}, "give 1, 2 or 3 coordinates of every node"),
-    ({"coordinates": np.zeros((3, 1))}, "K has 2 rows, and 3 nodes have 3 components; give unknowns="),
-    ({"unknowns": [[0, 0], [1, 1]]}, r"row 1 of unknowns is \[1, 1\]; give a node from 0 to 0"),
-    ({"unknowns": [[0, 0], [0, 2]]}, "component from -1 to 1"),
-    ({"unknowns": [[0, 0], [0, 0]]}, "component 0 of node 0 has several rows"),
-    ({"clamped": [2]}, "clamped goes from 2 to 2; give numbers of rows below 2"),
-    ({"load": [1.0]}, r"load has shape \(1,\)"),
-    ({"load": Load(np.zeros(3))}, r"a vector of load has shape \(3,\)"),
-    ({"u0": [0.0, np.inf]}, "u0 is inf at"),
-])
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"K": np.ones((2, 3))}, r"M has shape \(2, 2\) and K has 2 rows|K has shape \(2, 3\)"),
+        (
+            {"M": np.eye(3)},
+            r"M has shape \(3, 3\) and K has 2 rows; give square matrices of one size",
+        ),
+        ({"K": 1j * ONE}, "K is .*give real numbers"),
+        ({"K": sp.csr_matrix(1j * ONE)}, "K has entries of type complex128; give real numbers"),
+        ({"K": [[1.0, np.nan], [np.nan, 1.0]]}, "K is nan at"),
+        ({"K": sp.csr_matrix([[1.0, np.inf], [np.inf, 1.0]])}, "K has NaN or infinite entries"),
+        ({"M": [[1.0, 0.1], [0.0, 1.0]]}, "M is not symmetric"),
+        ({"M": [1.0, -1.0]}, "M has a diagonal entry below zero"),
+        ({"M": [[0.0, 1.0], [1.0, 0.0]]}, "M has a zero on its diagonal beside other entries"),
+        ({"M": None}, "M is None"),
+        ({"coordinates": np.zeros((1, 4))}, "give 1, 2 or 3 coordinates of every node"),
+        (
+            {"coordinates": np.zeros((3, 1))},
+            "K has 2 rows, and 3 nodes have 3 components; give unknowns=",
+        ),
+        ({"unknowns": [[0, 0], [1, 1]]}, r"row 1 of unknowns is \[1, 1\]; give a node from 0 to 0"),
+        ({"unknowns": [[0, 0], [0, 2]]}, "component from -1 to 1"),
+        ({"unknowns": [[0, 0], [0, 0]]}, "component 0 of node 0 has several rows"),
+        ({"clamped": [2]}, "clamped goes from 2 to 2; give numbers of rows below 2"),
+        ({"load": [1.0]}, r"load has shape \(1,\)"),
+        ({"load": Load(np.zeros(3))}, r"a vector of load has shape \(3,\)"),
+        ({"u0": [0.0, np.inf]}, "u0 is inf at"),
+    ],
+)
 def test_bad_matrices(given, said):
     with pytest.raises(InputError, match=said):
         vc.system_from_arrays(**({"M": ONE, "C": None, "K": ONE, "coordinates": POINTS} | given))
 
 
-@pytest.mark.parametrize(("given", "said"), [
-    ({"nodes": []}, "nodes is empty"),
-    ({"nodes": [7]}, "nodes has node 7, which the system does not have"),
-    ({"nodes": [0.5]}, "give whole numbers"),
-    ({"normals": [0.0, 0.0]}, "the normal of node 6 is zero"),
-    ({"normals": [1.0, 0.0, 0.0]}, r"normals has shape \(3,\)"),
-    ({"gap0": -1e-3}, "penetrates its obstacle by 0.001 m"),
-    ({"obstacle": vc.Touching(), "gap0": 0.1}, "the obstacle gives the gaps"),
-    ({"obstacle": vc.HalfSpace((0.0, -1.0), (0.0, -1.0))}, "points into the body"),
-    ({"opposite": [6]}, "side 1 of one contact pair and on side 2"),
-    ({"nodes": [0]}, "is also prescribed along its contact direction"),
-    ({"nodes": [6, 6]}, "several contact surfaces with one contact direction"),
-])
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"nodes": []}, "nodes is empty"),
+        ({"nodes": [7]}, "nodes has node 7, which the system does not have"),
+        ({"nodes": [0.5]}, "give whole numbers"),
+        ({"normals": [0.0, 0.0]}, "the normal of node 6 is zero"),
+        ({"normals": [1.0, 0.0, 0.0]}, r"normals has shape \(3,\)"),
+        ({"gap0": -1e-3}, "penetrates its obstacle by 0.001 m"),
+        ({"obstacle": vc.Touching(), "gap0": 0.1}, "the obstacle gives the gaps"),
+        ({"obstacle": vc.HalfSpace((0.0, -1.0), (0.0, -1.0))}, "points into the body"),
+        ({"opposite": [6]}, "side 1 of one contact pair and on side 2"),
+        ({"nodes": [0]}, "is also prescribed along its contact direction"),
+        ({"nodes": [6, 6]}, "several contact surfaces with one contact direction"),
+    ],
+)
 def test_bad_contact(given, said):
     with pytest.raises(InputError, match=said):
         vc.contact_points(**({"system": beam(), "nodes": [6], "normals": [0.0, -1.0]} | given))

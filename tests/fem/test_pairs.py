@@ -70,6 +70,7 @@ def of_body(problem: ContactProblem, u: Array, body: int) -> tuple[Array, Array]
 
 # Relative unknowns ----------------------------------------------------------------------------------------------------
 
+
 @pytest.mark.two_ranks
 @cases
 def test_unknowns_are_relative_displacements(name):
@@ -83,13 +84,21 @@ def test_unknowns_are_relative_displacements(name):
     normal = np.sum(jump * seen(surface).normals, axis=1)
     assert seen(surface).normal_values(x) == pytest.approx(normal, abs=1e-13 * np.abs(jump).max())
     along = np.linalg.norm(jump - normal[:, None] * seen(surface).normals, axis=1)
-    assert np.linalg.norm(seen(surface).tangential_values(x), axis=1) == pytest.approx(along, abs=1e-12)
+    assert np.linalg.norm(seen(surface).tangential_values(x), axis=1) == pytest.approx(
+        along, abs=1e-12
+    )
     d = system.space.dimension
     down = np.zeros(d)
     down[: min(d, 2)] = turned((0.0, -1.0), CASES[name].get("angle", 0.0)) if d > 1 else -1.0
-    assert seen(surface).normals == pytest.approx(np.tile(down, (seen(surface).count, 1)), abs=1e-13)
-    assert seen(surface).count == np.prod(np.delete(np.add(blocks(d).upper.divisions, 1), 0 if d == 1 else 1))
-    assert not seen(surface).gap0.any() and seen(surface).weights.sum() == pytest.approx({1: 1.0, 2: 1.5, 3: 1.8}[d])
+    assert seen(surface).normals == pytest.approx(
+        np.tile(down, (seen(surface).count, 1)), abs=1e-13
+    )
+    assert seen(surface).count == np.prod(
+        np.delete(np.add(blocks(d).upper.divisions, 1), 0 if d == 1 else 1)
+    )
+    assert not seen(surface).gap0.any() and seen(surface).weights.sum() == pytest.approx(
+        {1: 1.0, 2: 1.5, 3: 1.8}[d]
+    )
 
 
 @cases
@@ -97,10 +106,16 @@ def test_relative_system_is_the_same_system(name):
     """Energies, work of loads and inertia loads do not depend on the unknowns."""
     d = CASES[name]["d"]
     pull = {"loads": BodyForce(tuple(np.arange(1.0, d + 1.0)))}
-    problem = paired(name, initial_displacement=lambda x: 1e-2 * linear(x), initial_velocity=wavy, **pull)
+    problem = paired(
+        name, initial_displacement=lambda x: 1e-2 * linear(x), initial_velocity=wavy, **pull
+    )
     system, other = problem.system, problem.equations
-    assert other.kinetic_energy(other.v0) == pytest.approx(system.kinetic_energy(system.v0), rel=1e-13)
-    assert other.strain_energy(other.u0) == pytest.approx(system.strain_energy(system.u0), rel=1e-12)
+    assert other.kinetic_energy(other.v0) == pytest.approx(
+        system.kinetic_energy(system.v0), rel=1e-13
+    )
+    assert other.strain_energy(other.u0) == pytest.approx(
+        system.strain_energy(system.u0), rel=1e-12
+    )
     work = system.algebra.dot(system.load(0.0), system.v0)
     assert other.algebra.dot(other.load(0.0), other.v0) == pytest.approx(work, rel=1e-13)
     for a, b in zip(other.influence.T, system.influence.T, strict=True):
@@ -136,7 +151,9 @@ def test_gaps_and_listed_points():
     one, two = (tags[side] for side in mesh.interface)
     surface = contact_pair(system, one, two)
     assert seen(surface).gap0 == pytest.approx(np.full(5, 0.25), rel=1e-12)
-    assert seen(contact_pair(system, two, one)).normals == pytest.approx(-seen(surface).normals, abs=1e-13)
+    assert seen(contact_pair(system, two, one)).normals == pytest.approx(
+        -seen(surface).normals, abs=1e-13
+    )
     points = turned([(1.5, 1.25), (0.375, 1.25)], 0.4)
     listed = contact_pair(system, one, two, points=points)
     assert seen(listed).points == pytest.approx(points, abs=1e-12)
@@ -164,7 +181,9 @@ def test_curved_sides_pair_along_their_normals():
     """Rings one inside the other: radial partners, gap 0.1; at the ends, where the normal of the last chord is half an
     angle off, its component."""
     system, tags = two_blocks(COMM, rings())
-    surface = contact_pair(system, tags["inner_right"], tags["outer_left"], matching=NodeToNode(0.05))
+    surface = contact_pair(
+        system, tags["inner_right"], tags["outer_left"], matching=NodeToNode(0.05)
+    )
     half = np.pi / 24.0
     ends = np.isclose(np.abs(seen(surface).points[:, 0]), 2.0)
     assert seen(surface).gap0 == pytest.approx(np.where(ends, 0.1 * np.cos(half), 0.1), rel=1e-12)
@@ -193,6 +212,7 @@ def test_a_crack_rubs_on_itself():
 
 
 # Bodies that do not deform --------------------------------------------------------------------------------------------
+
 
 def thrown_down(problem: ContactProblem, angle: float) -> ContactProblem:
     def down(x: Array) -> Array:
@@ -224,7 +244,10 @@ def test_a_body_held_everywhere_is_an_obstacle(moves, friction):
 
     def hold(tags: Any) -> list[Prescribed]:
         motion = {"displacement": shift, "velocity": rate, "acceleration": bend} if moves else {}
-        return [Prescribed(tags[f"lower_{side}"], **motion) for side in ("left", "right", "bottom", "top")]
+        return [
+            Prescribed(tags[f"lower_{side}"], **motion)
+            for side in ("left", "right", "bottom", "top")
+        ]
 
     system, tags = two_blocks(COMM, mesh, prescribed=hold)
     one, two = (tags[side] for side in mesh.interface)
@@ -236,12 +259,20 @@ def test_a_body_held_everywhere_is_an_obstacle(moves, friction):
         along = relative(problem, system.influence @ speed)
         t0 = seen(alone).tangential_values(along)[:1]
         alone = alone.moving(
-            towards=lambda t: 1e-2 * np.sin(20.0 * t) * float(speed @ up), along=lambda t: 1e-2 * np.sin(20.0 * t) * t0
+            towards=lambda t: 1e-2 * np.sin(20.0 * t) * float(speed @ up),
+            along=lambda t: 1e-2 * np.sin(20.0 * t) * t0,
         )
     found, expected = (
         run(
-            thrown_down(ContactProblem(system, surface, **({} if friction is None else {"friction": friction})), angle),
-            scheme=Midpoint() if friction is None else Trapezoidal(), dt=2e-3, steps=40,
+            thrown_down(
+                ContactProblem(
+                    system, surface, **({} if friction is None else {"friction": friction})
+                ),
+                angle,
+            ),
+            scheme=Midpoint() if friction is None else Trapezoidal(),
+            dt=2e-3,
+            steps=40,
         )
         for surface in (pair, alone)
     )
@@ -255,7 +286,9 @@ def test_a_body_held_everywhere_is_an_obstacle(moves, friction):
 def test_held_components_of_partners_drop_out(held):
     """Rollers under the interface: the relative unknown keeps the free component of the partner only."""
     mesh = blocks(2, angle=0.0)
-    system, tags = two_blocks(COMM, mesh, prescribed=lambda tags: Prescribed(tags["lower_top"], components=held))
+    system, tags = two_blocks(
+        COMM, mesh, prescribed=lambda tags: Prescribed(tags["lower_top"], components=held)
+    )
     problem = ContactProblem(system, contact_pair(system, *(tags[side] for side in mesh.interface)))
     u = per_body(system, wavy, linear)
     kept = np.ones(2)
@@ -263,23 +296,30 @@ def test_held_components_of_partners_drop_out(held):
     jump = linear(seen(problem.surface).points) - kept * wavy(seen(problem.surface).points)
     x = relative(problem, u)
     assert seen(problem.surface).normal_values(x) == pytest.approx(-jump[:, 1], abs=1e-12)
-    assert np.abs(seen(problem.surface).tangential_values(x))[:, 0] == pytest.approx(np.abs(jump[:, 0]), abs=1e-12)
+    assert np.abs(seen(problem.surface).tangential_values(x))[:, 0] == pytest.approx(
+        np.abs(jump[:, 0]), abs=1e-12
+    )
 
 
 @pytest.mark.two_ranks
 def test_nodes_clamped_on_both_sides_are_left_out():
     mesh = blocks(2)
-    system, tags = two_blocks(COMM, mesh, clamped=lambda tags: [tags["lower_left"], tags["upper_left"]])
+    system, tags = two_blocks(
+        COMM, mesh, clamped=lambda tags: [tags["lower_left"], tags["upper_left"]]
+    )
     surface = contact_pair(system, *(tags[side] for side in mesh.interface))
     assert seen(surface).count == 4 and seen(surface).points[:, 0].min() > 0.0
 
 
 # Refusals, each with its sentence, on all ranks -----------------------------------------------------------------------
 
+
 def test_partners_are_looked_for_nearby():
     """On two waved faces, touching or apart, a table holds the few nodes next to each one; partners are those that all
     nodes of the other side would give."""
-    x = np.stack(np.meshgrid(np.linspace(0.0, 1.0, 24), np.linspace(0.0, 2.0, 24)), axis=-1).reshape(-1, 2)
+    x = np.stack(
+        np.meshgrid(np.linspace(0.0, 1.0, 24), np.linspace(0.0, 2.0, 24)), axis=-1
+    ).reshape(-1, 2)
     x = np.column_stack([x, 0.1 * np.sin(6.0 * x[:, 0])])
     normals = np.column_stack([-0.6 * np.cos(6.0 * x[:, 0]), np.zeros(len(x)), np.ones(len(x))])
     normals /= np.linalg.norm(normals, axis=1)[:, None]
@@ -306,13 +346,17 @@ def test_partners_are_looked_for_nearby():
 def test_sides_that_do_not_pair():
     system, tags = two_blocks(COMM, blocks(2, lower=(5, 2)))
     one, two = tags["upper_bottom"], tags["lower_top"]
-    with pytest.raises(InputError, match="3 of 5 nodes of 'upper_bottom' have no node of 'lower_top' opposite"):
+    with pytest.raises(
+        InputError, match="3 of 5 nodes of 'upper_bottom' have no node of 'lower_top' opposite"
+    ):
         contact_pair(system, one, two)
     system, tags = two_blocks(COMM, blocks(2, offset=(0.375,)))
     sentence = r"1 of 5 nodes of 'lower_top' have no node of 'upper_bottom' opposite, the first at \(0, 1\): mesh both"
     with pytest.raises(InputError, match=sentence):
         contact_pair(system, tags["lower_top"], tags["upper_bottom"])
-    with pytest.raises(InputError, match=r"several nodes of 'upper_bottom' face the node of 'lower_top' at \(0"):
+    with pytest.raises(
+        InputError, match=r"several nodes of 'upper_bottom' face the node of 'lower_top' at \(0"
+    ):
         system, tags = two_blocks(COMM, blocks(2, lower=(2, 2)))
         contact_pair(system, tags["upper_bottom"], tags["lower_top"], matching=NodeToNode(1.1))
 
@@ -320,9 +364,15 @@ def test_sides_that_do_not_pair():
 @pytest.mark.two_ranks
 def test_sides_that_do_not_face_each_other():
     system, tags = two_blocks(COMM, blocks(2))
-    with pytest.raises(InputError, match=r"'lower_bottom' does not face 'upper_bottom' at \(.*\), where both outward"):
+    with pytest.raises(
+        InputError,
+        match=r"'lower_bottom' does not face 'upper_bottom' at \(.*\), where both outward",
+    ):
         contact_pair(system, tags["upper_bottom"], tags["lower_bottom"])
-    with pytest.raises(InputError, match=r"'lower_bottom' lies 2 m behind 'upper_top' at \(0, 2\): the bodies overlap"):
+    with pytest.raises(
+        InputError,
+        match=r"'lower_bottom' lies 2 m behind 'upper_top' at \(0, 2\): the bodies overlap",
+    ):
         contact_pair(system, tags["upper_top"], tags["lower_bottom"])
     system, tags = two_blocks(COMM, blocks(2, gap=-0.01))
     with pytest.raises(InputError, match=r"'lower_top' lies 0.01 m behind 'upper_bottom' at"):
@@ -332,7 +382,9 @@ def test_sides_that_do_not_face_each_other():
 @pytest.mark.two_ranks
 def test_one_boundary_is_no_pair():
     system, tags = two_blocks(COMM, blocks(2))
-    with pytest.raises(InputError, match="'upper_bottom' and 'upper_bottom' are the same nodes, so that nothing"):
+    with pytest.raises(
+        InputError, match="'upper_bottom' and 'upper_bottom' are the same nodes, so that nothing"
+    ):
         contact_pair(system, tags["upper_bottom"], tags["upper_bottom"])
 
 
@@ -347,7 +399,9 @@ def test_inner_boundaries():
 
     mesh, tags = build_mesh(Uncut(), COMM)
     system = assemble(mesh, SOFT)
-    with pytest.raises(InputError, match="boundary group 'joint' lies inside the body, where cells on"):
+    with pytest.raises(
+        InputError, match="boundary group 'joint' lies inside the body, where cells on"
+    ):
         contact_pair(system, tags["joint"], tags["joint"])
 
 
@@ -357,12 +411,18 @@ def test_clamped_nodes_and_directions():
     with pytest.raises(InputError, match=sentence):
         contact_pair(system, tags["upper_bottom"], tags["lower_top"])
     assert contact_pair(system, tags["lower_top"], tags["upper_bottom"]).total == 5
-    system, tags = two_blocks(COMM, blocks(2), prescribed=lambda tags: held_by(tags, "upper_left", wavy, 1))
-    with pytest.raises(InputError, match=r"contact node \(0, 1\) is also prescribed along its contact direction"):
+    system, tags = two_blocks(
+        COMM, blocks(2), prescribed=lambda tags: held_by(tags, "upper_left", wavy, 1)
+    )
+    with pytest.raises(
+        InputError, match=r"contact node \(0, 1\) is also prescribed along its contact direction"
+    ):
         contact_pair(system, tags["upper_bottom"], tags["lower_top"])
     clamped = {"clamped": lambda tags: [tags["upper_bottom"], tags["lower_top"]]}
     system, tags = two_blocks(COMM, blocks(2), **clamped)
-    with pytest.raises(InputError, match="no contact nodes: every node of 'upper_bottom' that faces 'lower_top' is"):
+    with pytest.raises(
+        InputError, match="no contact nodes: every node of 'upper_bottom' that faces 'lower_top' is"
+    ):
         contact_pair(system, tags["upper_bottom"], tags["lower_top"])
 
 
@@ -385,4 +445,6 @@ def test_every_body_has_its_own_initial_velocity():
     system = assemble(
         mesh, SOFT, initial_velocity=[(tags["upper"], (0.0, -1.0)), (tags["lower"], flying)]
     )
-    assert np.array_equal(system.v0, per_body(system, flying, lambda x: np.tile([0.0, -1.0], (len(x), 1))))
+    assert np.array_equal(
+        system.v0, per_body(system, flying, lambda x: np.tile([0.0, -1.0], (len(x), 1)))
+    )

@@ -27,7 +27,9 @@ def layout(empty_rank: bool = False) -> tuple[int, int]:
 def spd(seed: int, reach: int) -> sp.csr_matrix:
     """A sparse symmetric positive definite matrix with some far couplings, the same on all ranks."""
     rng = np.random.default_rng(seed)
-    near = sp.diags([rng.normal(size=N - k) for k in range(1, reach + 1)], range(1, reach + 1), shape=(N, N))
+    near = sp.diags(
+        [rng.normal(size=N - k) for k in range(1, reach + 1)], range(1, reach + 1), shape=(N, N)
+    )
     far = sp.random(N, N, density=2.0 / N, random_state=rng)
     upper = sp.triu(near + far, k=1)
     matrix = upper + upper.T
@@ -141,7 +143,10 @@ def test_a_matrix_that_cannot_be_factorised(value):
     matrix = spd(4, 1).tolil()
     matrix[17, :] = matrix[:, 17] = 0.0
     matrix[17, 17] = value
-    with pytest.raises(InputError, match="the effective matrix cannot be factorised: it is singular or contains NaN"):
+    with pytest.raises(
+        InputError,
+        match="the effective matrix cannot be factorised: it is singular or contains NaN",
+    ):
         PetscAlgebra(COMM).factor(distributed(sp.csr_matrix(matrix)))
 
 

@@ -29,8 +29,12 @@ SOFT = vc.LinearElastic(E=1.0e7, nu=0.3, rho=1000.0)
 
 def block(d: int) -> tuple[Any, Any]:
     """A block that slides as it falls on an oblique plane, damped."""
-    mesh, tags = fem.build_mesh(meshes.BlockMesh(lengths=(2.0, 1.0, 1.0)[:d], divisions=(6, 4, 2)[:d]), COMM)
-    system = fem.assemble(mesh, SOFT, damping=vc.Rayleigh(1.0, 1e-4), initial_velocity=(1.0, -1.0, 0.2)[:d])
+    mesh, tags = fem.build_mesh(
+        meshes.BlockMesh(lengths=(2.0, 1.0, 1.0)[:d], divisions=(6, 4, 2)[:d]), COMM
+    )
+    system = fem.assemble(
+        mesh, SOFT, damping=vc.Rayleigh(1.0, 1e-4), initial_velocity=(1.0, -1.0, 0.2)[:d]
+    )
     plane = vc.HalfSpace((0.0, -1e-3, 0.0)[:d], (0.2, 1.0, 0.1)[:d])
     return system, fem.contact_surface(system, tags["bottom"], obstacle=plane)
 
@@ -65,11 +69,19 @@ def test_exported_matrices_march_as_the_system_they_are_of(d, scheme):
     cases = [own]
     if COMM.size == 1:
         table = np.column_stack(np.divmod(space.ids, d))
-        cases += [vc.system_from_arrays(*map(rows_of, mats), coordinates=points, unknowns=table, v0=system.v0)]
-    wanted = history(vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3)), every, scheme=scheme)
+        cases += [
+            vc.system_from_arrays(
+                *map(rows_of, mats), coordinates=points, unknowns=table, v0=system.v0
+            )
+        ]
+    wanted = history(
+        vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3)), every, scheme=scheme
+    )
     for body in cases:
         node = body.space.find_nodes(whole.points)
-        contact = vc.contact_points(body, node, whole.normals, weights=whole.weights, gap0=whole.gap0)
+        contact = vc.contact_points(
+            body, node, whole.normals, weights=whole.weights, gap0=whole.gap0
+        )
         problem = vc.ContactProblem(body, contact, friction=vc.Coulomb(0.3))
         assert same(wanted, history(problem, body.space.find_nodes(points), scheme=scheme), 1e-12)
 
@@ -79,12 +91,16 @@ def test_other_matrices_on_the_unknowns_of_a_body():
     """A matrix of all components, reduced to the free ones, takes the place of K: surfaces fit, no factor is old."""
     mesh, tags = fem.build_mesh(meshes.BlockMesh(lengths=(2.0, 1.0), divisions=(4, 2)), COMM)
     system = fem.assemble(mesh, SOFT, clamped=tags["left"], loads=fem.BodyForce((0.0, -1e3)))
-    surface = fem.contact_surface(system, tags["bottom"], obstacle=vc.HalfSpace((0.0, -1.0), (0.0, 1.0)))
+    surface = fem.contact_surface(
+        system, tags["bottom"], obstacle=vc.HalfSpace((0.0, -1.0), (0.0, 1.0))
+    )
     u = vc.static_equilibrium(vc.ContactProblem(system, surface)).u
     stiff = PetscMatrix(system.space.reduced(system.space.forms.matrix("K")))
     stiff.mat.scale(2.0)
     other = system.changed(K=stiff)
-    assert vc.static_equilibrium(vc.ContactProblem(other, surface)).u == pytest.approx(0.5 * u, rel=1e-10)
+    assert vc.static_equilibrium(vc.ContactProblem(other, surface)).u == pytest.approx(
+        0.5 * u, rel=1e-10
+    )
 
 
 def shared(csr: Any, per_node: int) -> tuple[Any, slice]:
@@ -97,8 +113,13 @@ def shared(csr: Any, per_node: int) -> tuple[Any, slice]:
 
 def test_frame_on_ranks():
     """A portal with rotations, clamped feet, an oblique stop with friction: the serial run, on any number of ranks."""
-    nodes = np.concatenate([line([0.0, 0.0], [0.0, 3.0], 4), line([0.0, 3.0], [4.0, 3.0], 4)[1:],
-                            line([4.0, 3.0], [4.0, 0.0], 4)[1:]])
+    nodes = np.concatenate(
+        [
+            line([0.0, 0.0], [0.0, 3.0], 4),
+            line([0.0, 3.0], [4.0, 3.0], 4)[1:],
+            line([4.0, 3.0], [4.0, 0.0], 4)[1:],
+        ]
+    )
     parts = frame(nodes, [(i, i + 1) for i in range(12)], EA=5e5, EI=2e3, rho_A=3.0)
     v0, contact = np.tile([1.0, -0.5, 0.0], 13), ([8, 6], [[1.0, 0.2], [0.1, -1.0]])
     alone = vc.system_from_arrays(**parts, clamped=[0, 1, 2, 36, 37, 38], v0=v0)
@@ -112,12 +133,16 @@ def test_frame_on_ranks():
     runs = []
     for one in (alone, system):
         surface = vc.contact_points(one, *contact, gap0=1e-3, weights=0.01)
-        problem = vc.ContactProblem(one, surface, friction=vc.Coulomb(0.3), mass=vc.ConsistentMass())
+        problem = vc.ContactProblem(
+            one, surface, friction=vc.Coulomb(0.3), mass=vc.ConsistentMass()
+        )
         runs.append(history(problem, np.arange(13), scheme=vc.ContactStabilisedNewmark()))
     assert same(*runs, 1e-11)
     heavy = vc.with_weight(system)
     weight = COMM.allreduce(heavy.load.constant @ heavy.influence[:, 1])
-    assert weight == pytest.approx(vc.with_weight(alone).load.constant @ alone.influence[:, 1], rel=1e-13)
+    assert weight == pytest.approx(
+        vc.with_weight(alone).load.constant @ alone.influence[:, 1], rel=1e-13
+    )
 
 
 def test_restart_on_ranks(shared_tmp):
@@ -125,16 +150,29 @@ def test_restart_on_ranks(shared_tmp):
     M, K = bar_matrices(12, length=1.0, E=1e6, rho=1000.0)
     (mass, here), (stiffness, _) = shared(M, 1), shared(K, 1)
     points = line([0.0], [1.0], 12)[here]
-    system = fem.system_from_matrices(mass, None, stiffness, coordinates=points, v0=np.ones(len(points)))
+    system = fem.system_from_matrices(
+        mass, None, stiffness, coordinates=points, v0=np.ones(len(points))
+    )
     problem = vc.ContactProblem(system, vc.contact_points(system, [12], [1.0], gap0=1e-3))
-    given = {"dt": 2e-4, "progress": False, "record": [vc.Energy(), vc.Contact(), vc.Probe({"end": (0.0,)})]}
+    given = {
+        "dt": 2e-4,
+        "progress": False,
+        "record": [vc.Energy(), vc.Contact(), vc.Probe({"end": (0.0,)})],
+    }
     straight = vc.simulate(problem, steps=40, **given)
     vc.simulate(problem, steps=20, out=shared_tmp, fields=fem.XDMF(every=20), **given)
-    again = vc.simulate(problem, steps=40, out=shared_tmp, fields=fem.XDMF(every=20), restart=True, **given)
-    assert straight.facts["energy_defect"] <= 1e-10 and np.max(straight.history["contact_resultant"]) > 0.0
+    again = vc.simulate(
+        problem, steps=40, out=shared_tmp, fields=fem.XDMF(every=20), restart=True, **given
+    )
+    assert (
+        straight.facts["energy_defect"] <= 1e-10
+        and np.max(straight.history["contact_resultant"]) > 0.0
+    )
     for name in ("u_x_end", "contact_resultant", "energy_strain"):
         size = np.max(np.abs(straight.history[name]))
-        assert again.history[name] == pytest.approx(straight.history[name], rel=1e-9, abs=1e-9 * size)
+        assert again.history[name] == pytest.approx(
+            straight.history[name], rel=1e-9, abs=1e-9 * size
+        )
     assert (shared_tmp / "fields.xdmf").read_text().count('NumberOfElements="13"') == 3
 
 
@@ -167,7 +205,9 @@ def test_stiffness_that_is_not_symmetric_on_ranks():
     system = fem.system_from_matrices(mass, None, stiffness, coordinates=points[here], v0=v0[here])
     runs = []
     for one in (alone, system):
-        problem = vc.ContactProblem(one, vc.contact_points(one, [12], [1.0]), mass=vc.ConsistentMass())
+        problem = vc.ContactProblem(
+            one, vc.contact_points(one, [12], [1.0]), mass=vc.ConsistentMass()
+        )
         for solver in (vc.Volume(), vc.Condensed(Lemke())):
             runs.append(history(problem, np.arange(13), scheme=vc.MoreauJean(), solver=solver))
         with pytest.raises(InputError, match="needs symmetric matrices"):
@@ -192,8 +232,15 @@ def test_bad_matrices():
     system, _ = block(2)
     M, C, K = (getattr(system, name).mat for name in "MCK")
     few = aij_of(sp.identity(3, format="csr"), COMM)
-    skew = aij_of(sp.csr_matrix(rows_of(K) + (COMM.rank == COMM.size - 1) * 1e4 * sp.eye(
-        K.getLocalSize()[0], K.getSize()[0], k=K.getOwnershipRange()[0] - 1)), COMM)
+    skew = aij_of(
+        sp.csr_matrix(
+            rows_of(K)
+            + (COMM.rank == COMM.size - 1)
+            * 1e4
+            * sp.eye(K.getLocalSize()[0], K.getSize()[0], k=K.getOwnershipRange()[0] - 1)
+        ),
+        COMM,
+    )
     points = system.space.points
     loose = PETSc.Mat().createAIJ(K.getSizes(), comm=COMM)
     dense = PETSc.Mat().createDense(K.getSizes(), comm=COMM)
@@ -212,8 +259,12 @@ def test_bad_matrices():
     ):
         with pytest.raises(InputError, match=said):
             fem.system_from_matrices(*matrices, **({"coordinates": points} | given))
-    with pytest.raises(InputError, match="clamped goes from 1000000 to 1000000"):  # of one rank, told on all
-        fem.system_from_matrices(M, C, K, coordinates=points, clamped=[10**6] if COMM.rank == COMM.size - 1 else ())
+    with pytest.raises(
+        InputError, match="clamped goes from 1000000 to 1000000"
+    ):  # of one rank, told on all
+        fem.system_from_matrices(
+            M, C, K, coordinates=points, clamped=[10**6] if COMM.rank == COMM.size - 1 else ()
+        )
     if COMM.size > 1:
         alone = aij_of(sp.identity(K.getLocalSize()[0], format="csr"), MPI.COMM_SELF)
         with pytest.raises(InputError, match="C and K are on different communicators"):

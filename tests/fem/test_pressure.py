@@ -13,7 +13,13 @@ from vi_contact import fem
 from vi_contact.core.algebra import Array
 from vi_contact.core.errors import InputError
 
-GAMMA, LEVEL, HEIGHT, BASE, SLOPE = 9810.0, 5.0, 6.0, 4.0, 0.2  # N/m³, m; the upstream face leans by SLOPE
+GAMMA, LEVEL, HEIGHT, BASE, SLOPE = (
+    9810.0,
+    5.0,
+    6.0,
+    4.0,
+    0.2,
+)  # N/m³, m; the upstream face leans by SLOPE
 
 
 def water(points: Array, t: float) -> Array:
@@ -28,14 +34,20 @@ def lean(points: Array) -> Array:
     return np.column_stack([points[:, 0] + SLOPE * points[:, 1], points[:, 1:]])
 
 
-def dam(comm: Any, depth: float | None, simplices: bool, held: bool = True) -> tuple[Any, Any, list[Any]]:
+def dam(
+    comm: Any, depth: float | None, simplices: bool, held: bool = True
+) -> tuple[Any, Any, list[Any]]:
     """A leaning dam with nodes at the water level, under water on its left face and below its base."""
     lengths, divisions = (BASE, HEIGHT), (3, 6)
     if depth is not None:
         lengths, divisions = (*lengths, depth), (*divisions, 2)
     mesh, tags = block(comm, lengths=lengths, divisions=divisions, simplices=simplices, deform=lean)
     loads = [fem.Pressure(tags["left"], water), fem.Pressure(tags["bottom"], uplift)]
-    return fem.assemble(mesh, CONCRETE, clamped=tags["bottom"] if held else (), loads=loads), tags, loads
+    return (
+        fem.assemble(mesh, CONCRETE, clamped=tags["bottom"] if held else (), loads=loads),
+        tags,
+        loads,
+    )
 
 
 def water_above(y: float, x: float) -> tuple[float, float, float]:
@@ -48,7 +60,9 @@ def water_above(y: float, x: float) -> tuple[float, float, float]:
 
 @pytest.mark.parametrize("simplices", [False, True], ids=["boxes", "simplices"])
 @pytest.mark.parametrize("depth", [None, 2.0], ids=["plane", "space"])
-def test_resultants_are_those_of_hydrostatics(comm: Any, depth: float | None, simplices: bool) -> None:
+def test_resultants_are_those_of_hydrostatics(
+    comm: Any, depth: float | None, simplices: bool
+) -> None:
     """C1.1: force and moment on the foot, of water and of a linear uplift, to 1e-12 of the largest."""
     system, tags, loads = dam(comm, depth, simplices)
     problem = linear(system)
@@ -93,7 +107,11 @@ def test_wrong_pressures_are_refused(comm: Any) -> None:
     mesh, tags = block(comm, lengths=(2.0, 3.0), divisions=(2, 3))
     with pytest.raises(InputError, match="Pressure: value is .*; give a finite number in Pa"):
         fem.Pressure(tags["left"], (1.0, 0.0))  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="Pressure at t = 0 s .*[Bb]roadcast|Pressure at t = 0 s .*more dimensions"):
-        fem.assemble(mesh, CONCRETE, loads=fem.Pressure(tags["left"], lambda points, t: points)).load(0.0)
+    with pytest.raises(
+        InputError, match="Pressure at t = 0 s .*[Bb]roadcast|Pressure at t = 0 s .*more dimensions"
+    ):
+        fem.assemble(
+            mesh, CONCRETE, loads=fem.Pressure(tags["left"], lambda points, t: points)
+        ).load(0.0)
     with pytest.raises(InputError, match="give a boundary group"):
         fem.Pressure(tags["block"], 1.0)

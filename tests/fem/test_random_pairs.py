@@ -31,22 +31,35 @@ SAME = 1e-7  # of the weight: certificates are below 1e-9
 
 
 @Fuzz("pairs", __file__).property(
-    upper=st.integers(1, 7), lower=st.integers(1, 9), simplices=st.booleans(), swapped=st.booleans(),
-    offset=st.integers(-90, 90), sliver=st.integers(-12, -1), examples=40)
-def test_contact_forces_balance_the_weight(upper: int, lower: int, simplices: bool, swapped: bool, offset: int,
-                                           sliver: int) -> None:
+    upper=st.integers(1, 7),
+    lower=st.integers(1, 9),
+    simplices=st.booleans(),
+    swapped=st.booleans(),
+    offset=st.integers(-90, 90),
+    sliver=st.integers(-12, -1),
+    examples=40,
+)
+def test_contact_forces_balance_the_weight(
+    upper: int, lower: int, simplices: bool, swapped: bool, offset: int, sliver: int
+) -> None:
     """A place in hundredths of the overhang, and a sliver of a power of ten beside it."""
     from mpi4py import MPI
 
     middle = 0.5 * (WIDE - LONG) * (1.0 + offset / 100.0) + 10.0**sliver
     blocks = TwoBlocks(
         upper=BlockMesh(lengths=(LONG, HIGH), divisions=(upper, 2), simplices=simplices),
-        lower=BlockMesh(lengths=(WIDE, HIGH), divisions=(lower, 2), simplices=simplices), offset=(middle, 0.0))
+        lower=BlockMesh(lengths=(WIDE, HIGH), divisions=(lower, 2), simplices=simplices),
+        offset=(middle, 0.0),
+    )
     loads = lambda tags: [fem.BodyForce((0.0, -WEIGHT))]  # noqa: E731
-    system, tags = two_blocks(MPI.COMM_SELF, blocks, clamped=lambda tags: tags["lower_bottom"], loads=loads)
+    system, tags = two_blocks(
+        MPI.COMM_SELF, blocks, clamped=lambda tags: tags["lower_bottom"], loads=loads
+    )
     sides = [tags["upper_bottom"], tags["lower_top"]]
     try:
-        surface = fem.contact_pair(system, *(sides[::-1] if swapped else sides), matching=DualMortar())
+        surface = fem.contact_pair(
+            system, *(sides[::-1] if swapped else sides), matching=DualMortar()
+        )
     except vc.InputError as refusal:
         # nodes that coincide but for a sliver may be refused, with their place; nothing else may
         assert "(" in str(refusal) and " at " in str(refusal)
@@ -58,7 +71,9 @@ def test_contact_forces_balance_the_weight(upper: int, lower: int, simplices: bo
     assert isclose(state.r_n.sum(), weight, rel_tol=SAME)
     upper_one, both = moments(problem, state, middle)
     assert abs(upper_one) <= SAME * weight * WIDE, x
-    assert abs(both) <= SAME * weight * WIDE, x  # what the lower block feels is the opposite, at the same place
+    assert abs(both) <= SAME * weight * WIDE, (
+        x
+    )  # what the lower block feels is the opposite, at the same place
 
 
 def moments(problem: Any, state: Any, middle: float) -> tuple[float, float]:

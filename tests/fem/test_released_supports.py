@@ -22,7 +22,9 @@ DT = 4e-3
 WEIGHT = fem.BodyForce((0.0, -2000.0 * 9.81))
 
 
-def stages(comm: Any, *, motion: Any = None, friction: Any = None, **other: Any) -> tuple[Any, Any, Any, Any]:
+def stages(
+    comm: Any, *, motion: Any = None, friction: Any = None, **other: Any
+) -> tuple[Any, Any, Any, Any]:
     """(static problem, its state, dynamic problem, points): soil beside a rigid wall, on clamps; then on dashpots."""
     mesh, tags = strip(comm, 6.0, 4.0, (6, 4))
     rollers = fem.Prescribed(tags["left"], components=(0,))
@@ -33,7 +35,8 @@ def stages(comm: Any, *, motion: Any = None, friction: Any = None, **other: Any)
     settings = {} if friction is None else {"friction": friction}
     wall = [(6.0, y) for y in (1.0, 2.0, 3.0, 4.0)]
     static, dynamic = (
-        vc.ContactProblem(s, fem.contact_surface(s, tags["right"], points=wall), **settings) for s in (before, after)
+        vc.ContactProblem(s, fem.contact_surface(s, tags["right"], points=wall), **settings)
+        for s in (before, after)
     )
     state = vc.static_equilibrium(static, solver=vc.Condensed())
     return static, state, dynamic, [(0.0, 4.0), (3.0, 4.0), (6.0, 2.0)]
@@ -96,22 +99,39 @@ def test_what_does_not_fit_is_refused(comm):
     with pytest.raises(InputError, match="on one mesh"):
         fem.release(static, state, elsewhere)
     mesh, tags = strip(comm, 6.0, 4.0, (6, 4))
-    bulging = fem.assemble(mesh, SOIL, clamped=tags["bottom"], loads=WEIGHT,
-                           prescribed=fem.Prescribed(tags["left"], components=(0,)))
-    tied = fem.assemble(mesh, SOIL, clamped=tags["bottom"], loads=WEIGHT, tied=fem.Tied(tags["left"], tags["right"]))
+    bulging = fem.assemble(
+        mesh,
+        SOIL,
+        clamped=tags["bottom"],
+        loads=WEIGHT,
+        prescribed=fem.Prescribed(tags["left"], components=(0,)),
+    )
+    tied = fem.assemble(
+        mesh, SOIL, clamped=tags["bottom"], loads=WEIGHT, tied=fem.Tied(tags["left"], tags["right"])
+    )
     static, problem = (linear(system) for system in (bulging, tied))
     state = vc.static_equilibrium(static, solver=vc.Condensed())
-    with pytest.raises(InputError, match="a support or tie of the problem is .* m away from where the static stage"):
+    with pytest.raises(
+        InputError, match="a support or tie of the problem is .* m away from where the static stage"
+    ):
         fem.release(static, state, problem)
 
 
 HOUSE = vc.LinearElastic(E=2e8, nu=0.2, rho=1500.0)
-SHAKEN = [vc.Ricker(a, f, direction=tuple(e))
-          for a, f, e in zip((12.0, 8.0, 10.0), (6.0, 9.0, 7.0), np.eye(3), strict=True)]
+SHAKEN = [
+    vc.Ricker(a, f, direction=tuple(e))
+    for a, f, e in zip((12.0, 8.0, 10.0), (6.0, 9.0, 7.0), np.eye(3), strict=True)
+]
 
 
 def block_on_soil(
-    comm: Any, held: str, solver: Any, *, motion: Any = None, friction: Any = None, simplices: bool = False
+    comm: Any,
+    held: str,
+    solver: Any,
+    *,
+    motion: Any = None,
+    friction: Any = None,
+    simplices: bool = False,
 ) -> tuple[Any, Any, Any]:
     """(static problem, its state, dynamic problem): a block on a box of soil, meshes that do not match, a clamped base
     and sides that are ``held`` by ties or rollers; then a compliant base, and the same ties or dashpots."""
@@ -119,39 +139,67 @@ def block_on_soil(
     upper = BlockMesh(lengths=(3.0, 3.0, 3.0), divisions=(2, 3, 2), simplices=simplices)
     mesh, tags = fem.build_mesh(TwoBlocks(lower=lower, upper=upper, offset=(1.2, 1.5)), comm)
     cells = [(tags["lower"], SOIL), (tags["upper"], HOUSE)]
-    pairs = [[tags[f"lower_{name}"] for name in pair] for pair in (("left", "right"), ("back", "front"))]
+    pairs = [
+        [tags[f"lower_{name}"] for name in pair] for pair in (("left", "right"), ("back", "front"))
+    ]
     ties = [fem.Tied(one, two) for one, two in pairs]
-    rollers = [fem.Prescribed(side, components=(c,)) for pair, c in zip(pairs, (0, 2), strict=True) for side in pair]
+    rollers = [
+        fem.Prescribed(side, components=(c,))
+        for pair, c in zip(pairs, (0, 2), strict=True)
+        for side in pair
+    ]
     firm = {"prescribed": rollers} if held == "rollers" else {"tied": ties}
     base = fem.CompliantBase(tags["lower_bottom"], motion=motion or (lambda t: np.zeros(3)))
-    sides = {"dashpots": [base], "tied": ties} if held == "ties" else {
-        "dashpots": [base, *(fem.Dashpots(side) for pair in pairs for side in pair)]}
+    sides = (
+        {"dashpots": [base], "tied": ties}
+        if held == "ties"
+        else {"dashpots": [base, *(fem.Dashpots(side) for pair in pairs for side in pair)]}
+    )
     before = fem.assemble(mesh, cells, clamped=tags["lower_bottom"], **firm)
     settings = {} if friction is None else {"friction": friction}
-    heavy = (vc.with_weight(one, direction=(0.0, -1.0, 0.0)) for one in (before, fem.assemble(mesh, cells, **sides)))
+    heavy = (
+        vc.with_weight(one, direction=(0.0, -1.0, 0.0))
+        for one in (before, fem.assemble(mesh, cells, **sides))
+    )
     foot, ground = tags["upper_bottom"], tags["lower_top"]
     static, dynamic = (
-        vc.ContactProblem(s, fem.contact_pair(s, foot, ground, matching=fem.DualMortar()), **settings) for s in heavy
+        vc.ContactProblem(
+            s, fem.contact_pair(s, foot, ground, matching=fem.DualMortar()), **settings
+        )
+        for s in heavy
     )
     return static, vc.static_equilibrium(static, solver=solver), dynamic
 
 
-@pytest.mark.parametrize("held, solver, friction, simplices", [
-    ("ties", vc.Condensed(), vc.Coulomb(0.5), False),
-    pytest.param("rollers", vc.Iterative(tolerance=1e-12), None, True, marks=pytest.mark.slow),
-    pytest.param("ties that go", vc.Condensed(), None, True, marks=pytest.mark.slow),
-])
+@pytest.mark.parametrize(
+    "held, solver, friction, simplices",
+    [
+        ("ties", vc.Condensed(), vc.Coulomb(0.5), False),
+        pytest.param("rollers", vc.Iterative(tolerance=1e-12), None, True, marks=pytest.mark.slow),
+        pytest.param("ties that go", vc.Condensed(), None, True, marks=pytest.mark.slow),
+    ],
+)
 def test_a_block_on_a_box_of_soil_stays(comm, held, solver, friction, simplices):
     """Without motion nothing moves, whatever held the sides during gravity and whatever does afterwards."""
-    static, state, dynamic = block_on_soil(comm, held, solver, friction=friction, simplices=simplices)
+    static, state, dynamic = block_on_soil(
+        comm, held, solver, friction=friction, simplices=simplices
+    )
     problem, start = fem.release(static, state, dynamic)
     weight = 27.0 * HOUSE.rho * 9.80665
     assert np.isclose(static.surface.everywhere(state.r_n).sum(), weight, rtol=1e-9)
-    ((new, report),) = deque(vc.march(problem, dt=DT, steps=40, state=start, solver=solver), maxlen=1)
+    ((new, report),) = deque(
+        vc.march(problem, dt=DT, steps=40, state=start, solver=solver), maxlen=1
+    )
     moved = problem.system.space.expand(new.u - start.u, new.t)
-    size, moves, changes = problem.system.algebra.comm.max(np.array([
-        np.abs(start.u).max(initial=0.0), np.abs(moved).max(initial=0.0),
-        np.abs(new.r_n - start.r_n).max(initial=0.0)]))
+    size, moves, changes = problem.system.algebra.comm.max(
+        np.array(
+            [
+                np.abs(start.u).max(initial=0.0),
+                np.abs(moved).max(initial=0.0),
+                np.abs(new.r_n - start.r_n).max(initial=0.0),
+            ]
+        )
+    )
     assert moves < 1e-11 * size and changes < 1e-11 * weight and report.certificate.worst < 1e-11
 
 
@@ -165,8 +213,14 @@ def test_a_block_on_a_box_of_soil_is_shaken(comm):
         up = soil.upgoing(SHAKEN, dt=1e-3)
         stages = block_on_soil(ranks, "ties", solver, motion=up, friction=vc.Coulomb(0.3))
         problem, start = fem.release(*stages)
-        recorders = [vc.Energy(), vc.Contact(), vc.Probe({"side": (0.0, 4.0, 0.0), "roof": (1.2, 7.0, 1.5)})]
-        run = vc.simulate(problem, dt=DT, steps=60, state=start, solver=solver, record=recorders, progress=False)
+        recorders = [
+            vc.Energy(),
+            vc.Contact(),
+            vc.Probe({"side": (0.0, 4.0, 0.0), "roof": (1.2, 7.0, 1.5)}),
+        ]
+        run = vc.simulate(
+            problem, dt=DT, steps=60, state=start, solver=solver, record=recorders, progress=False
+        )
         h = run.history
         assert run.facts["worst_certificate"] < 1e-12
         assert np.abs(h["energy_defect"]).max() < 1e-12 * h["work_input"].max()

@@ -49,13 +49,29 @@ def test_mid_points_are_numbered_after_the_vertices_by_those_of_their_edges(name
     assert np.allclose(points[:vertices], arrays.points, rtol=0.0, atol=1e-14)
     sides = {  # pairs of Gmsh's vertices of a cell that are edges
         "quadrilateral": [(0, 1), (1, 2), (2, 3), (3, 0)],
-        "hexahedron": [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)],
+        "hexahedron": [
+            (0, 1),
+            (1, 2),
+            (2, 3),
+            (3, 0),
+            (4, 5),
+            (5, 6),
+            (6, 7),
+            (7, 4),
+            (0, 4),
+            (1, 5),
+            (2, 6),
+            (3, 7),
+        ],
     }.get(arrays.cell, list(combinations(range(corner), 2)))
     edges = np.unique(np.sort(arrays.cells[:, np.array(sides)].reshape(-1, 2), axis=1), axis=0)
     middles = arrays.points[edges].mean(axis=1)
     assert np.allclose(points[vertices:][: len(edges)], middles, rtol=0.0, atol=1e-14)
     if arrays.cell in ("quadrilateral", "hexahedron"):
-        found, centres = points[len(points) - len(arrays.cells) :], arrays.points[arrays.cells].mean(axis=1)
+        found, centres = (
+            points[len(points) - len(arrays.cells) :],
+            arrays.points[arrays.cells].mean(axis=1),
+        )
         order = [np.lexsort(np.round(one, 9).T) for one in (found, centres)]
         assert np.allclose(found[order[0]], centres[order[1]], rtol=0.0, atol=1e-14)
     else:
@@ -78,9 +94,15 @@ def pressed_down(x: Array) -> Array:
 @pytest.mark.two_ranks
 @shapes
 @curved
-def test_a_uniform_pressure_is_exact_at_every_node_of_a_rigid_support(name: str, curved: bool) -> None:
+def test_a_uniform_pressure_is_exact_at_every_node_of_a_rigid_support(
+    name: str, curved: bool
+) -> None:
     mesh, tags = build_mesh(mesh_of(name, curved), COMM)
-    rollers = [Prescribed(tags[side], components=(c,)) for c, side in ((0, "left"), (2, "back")) if side in tags]
+    rollers = [
+        Prescribed(tags[side], components=(c,))
+        for c, side in ((0, "left"), (2, "back"))
+        if side in tags
+    ]
     load = Traction(tags["top"], (0.0, -PRESSURE, 0.0)[: mesh.geometry.dim])
     system = assemble(mesh, SOFT, prescribed=rollers, loads=load, degree=2)
     surface = contact_surface(system, tags["bottom"])
@@ -88,7 +110,9 @@ def test_a_uniform_pressure_is_exact_at_every_node_of_a_rigid_support(name: str,
     assert surface.total == (5**2 if name == "hexahedra" else 7)
     assert np.allclose(state.r_n, PRESSURE * surface.weights, rtol=1e-10, atol=0.0)
     exact = nodal(system, pressed_down)
-    assert np.allclose(state.u, exact, rtol=0.0, atol=1e-10 * np.abs(exact).max(initial=1e-300) + 1e-16)
+    assert np.allclose(
+        state.u, exact, rtol=0.0, atol=1e-10 * np.abs(exact).max(initial=1e-300) + 1e-16
+    )
 
 
 PAIRS: dict[str, dict[str, Any]] = {
@@ -107,12 +131,18 @@ def bent_bodies(x: Array) -> Array:
 
 @pytest.mark.parametrize("name", PAIRS)
 @curved
-def test_a_uniform_pressure_goes_through_the_nodes_between_two_bodies(name: str, curved: bool) -> None:
+def test_a_uniform_pressure_goes_through_the_nodes_between_two_bodies(
+    name: str, curved: bool
+) -> None:
     both = blocks(**PAIRS[name])
     mesh, tags = build_mesh(Curved(both, bent_bodies) if curved else both, COMM)
     held = [Prescribed(tags["lower_bottom"], components=(1,))]
     for c, side in ((0, "left"), (2, "back")):
-        held += [Prescribed(tags[name], components=(c,)) for name in (f"lower_{side}", f"upper_{side}") if name in tags]
+        held += [
+            Prescribed(tags[name], components=(c,))
+            for name in (f"lower_{side}", f"upper_{side}")
+            if name in tags
+        ]
     load = Traction(tags["upper_top"], (0.0, -PRESSURE, 0.0)[: mesh.geometry.dim])
     system = assemble(mesh, SOFT, prescribed=held, loads=load, degree=2)
     surface = contact_pair(system, *(tags[side] for side in both.interface))
@@ -121,17 +151,27 @@ def test_a_uniform_pressure_goes_through_the_nodes_between_two_bodies(name: str,
     assert surface.total == (5**2 if name == "hexahedra" else 9)
     assert np.allclose(state.r_n, PRESSURE * surface.weights, rtol=1e-10, atol=0.0)
     exact = nodal(system, pressed_down)
-    assert np.allclose(problem.cartesian(state.u), exact, rtol=0.0, atol=1e-10 * 2.0 * PRESSURE / SOFT.E)
+    assert np.allclose(
+        problem.cartesian(state.u), exact, rtol=0.0, atol=1e-10 * 2.0 * PRESSURE / SOFT.E
+    )
 
 
 @pytest.mark.two_ranks
 def test_conditions_that_do_not_serve_are_refused() -> None:
     both = blocks(2)
     mesh, tags = build_mesh(both, COMM)
-    with pytest.raises(InputError, match=r"DualMortar joins facets of first order .* have mid-points"):
-        contact_pair(assemble(mesh, SOFT, degree=2), *(tags[side] for side in both.interface), matching=DualMortar())
+    with pytest.raises(
+        InputError, match=r"DualMortar joins facets of first order .* have mid-points"
+    ):
+        contact_pair(
+            assemble(mesh, SOFT, degree=2),
+            *(tags[side] for side in both.interface),
+            matching=DualMortar(),
+        )
     for degree in (0, 3, 2.5, True, "2"):
-        with pytest.raises(InputError, match="assemble: degree is .*; give 1 for P1 and Q1, 2 for P2 and Q2"):
+        with pytest.raises(
+            InputError, match="assemble: degree is .*; give 1 for P1 and Q1, 2 for P2 and Q2"
+        ):
             assemble(mesh, SOFT, degree=degree)
     mesh, _ = build_mesh(mesh_of("triangles", curved=True), COMM)
     with pytest.raises(InputError, match="the mesh has cells of second order; give degree=2"):
@@ -164,7 +204,9 @@ def test_an_even_pressure_from_all_sides_goes_through_a_curved_interface(name: s
     state = static_equilibrium(problem)
     bulk = (1.0 + SOFT.nu if d == 2 else 1.0) * (1.0 - 2.0 * SOFT.nu) / SOFT.E
     exact = nodal(system, lambda x: -PRESSURE * bulk * x)
-    assert np.allclose(problem.cartesian(state.u), exact, rtol=0.0, atol=1e-10 * 2.0 * PRESSURE / SOFT.E)
+    assert np.allclose(
+        problem.cartesian(state.u), exact, rtol=0.0, atol=1e-10 * 2.0 * PRESSURE / SOFT.E
+    )
     assert np.abs(state.r_n / surface.weights / PRESSURE - 1.0).max(initial=0.0) < 0.03
     assert surface.total == (25 if name == "hexahedra" else 9)
 

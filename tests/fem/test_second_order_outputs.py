@@ -38,13 +38,34 @@ VTK = {  # which vertices every node of a cell is the mean of, in VTK's order (V
     "quadrilaterals": [(0,), (1,), (2,), (3,), (0, 1), (1, 2), (2, 3), (0, 3), (0, 1, 2, 3)],
     "tetrahedra": [(0,), (1,), (2,), (3,), (0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)],
     "hexahedra": [
-        *((i,) for i in range(8)), (0, 1), (1, 2), (2, 3), (0, 3), (4, 5), (5, 6), (6, 7), (4, 7), (0, 4), (1, 5),
-        (2, 6), (3, 7), (0, 3, 4, 7), (1, 2, 5, 6), (0, 1, 4, 5), (2, 3, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7),
+        *((i,) for i in range(8)),
+        (0, 1),
+        (1, 2),
+        (2, 3),
+        (0, 3),
+        (4, 5),
+        (5, 6),
+        (6, 7),
+        (4, 7),
+        (0, 4),
+        (1, 5),
+        (2, 6),
+        (3, 7),
+        (0, 3, 4, 7),
+        (1, 2, 5, 6),
+        (0, 1, 4, 5),
+        (2, 3, 6, 7),
+        (0, 1, 2, 3),
+        (4, 5, 6, 7),
         tuple(range(8)),
     ],
 }
-TOPOLOGY = {"triangles": "Triangle_6", "quadrilaterals": "Quadrilateral_9", "tetrahedra": "Tetrahedron_10",
-            "hexahedra": "Hexahedron_27"}
+TOPOLOGY = {
+    "triangles": "Triangle_6",
+    "quadrilaterals": "Quadrilateral_9",
+    "tetrahedra": "Tetrahedron_10",
+    "hexahedra": "Hexahedron_27",
+}
 SHEAR = CONCRETE.shear_modulus
 STRAIN = 1e-4 * np.array([[1.0, 2.0, -1.0], [0.5, -3.0, 0.25], [2.0, 0.125, 1.5]])
 
@@ -53,20 +74,31 @@ WRITTEN = [*((name, False) for name in SHAPES), ("triangles", True), ("tetrahedr
 
 
 @pytest.mark.parametrize("name, curved", WRITTEN)
-def test_fields_have_all_nodes_in_the_order_of_vtk(name: str, curved: bool, shared_tmp: Path) -> None:
+def test_fields_have_all_nodes_in_the_order_of_vtk(
+    name: str, curved: bool, shared_tmp: Path
+) -> None:
     """The cells are turned the right way round, mid-points of straight cells lie where VTK expects them and curved ones
     not far from there; stress and displacements of a uniform strain are exact; pictures have the vertices."""
     mesh, _ = fem.build_mesh(mesh_of(name, curved), COMM)
     d = mesh.geometry.dim
     A = STRAIN[:d, :d]
     system = fem.assemble(mesh, CONCRETE, degree=2, initial_displacement=lambda x: x @ A.T)
-    vc.simulate(linear(system), dt=1e-9, steps=1, out=shared_tmp / "run", fields=fem.XDMF(every=1), progress=False)
+    vc.simulate(
+        linear(system),
+        dt=1e-9,
+        steps=1,
+        out=shared_tmp / "run",
+        fields=fem.XDMF(every=1),
+        progress=False,
+    )
     with h5py.File(shared_tmp / "run/fields/mesh.h5") as file:
         points, cells = file["points"][:, :d], file["cells"][:]
     with h5py.File(shared_tmp / "run/fields/frame_000000.h5") as file:
         u, stress = file["u"][:, :d], file["von_mises"][:]
     assert f'TopologyType="{TOPOLOGY[name]}"' in (shared_tmp / "run/fields.xdmf").read_text()
-    assert np.array_equal(np.unique(cells), np.arange(len(points))) and np.allclose(u, points @ A.T, atol=1e-18)
+    assert np.array_equal(np.unique(cells), np.arange(len(points))) and np.allclose(
+        u, points @ A.T, atol=1e-18
+    )
     x, vertices = points[cells], [place for place, one in enumerate(VTK[name]) if len(one) == 1]
     means = np.stack([x[:, list(one)].mean(axis=1) for one in VTK[name]], axis=1)
     assert np.abs(x - means).max() < (0.11 if curved else 1e-14)
@@ -103,10 +135,18 @@ def test_functions_and_pressure(name: str) -> None:
     told = of_reactions(problem, state)
     assert integral(mesh, told, ds) == pytest.approx(total, rel=1e-12) and total > 1e3
     assert np.array_equal(told.x.array, pressure.x.array * (told.x.array != 0.0))
-    assert integral(mesh, pressure, ds) > 1.01 * total  # clamped nodes have the pressure of their neighbours
+    assert (
+        integral(mesh, pressure, ds) > 1.01 * total
+    )  # clamped nodes have the pressure of their neighbours
     free = linear(fem.assemble(mesh, CONCRETE, degree=2))
-    bent = vc.State(0.0, 0, nodal(free.system, lambda x: x[:, ::-1] * x[:, :1]), np.zeros(free.system.rows),
-                    np.zeros(0), np.zeros(0, dtype=bool))
+    bent = vc.State(
+        0.0,
+        0,
+        nodal(free.system, lambda x: x[:, ::-1] * x[:, :1]),
+        np.zeros(free.system.rows),
+        np.zeros(0),
+        np.zeros(0, dtype=bool),
+    )
     for continuous in (False, True):
         stress = fem.as_function(free, bent, "stress", continuous=continuous)
         u = fem.as_function(free, bent, "u")
@@ -116,7 +156,9 @@ def test_functions_and_pressure(name: str) -> None:
 
 
 def test_reactions_and_sections_balance_the_loads() -> None:
-    mesh, tags = fem.build_mesh(BlockMesh(lengths=(0.5, 4.0), divisions=(2, 8), simplices=True), COMM)
+    mesh, tags = fem.build_mesh(
+        BlockMesh(lengths=(0.5, 4.0), divisions=(2, 8), simplices=True), COMM
+    )
     loads = (fem.Traction(tags["right"], (-3.0e3, 0.0)), fem.BodyForce((0.0, -2.4e4)))
     problem = linear(fem.assemble(mesh, CONCRETE, degree=2, clamped=tags["bottom"], loads=loads))
     state = vc.static_equilibrium(problem)
@@ -134,11 +176,18 @@ def test_reactions_and_sections_balance_the_loads() -> None:
 
 def thrown(comm: Any, name: str) -> vc.ContactProblem:
     """Two bodies that strike one another and rub."""
-    both = blocks(3 if name == "hexahedra" else 2, simplices=name == "triangles", gap=1e-3, upper=(2, 2, 2),
-                  lower=(2, 2, 2))
+    both = blocks(
+        3 if name == "hexahedra" else 2,
+        simplices=name == "triangles",
+        gap=1e-3,
+        upper=(2, 2, 2),
+        lower=(2, 2, 2),
+    )
     system, tags = two_blocks(comm, both, degree=2)
     aside = np.array([1.0, -2.0, 0.5])[: system.space.dimension]
-    system = system.changed(v0=per_body(system, lambda x: 0.0 * x, lambda x: aside + 0.2 * x[:, ::-1]))
+    system = system.changed(
+        v0=per_body(system, lambda x: 0.0 * x, lambda x: aside + 0.2 * x[:, ::-1])
+    )
     surface = fem.contact_pair(system, *(tags[side] for side in both.interface))
     return vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3))
 
@@ -150,17 +199,30 @@ def test_two_bodies_strike_and_rub_alike_on_any_ranks(name: str) -> None:
     found = vc.simulate(problem, dt=2e-4, steps=40, progress=False, record=[vc.Energy()])
     facts, energy = found.facts, found.facts["energy"]
     assert facts["worst_certificate"] <= 1e-9 and facts["energy_defect"] <= 1e-10
-    assert facts.get("energy_created", 0.0) <= 1e-9 and energy["loss_friction"] > 1e-6 * energy["energy_start"]
+    assert (
+        facts.get("energy_created", 0.0) <= 1e-9
+        and energy["loss_friction"] > 1e-6 * energy["energy_start"]
+    )
     runs = [run(one, dt=2e-4, steps=40, scheme=vc.Trapezoidal()) for one in (problem, alone)]
     assert np.abs(runs[0].u - runs[1].u).max() <= 1e-8 * np.abs(runs[1].u).max()
-    assert np.abs(runs[0].r_n - runs[1].r_n).max() <= 1e-6 * np.abs(runs[1].r_n).max() and runs[0].r_n.max() > 0.0
+    assert (
+        np.abs(runs[0].r_n - runs[1].r_n).max() <= 1e-6 * np.abs(runs[1].r_n).max()
+        and runs[0].r_n.max() > 0.0
+    )
 
 
 @pytest.mark.serial
 @pytest.mark.parametrize("name", ["triangles", "hexahedra"])
 def test_pictures_have_the_contact_of_mid_points_too(name: str, tmp_path: Path) -> None:
-    vc.simulate(thrown(COMM, name), dt=2e-4, steps=2, out=tmp_path / "run", fields=fem.XDMF(every=1), progress=False,
-                record=[vc.Contact()])
+    vc.simulate(
+        thrown(COMM, name),
+        dt=2e-4,
+        steps=2,
+        out=tmp_path / "run",
+        fields=fem.XDMF(every=1),
+        progress=False,
+        record=[vc.Contact()],
+    )
     run = vc.read_run(tmp_path / "run")
     scene = Scene.of(run, [0.0], None)
     assert scene.contact is not None and len(scene.nodes) == (25 if name == "hexahedra" else 5)
@@ -176,10 +238,15 @@ def test_mass_of_contact_nodes_is_handed_on(curved: bool) -> None:
     system = fem.assemble(mesh, CONCRETE, degree=2)
     surface = fem.contact_surface(system, tags["bottom"])
     if curved:
-        with pytest.raises(InputError, match=r"cannot lump negative row sums .* mass=Redistributed\(lumping=0.0\)"):
+        with pytest.raises(
+            InputError, match=r"cannot lump negative row sums .* mass=Redistributed\(lumping=0.0\)"
+        ):
             vc.Redistributed().apply(system, surface, tangential=False)
     moved = vc.Redistributed(0.0 if curved else 0.4).apply(system, surface, tangential=False)
-    x, y = nodal(system, lambda x: np.ones_like(x)), nodal(system, lambda x: x[:, ::-1] * [-1.0, 1.0])
+    x, y = (
+        nodal(system, lambda x: np.ones_like(x)),
+        nodal(system, lambda x: x[:, ::-1] * [-1.0, 1.0]),
+    )
     for one, other in ((x, x), (x, y), (y, y)):
         before, after = (system.algebra.dot(one, M @ other) for M in (system.M, moved.M))
         assert after == pytest.approx(before, rel=1e-11, abs=1e-8)
@@ -202,14 +269,18 @@ def test_tied_sides_and_dashpots() -> None:
     absorbing = fem.assemble(mesh, CONCRETE, degree=2, dashpots=fem.Dashpots(tags["bottom"]))
     across, along = absorbing.influence[:, 1], absorbing.influence[:, 0]
     resists = [absorbing.algebra.dot(one, absorbing.C @ one) for one in (across, along)]
-    assert resists == pytest.approx([2.0 * CONCRETE.rho * c for c in (CONCRETE.c_p, CONCRETE.c_s)], rel=1e-12)
+    assert resists == pytest.approx(
+        [2.0 * CONCRETE.rho * c for c in (CONCRETE.c_p, CONCRETE.c_s)], rel=1e-12
+    )
 
 
 @pytest.mark.two_ranks
 def test_what_knows_first_order_only_says_so() -> None:
     mesh, tags = block(COMM, lengths=(2.0, 1.5), divisions=(3, 3))
     side = FreeField(tags["left"], base=vc.Harmonic(1.0, 2.0, direction=(1.0, 0.0)))
-    with pytest.raises(InputError, match="FreeField has a soil column of first order: give assemble degree=1"):
+    with pytest.raises(
+        InputError, match="FreeField has a soil column of first order: give assemble degree=1"
+    ):
         fem.assemble(mesh, CONCRETE, degree=2, clamped=tags["bottom"], dashpots=side)
     with pytest.raises(InputError, match="a mesh of second order cannot be cut or welded"):
         fem.build_mesh(CutOpen(mesh_of("triangles", curved=True), "bottom"), COMM)
@@ -224,17 +295,26 @@ def test_reactions_hold_what_contact_does_to_held_edges(curved: bool) -> None:
     density = np.array([1e3, -3e4, 2e3])
     loads = fem.BodyForce(tuple(density))
     system = fem.assemble(mesh, SOFT, clamped=tags["left"], loads=loads, degree=2)
-    surface = fem.contact_surface(system, tags["bottom"], obstacle=vc.AnalyticGap(lambda x: 1e-3 * x[:, 2]))
+    surface = fem.contact_surface(
+        system, tags["bottom"], obstacle=vc.AnalyticGap(lambda x: 1e-3 * x[:, 2])
+    )
     problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.2))
     state = vc.static_equilibrium(problem, tolerance=1e-13)
-    record: list[Any] = [fem.Reactions("left", tags["left"], (0.0, 0.0, 0.0), loads=loads), vc.Contact()]
+    record: list[Any] = [
+        fem.Reactions("left", tags["left"], (0.0, 0.0, 0.0), loads=loads),
+        vc.Contact(),
+    ]
     if not curved:
         side = (0.0, 0.0, 0.0), (0.0, 1.5, 0.0), (0.0, 0.0, 1.2)
         record.append(fem.SectionForces({"side": side}, loads=loads))
-    history = vc.simulate(problem, dt=1e-3, steps=2, state=state, record=record, progress=False).history
+    history = vc.simulate(
+        problem, dt=1e-3, steps=2, state=state, record=record, progress=False
+    ).history
     total = density * integral(mesh, 1.0, ufl.dx)
     held = np.column_stack([history[f"reaction_{c}_left"] for c in "xyz"])
-    contact = np.column_stack([history[f"contact_force_{c}"] + history[f"friction_force_{c}"] for c in "xyz"])
+    contact = np.column_stack(
+        [history[f"contact_force_{c}"] + history[f"friction_force_{c}"] for c in "xyz"]
+    )
     assert contact[0, 1] > 0.2 * abs(total[1])
     assert np.abs(contact[:, [0, 2]]).max() > 0.01 * contact[0, 1]
     assert np.allclose(held + contact, -total, rtol=0.0, atol=1e-8 * abs(total[1]))
@@ -251,24 +331,34 @@ def test_reactions_of_both_sides_of_a_pair(degree: int) -> None:
     load = fem.Traction(tags["upper_top"], (0.0, -P, 0.0))
     total = P * size(tags["upper_top"])
     for lower in (tags["lower_left"], tags["lower_top"]):
-        system = fem.assemble(mesh, SOFT, clamped=[lower, tags["upper_left"]], loads=load, degree=degree)
-        problem = vc.ContactProblem(system, fem.contact_pair(system, *(tags[side] for side in both.interface)))
+        system = fem.assemble(
+            mesh, SOFT, clamped=[lower, tags["upper_left"]], loads=load, degree=degree
+        )
+        problem = vc.ContactProblem(
+            system, fem.contact_pair(system, *(tags[side] for side in both.interface))
+        )
         state = vc.static_equilibrium(problem, tolerance=1e-13)
         pressed = COMM.allreduce(float(state.r_n.sum()))
         below = fem.Reactions("lower", lower, (0.0, 0.0, 0.0), loads=load).start(problem, state)
-        above = fem.Reactions("upper", tags["upper_left"], (0.0, 0.0, 0.0), loads=load).start(problem, state)
+        above = fem.Reactions("upper", tags["upper_left"], (0.0, 0.0, 0.0), loads=load).start(
+            problem, state
+        )
         assert pressed > 0.2 * total
         assert below["reaction_y_lower"] == pytest.approx(pressed, rel=1e-9)
         assert above["reaction_y_upper"] == pytest.approx(total - pressed, rel=1e-9)
 
 
 @pytest.mark.two_ranks
-@pytest.mark.parametrize("points", [None, [(1.0, 0.0, 0.6), (2.0, 0.0, 1.2)]], ids=["all", "listed"])
+@pytest.mark.parametrize(
+    "points", [None, [(1.0, 0.0, 0.6), (2.0, 0.0, 1.2)]], ids=["all", "listed"]
+)
 def test_the_pressure_of_tetrahedra_has_the_contact_force(points: Any) -> None:
     """∫ p = sum r_n of p that is zero at vertices of contact facets without a condition, clamped or not listed; as a
     function clamped ones have the pressure of their neighbours."""
     mesh, tags = fem.build_mesh(mesh_of("tetrahedra", False), COMM)
-    system = fem.assemble(mesh, SOFT, clamped=tags["left"], loads=fem.BodyForce((0.0, -3e4, 0.0)), degree=2)
+    system = fem.assemble(
+        mesh, SOFT, clamped=tags["left"], loads=fem.BodyForce((0.0, -3e4, 0.0)), degree=2
+    )
     problem = vc.ContactProblem(system, fem.contact_surface(system, tags["bottom"], points=points))
     state = vc.static_equilibrium(problem)
     pressure = fem.as_function(problem, state, "contact_pressure")

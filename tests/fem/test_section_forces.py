@@ -26,7 +26,9 @@ def cantilever(comm: Any, simplices: bool) -> tuple[vc.ContactProblem, Any, list
     """A wall clamped at its foot under a tip load, a uniform pressure on its left face and a body force."""
     mesh, tags = block(comm, lengths=(WIDTH, HEIGHT), divisions=(2, 8), simplices=simplices)
     loads = [
-        fem.Traction(tags["top"], TIP), fem.Traction(tags["left"], (WIND, 0.0)), fem.BodyForce(WEIGHT),
+        fem.Traction(tags["top"], TIP),
+        fem.Traction(tags["left"], (WIND, 0.0)),
+        fem.BodyForce(WEIGHT),
     ]
     return linear(fem.assemble(mesh, CONCRETE, clamped=tags["bottom"], loads=loads)), tags, loads
 
@@ -48,7 +50,9 @@ def test_section_forces_are_those_of_equilibrium(comm: Any, simplices: bool) -> 
     state = vc.static_equilibrium(problem, solver=vc.Condensed())
     levels = {"foot": 0.0, "through": 1.3, "middle": 2.0, "close": 2.001, "high": 3.5}
     cuts = {name: ((0.0, y), (WIDTH, y)) for name, y in levels.items()}
-    row = fem.SectionForces(cuts | {"back": ((WIDTH, 2.0), (0.0, 2.0))}, loads=loads).start(problem, state)
+    row = fem.SectionForces(cuts | {"back": ((WIDTH, 2.0), (0.0, 2.0))}, loads=loads).start(
+        problem, state
+    )
     for name, y in levels.items():
         for quantity, expected in above(y).items():
             assert row[f"{quantity}_{name}"] == pytest.approx(expected, rel=1e-10), (quantity, name)
@@ -66,7 +70,9 @@ def test_a_section_through_what_is_pulled_along(comm: Any) -> None:
     pull = fem.TangentialTraction(tags["left"], tuple(3e3 * up + 7e3 * right))
     problem = linear(fem.assemble(mesh, CONCRETE, clamped=tags["bottom"], loads=pull))
     state = vc.static_equilibrium(problem, solver=vc.Condensed())
-    row = fem.SectionForces({"a": (1.9 * up, 1.9 * up + WIDTH * right)}, loads=pull).start(problem, state)
+    row = fem.SectionForces({"a": (1.9 * up, 1.9 * up + WIDTH * right)}, loads=pull).start(
+        problem, state
+    )
     force = 3e3 * (HEIGHT - 1.9)
     assert row["N_a"] == pytest.approx(force, rel=1e-10)
     assert row["V_a"] == pytest.approx(0.0, abs=1e-10 * force)
@@ -95,8 +101,10 @@ def test_weight_as_gravity(comm: Any) -> None:
     mesh, tags = block(comm, lengths=(WIDTH, HEIGHT), divisions=(2, 8))
     heavy = vc.LinearElastic(E=3.0e10, nu=0.1, rho=7800.0)
     low = mesh.geometry.x[compat.geometry_dofmap(mesh)][:, :, 1].mean(axis=1) < 2.0
-    parts = [(fem.Cells("low", np.flatnonzero(one).astype(np.int32), mesh), material)
-             for one, material in ((low, heavy), (~low, CONCRETE))]
+    parts = [
+        (fem.Cells("low", np.flatnonzero(one).astype(np.int32), mesh), material)
+        for one, material in ((low, heavy), (~low, CONCRETE))
+    ]
     problem = linear(vc.with_weight(fem.assemble(mesh, parts, clamped=tags["bottom"])))
     state = vc.static_equilibrium(problem, solver=vc.Condensed())
     g = (0.0, -9.80665)
@@ -105,14 +113,24 @@ def test_weight_as_gravity(comm: Any) -> None:
     row = fem.SectionForces(cuts, cells=tags["block"], gravity=g).start(problem, state)
     column = 9.80665 * WIDTH
     assert held["reaction_y_foot"] == pytest.approx(column * 2.0 * (2400.0 + 7800.0), rel=1e-10)
-    assert held["reaction_M_foot"] == pytest.approx(column * 2.0 * (2400.0 + 7800.0) * 0.5 * WIDTH, rel=1e-10)
+    assert held["reaction_M_foot"] == pytest.approx(
+        column * 2.0 * (2400.0 + 7800.0) * 0.5 * WIDTH, rel=1e-10
+    )
     assert row["N_joint"] == pytest.approx(-column * 2.0 * 2400.0, rel=1e-10)
     assert row["N_low"] == pytest.approx(-column * (2.0 * 2400.0 + 7800.0), rel=1e-10)
 
 
 CUTS = {
-    "ends inside": (((0.0, 2.0), (0.25, 2.0)), ((0.25, 2.0), (WIDTH, 2.0)), ((0.0, 2.2), (0.3, 2.3))),
-    "elements cover": (((0.0, 2.0), (0.6, 2.0)), ((-0.1, 2.0), (WIDTH, 2.0)), ((0.0, 9.0), (WIDTH, 9.0))),
+    "ends inside": (
+        ((0.0, 2.0), (0.25, 2.0)),
+        ((0.25, 2.0), (WIDTH, 2.0)),
+        ((0.0, 2.2), (0.3, 2.3)),
+    ),
+    "elements cover": (
+        ((0.0, 2.0), (0.6, 2.0)),
+        ((-0.1, 2.0), (WIDTH, 2.0)),
+        ((0.0, 9.0), (WIDTH, 9.0)),
+    ),
     "same point": (((0.0, 2.0), (0.0, 2.0)),),
     "3 corners": (((0.0, 2.0, 0.0), (1.0, 2.0, 0.0), (0.0, 2.0, 1.0)),),
 }
@@ -173,9 +191,13 @@ def test_frames_give_the_same_forces(comm: Any) -> None:
     names = [name for name in one if name.startswith(("reaction", "N_", "V_", "M_", "racking"))]
     assert len(names) == 10
     for name in names:
-        size = np.abs(one[name if "racking" in name else "V_foot"]).max()  # vertical forces are zero by symmetry
+        size = np.abs(
+            one[name if "racking" in name else "V_foot"]
+        ).max()  # vertical forces are zero by symmetry
         assert np.abs(one[name] - two[name]).max() < 1e-8 * size, name
-    assert np.abs(one["reaction_x_foot"] + one["V_foot"]).max() < 1e-10 * np.abs(one["V_foot"]).max()
+    assert (
+        np.abs(one["reaction_x_foot"] + one["V_foot"]).max() < 1e-10 * np.abs(one["V_foot"]).max()
+    )
 
 
 def test_reactions_move_all_masses(comm: Any) -> None:
@@ -186,15 +208,22 @@ def test_reactions_move_all_masses(comm: Any) -> None:
     free = fem.assemble(mesh, CONCRETE)
     stop = vc.HalfSpace(point=(2.0, 0.0), normal=(-1.0, 0.0))
     problem = vc.ContactProblem(
-        system, fem.contact_surface(system, tags["right"], obstacle=stop), excitation=SHAKE, mass=vc.ConsistentMass(),
+        system,
+        fem.contact_surface(system, tags["right"], obstacle=stop),
+        excitation=SHAKE,
+        mass=vc.ConsistentMass(),
     )
     reactions = fem.Reactions("foot", tags["bottom"], (1.0, 0.0), weight)
     touched = 0
     reactions.start(problem, initial_state(problem))
-    for _, report in vc.march(problem, scheme=vc.Trapezoidal(), solver=vc.Condensed(), dt=DT, steps=STEPS):
+    for _, report in vc.march(
+        problem, scheme=vc.Trapezoidal(), solver=vc.Condensed(), dt=DT, steps=STEPS
+    ):
         row = reactions.row(report)
         contact = problem.surface.comm.sum(0.0 - report.balance.r_n @ problem.surface.normals)
-        ground = 0.5 * (problem.ground_acceleration(report.old.t) + problem.ground_acceleration(report.new.t))
+        ground = 0.5 * (
+            problem.ground_acceleration(report.old.t) + problem.ground_acceleration(report.new.t)
+        )
         a = system.space.expand(problem.cartesian(report.balance.a), report.new.t, 2) + ground
         inertia = comm.allreduce(free.influence.T @ (free.M @ a.ravel()))
         total = comm.allreduce(free.influence.T @ (free.M @ np.tile((0.0, -9.80665), len(a))))
@@ -210,7 +239,9 @@ BLOCK_WEIGHT = RHO * 9.80665 * 2.0 * B * BLOCK_HEIGHT
 THETA_CR = BLOCK_WEIGHT / (2.0 * FOUNDATION * B**2)
 
 
-def block_on_springs(comm: Any, divisions: int, stiffness: float, **data: Any) -> tuple[vc.ContactProblem, Any]:
+def block_on_springs(
+    comm: Any, divisions: int, stiffness: float, **data: Any
+) -> tuple[vc.ContactProblem, Any]:
     mesh, tags = block(comm, lengths=(2.0 * B, BLOCK_HEIGHT), divisions=(divisions, 2))
     stiff = vc.LinearElastic(E=stiffness * FOUNDATION * B, nu=0.2, rho=RHO)
     system = fem.assemble(mesh, stiff, **{name: make(tags) for name, make in data.items()})
@@ -243,7 +274,10 @@ def test_s3_7_winkler_moment_and_rotation(comm: Any) -> None:
         for state in vc.quasi_static(problem, ratios[1:] - 1.0, solver=vc.Condensed(), state=start)
     ]
     printed = np.array([1.0 / 3.0, 0.5286, 0.6667, 0.7892, 0.9333])
-    found = {name: np.array([row[f"{name}_base"] for row in rows]) for name in ("N", "M", "theta", "uplift", "e")}
+    found = {
+        name: np.array([row[f"{name}_base"] for row in rows])
+        for name in ("N", "M", "theta", "uplift", "e")
+    }
     assert np.abs(found["theta"] / (ratios * THETA_CR) - 1.0).max() < 2e-3
     assert np.abs(found["N"] / BLOCK_WEIGHT - 1.0).max() < 5e-3
     assert np.abs(-found["M"] / (found["N"] * B) - printed).max() < 1e-3
@@ -263,7 +297,10 @@ def test_s3_7_lift_off_and_uplift_under_a_horizontal_load(comm: Any) -> None:
         part = ratio * B / (3.0 * h)  # a/g
         load = fem.BodyForce((RHO * 9.80665 * part, -RHO * 9.80665))
         problem, tags = block_on_springs(
-            comm, 40, 1e3, prescribed=lambda tags: fem.Prescribed(tags["bottom"], components=(0,)),
+            comm,
+            40,
+            1e3,
+            prescribed=lambda tags: fem.Prescribed(tags["bottom"], components=(0,)),
             loads=lambda tags, load=load: load,
         )
         state = vc.static_equilibrium(problem, solver=vc.Condensed())
@@ -273,7 +310,9 @@ def test_s3_7_lift_off_and_uplift_under_a_horizontal_load(comm: Any) -> None:
         assert row["M_base"] == pytest.approx(BLOCK_WEIGHT * h * part, rel=1e-6)
         assert row["e_base"] == pytest.approx(h * part, rel=1e-6)
         assert held["reaction_x_base"] == pytest.approx(-BLOCK_WEIGHT * part, rel=1e-6)
-        assert row["uplift_base"] == pytest.approx(1.0 - 1.5 * (1.0 - h * part / B) if uplift else 0.0, abs=1.0 / 40)
+        assert row["uplift_base"] == pytest.approx(
+            1.0 - 1.5 * (1.0 - h * part / B) if uplift else 0.0, abs=1.0 / 40
+        )
         assert (row["uplift_base"] > 0.0) == (ratio > 1.0)
 
 
@@ -284,7 +323,9 @@ def test_ranks_agree(comm: Any) -> None:
     together, alone = histories(comm, False), histories(MPI.COMM_SELF, False)
     for name, values in together.items():
         if name.startswith(("reaction", "N_", "V_", "M_", "racking", "rotation")):
-            size = np.abs(alone[name if name[0] == "r" and "reaction" not in name else "V_foot"]).max()
+            size = np.abs(
+                alone[name if name[0] == "r" and "reaction" not in name else "V_foot"]
+            ).max()
             assert np.abs(values - alone[name]).max() < 1e-10 * size, name
 
 
@@ -295,7 +336,9 @@ def test_tangents_are_those_of_the_surfaces() -> None:
     for d in (2, 3):
         inclined = rng.normal(size=(40, d))
         inclined[:10, 0] = 0.0
-        directions = np.vstack([np.eye(d), -np.eye(d), inclined / np.linalg.norm(inclined, axis=1)[:, None]])
+        directions = np.vstack(
+            [np.eye(d), -np.eye(d), inclined / np.linalg.norm(inclined, axis=1)[:, None]]
+        )
         tangents = tangent_vectors(directions, np.arange(len(directions)))
         for direction, found in zip(directions, tangents, strict=True):
             frame = np.column_stack([direction, found])
@@ -318,9 +361,13 @@ def test_friction_of_walls_in_all_directions(comm: Any, angle: float) -> None:
     system = fem.assemble(mesh, CONCRETE, clamped=tags["left"], loads=push)
     ground = vc.HalfSpace(point=(0.0, 0.0), normal=tuple(turn @ [0.0, 1.0]))
     problem = vc.ContactProblem(
-        system, fem.contact_surface(system, tags["bottom"], obstacle=ground), friction=vc.Coulomb(0.3)
+        system,
+        fem.contact_surface(system, tags["bottom"], obstacle=ground),
+        friction=vc.Coulomb(0.3),
     )
-    state = vc.static_equilibrium(problem, solver=vc.Condensed(friction_method=solvers.FrictionNewton()))
+    state = vc.static_equilibrium(
+        problem, solver=vc.Condensed(friction_method=solvers.FrictionNewton())
+    )
     whole = vc.Contact().start(problem, state)
     row = engineering.Resultants("base", tuple(turn @ [1.0, 0.0])).start(problem, state)
     size = row["N_base"]
@@ -341,7 +388,9 @@ def test_friction_resultants_are_the_recorded_forces(comm: Any) -> None:
         system, tags["bottom"], obstacle=vc.HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
     )
     problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3))
-    state = vc.static_equilibrium(problem, solver=vc.Condensed(friction_method=solvers.FrictionNewton()))
+    state = vc.static_equilibrium(
+        problem, solver=vc.Condensed(friction_method=solvers.FrictionNewton())
+    )
     whole = vc.Contact().start(problem, state)
     row = engineering.Resultants("base", (1.0, 0.0)).start(problem, state)
     held = fem.Reactions("left", tags["left"], (1.0, 0.0), push).start(problem, state)
@@ -367,7 +416,9 @@ def test_wall_of_the_channel_is_in_equilibrium(comm: Any) -> None:
     x, y = model.channel.shape.x, model.channel.shape.y
     left, inner, top_of_slab = x[1], x[2], y[2]
     problem = model.problem(friction=vc.Coulomb(0.5))
-    state = vc.static_equilibrium(problem, solver=vc.Condensed(friction_method=solvers.FrictionNewton()))
+    state = vc.static_equilibrium(
+        problem, solver=vc.Condensed(friction_method=solvers.FrictionNewton())
+    )
     middle = (0.5 * (left + inner), top_of_slab)
     whole = engineering.Resultants("all", middle, normal=(0.0, -1.0)).start(problem, state)
     above_cut = engineering.Resultants(
@@ -375,7 +426,9 @@ def test_wall_of_the_channel_is_in_equilibrium(comm: Any) -> None:
     ).start(problem, state)
     cut = {"foot": ((left, top_of_slab), (inner, top_of_slab))}
     g = 9.80665
-    section = fem.SectionForces(cut, cells=model.tags["channel"], gravity=(0.0, -g)).start(problem, state)
+    section = fem.SectionForces(cut, cells=model.tags["channel"], gravity=(0.0, -g)).start(
+        problem, state
+    )
     area = (x[4] - x[1]) * (y[3] - y[1]) - (x[3] - x[2]) * (y[3] - y[2])
     weight = 2400.0 * g * area
     wall = 2400.0 * g * (inner - left) * (y[3] - top_of_slab)
@@ -395,6 +448,13 @@ def test_reactions_in_space(comm: Any) -> None:
     state = vc.static_equilibrium(problem, solver=vc.Condensed())
     row = fem.Reactions("foot", tags["bottom"], (0.0, 0.0, 0.0), loads).start(problem, state)
     weight, drag = 2.4e4 * 3.0, 5.0e3 * 3.0  # N, at (1, .5, .75) and (1, 1, .75)
-    expected = {"x": 0.0, "y": weight, "z": -drag, "M_x": -drag * 1.0 - weight * 0.75, "M_y": drag, "M_z": weight}
+    expected = {
+        "x": 0.0,
+        "y": weight,
+        "z": -drag,
+        "M_x": -drag * 1.0 - weight * 0.75,
+        "M_y": drag,
+        "M_z": weight,
+    }
     found = {part: row[f"reaction_{part}_foot"] for part in expected}
     assert found == pytest.approx(expected, rel=1e-10, abs=1e-10 * weight)

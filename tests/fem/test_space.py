@@ -24,33 +24,47 @@ def test_initial_values():
     """Constants and functions of position, on the free unknowns, read back at nodes."""
     mesh, tags = block(COMM, **BODIES["triangles"])
     system = assemble(
-        mesh, CONCRETE, clamped=tags["bottom"], initial_displacement=lambda x: x**2, initial_velocity=(3.0, -4.0)
+        mesh,
+        CONCRETE,
+        clamped=tags["bottom"],
+        initial_displacement=lambda x: x**2,
+        initial_velocity=(3.0, -4.0),
     )
     points, u = field(system, system.u0)
     clamped = np.isclose(points @ [-np.sin(0.4), np.cos(0.4)], 0.0, atol=1e-9)
     assert 0 < clamped.sum() < len(points)
     assert np.array_equal(u, np.where(clamped[:, None], 0.0, points**2))
-    assert np.array_equal(field(system, system.v0)[1][~clamped], np.tile([3.0, -4.0], ((~clamped).sum(), 1)))
+    assert np.array_equal(
+        field(system, system.v0)[1][~clamped], np.tile([3.0, -4.0], ((~clamped).sum(), 1))
+    )
 
 
 @pytest.mark.two_ranks
 def test_rollers_hold_one_component():
     """A roller keeps one component at zero and leaves the others free, in number and in the solution."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0, 1.0), divisions=(2, 2, 2))
-    rollers = [Prescribed(tags["left"], components=(0,)), Prescribed(tags["bottom"], components=(1, 2))]
+    rollers = [
+        Prescribed(tags["left"], components=(0,)),
+        Prescribed(tags["bottom"], components=(1, 2)),
+    ]
     system = assemble(mesh, CONCRETE, prescribed=rollers, loads=BodyForce((0.0, -1e5, 2e4)))
     assert system.space.unknowns == 27 * 3 - 9 - 9 * 2
     points, values = field(system, system.algebra.factor(system.K).solve(system.load(0.0)))
     left, bottom = points[:, 0] == 0.0, points[:, 1] == 0.0
     assert not values[left, 0].any() and not values[bottom, 1:].any()
-    assert np.all(values[left & ~bottom][:, 1:] != 0.0) and np.all(values[bottom & ~left][:, 0] != 0.0)
+    assert np.all(values[left & ~bottom][:, 1:] != 0.0) and np.all(
+        values[bottom & ~left][:, 0] != 0.0
+    )
 
 
 @pytest.mark.two_ranks
 def test_where_conditions_meet_the_later_one_counts():
     """Corner nodes of two prescribed sides."""
     mesh, tags = block(COMM, lengths=(1.0, 1.0), divisions=(2, 2))
-    sides = [held_by(tags, "left", lambda x: 0.0 * x + 1.0), held_by(tags, "bottom", lambda x: 0.0 * x + 2.0, 1)]
+    sides = [
+        held_by(tags, "left", lambda x: 0.0 * x + 1.0),
+        held_by(tags, "bottom", lambda x: 0.0 * x + 2.0, 1),
+    ]
     for order, corner in ((sides, [1.0, 2.0]), (sides[::-1], [1.0, 1.0])):
         system = assemble(mesh, CONCRETE, prescribed=order)
         points, values = field(system, system.u0)
@@ -64,10 +78,16 @@ def test_prescribed_displacement_makes_its_linear_field():
     gradient = np.array([[1e-3, 4e-4], [-2e-4, 7e-4]])
     for simplices in (False, True):
         mesh, tags = block(
-            COMM, lengths=(2.0, 1.0), divisions=(4, 3), simplices=simplices,
+            COMM,
+            lengths=(2.0, 1.0),
+            divisions=(4, 3),
+            simplices=simplices,
             deform=lambda x: x + 0.05 * np.sin(np.pi * x[:, :1] / 2.0) * np.sin(np.pi * x[:, 1:]),
         )
-        sides = [held_by(tags, side, lambda x: x @ gradient.T) for side in ("left", "right", "bottom", "top")]
+        sides = [
+            held_by(tags, side, lambda x: x @ gradient.T)
+            for side in ("left", "right", "bottom", "top")
+        ]
         system = assemble(mesh, CONCRETE, prescribed=sides)
         points, values = field(system, system.algebra.factor(system.K).solve(system.load(0.0)))
         assert np.abs(values - points @ gradient.T).max() < 1e-13 * np.abs(values).max()
@@ -81,7 +101,9 @@ def shaken_base(t: float) -> tuple[float, float, float]:
 
 def moving_base(mesh, tags, damping=None, material=CONCRETE) -> SemiDiscreteSystem:
     motions = [lambda x, t, i=i: np.tile([shaken_base(t)[i], 0.0], (len(x), 1)) for i in range(3)]
-    return assemble(mesh, material, prescribed=Prescribed(tags["bottom"], *motions), damping=damping)
+    return assemble(
+        mesh, material, prescribed=Prescribed(tags["bottom"], *motions), damping=damping
+    )
 
 
 @pytest.mark.two_ranks
@@ -91,20 +113,28 @@ def test_moving_base_is_the_body_force_of_the_relative_frame(damping):
     per volume, on the free unknowns: an identity, whatever the motion. (Mass-proportional damping brakes U' too.)"""
     mesh, tags = block(COMM, lengths=(1.0, 2.0), divisions=(3, 5))
     system = moving_base(mesh, tags, damping)
-    weight = assemble(mesh, CONCRETE, clamped=tags["bottom"], loads=BodyForce((-CONCRETE.rho, 0.0))).load(0.0)
+    weight = assemble(
+        mesh, CONCRETE, clamped=tags["bottom"], loads=BodyForce((-CONCRETE.rho, 0.0))
+    ).load(0.0)
     r = system.influence[:, 0]
     for t in (0.0, 0.013, 0.4):
         U, V, A = shaken_base(t)
         expected = U * (system.K @ r) + A * (weight + system.M @ r)
         if system.C is not None:
             expected += V * (system.C @ r)
-        assert max_over_ranks(COMM, system.load(t) - expected) < 1e-12 * max_over_ranks(COMM, expected)
+        assert max_over_ranks(COMM, system.load(t) - expected) < 1e-12 * max_over_ranks(
+            COMM, expected
+        )
 
 
 def relative_frame(mesh, tags, excitation=()) -> ContactProblem:
     """Clamped base; without excitation the inertia -rho U'' acts as a body force on every element."""
-    inertia = () if excitation else BodyForce((-CONCRETE.rho, 0.0), history=lambda t: shaken_base(t)[2])
-    return linear(assemble(mesh, SOFT, clamped=tags["bottom"], loads=inertia), excitation=excitation)
+    inertia = (
+        () if excitation else BodyForce((-CONCRETE.rho, 0.0), history=lambda t: shaken_base(t)[2])
+    )
+    return linear(
+        assemble(mesh, SOFT, clamped=tags["bottom"], loads=inertia), excitation=excitation
+    )
 
 
 @pytest.mark.slow
@@ -115,7 +145,9 @@ def test_moving_base_and_relative_frame_converge_to_one_motion():
     absolute, relative = linear(moving_base(mesh, tags, material=SOFT)), relative_frame(mesh, tags)
     differences = []
     for steps in (40, 80, 160):
-        a, b = (run(problem, dt=0.08 / steps, steps=steps).u[-1] for problem in (absolute, relative))
+        a, b = (
+            run(problem, dt=0.08 / steps, steps=steps).u[-1] for problem in (absolute, relative)
+        )
         differences.append(np.abs(a - [shaken_base(0.08)[0], 0.0] - b).max() / np.abs(b).max())
     assert differences[-1] < 2e-4
     assert np.log2(differences[0] / differences[1]) == pytest.approx(2.0, abs=0.1)
@@ -132,8 +164,11 @@ def test_inertia_load_of_an_excitation_is_the_body_force_of_the_relative_frame()
     for n in (1, 2):
         mesh, tags = block(COMM, lengths=(1.0, 2.0), divisions=(3 * n, 5 * n))
         problems = (
-            relative_frame(mesh, tags), relative_frame(mesh, tags, excitation=shake),
-            linear(assemble(mesh, SOFT, clamped=tags["bottom"], base_inertia=False), excitation=shake),
+            relative_frame(mesh, tags),
+            relative_frame(mesh, tags, excitation=shake),
+            linear(
+                assemble(mesh, SOFT, clamped=tags["bottom"], base_inertia=False), excitation=shake
+            ),
         )
         a, b, c = (run(problem, dt=1e-3, steps=80).u[-1] for problem in problems)
         assert np.abs(a - b).max() <= 1e-12 * np.abs(a).max()
@@ -143,7 +178,9 @@ def test_inertia_load_of_an_excitation_is_the_body_force_of_the_relative_frame()
 
 def test_unknown_boundary_is_told_with_the_known_ones():
     _, tags = block(COMM, lengths=(2.0, 2.0), divisions=(4, 4))
-    with pytest.raises(InputError, match="mesh has no group 'botom'; its boundary groups are .*bottom"):
+    with pytest.raises(
+        InputError, match="mesh has no group 'botom'; its boundary groups are .*bottom"
+    ):
         tags["botom"]
 
 
@@ -154,7 +191,10 @@ def test_points_outside_the_body():
     points = field(system, system.u0)[0]
     found = system.space.find_nodes(np.array([[0.0, 0.0], [1.02, 1.49], [2.0, 2.0]]))
     assert points[found].tolist() == [[0.0, 0.0], [1.0, 1.5], [2.0, 2.0]]
-    with pytest.raises(InputError, match=r"point \(3, 1\) is 1 m away from the nearest node: give a point of the body"):
+    with pytest.raises(
+        InputError,
+        match=r"point \(3, 1\) is 1 m away from the nearest node: give a point of the body",
+    ):
         system.space.find_nodes(np.array([[0.0, 0.0], [3.0, 1.0]]))
     with pytest.raises(InputError, match="has 3 coordinates: give 2"):
         system.space.find_nodes(np.array([[0.0, 0.0, 0.0]]))

@@ -39,17 +39,29 @@ def ring(n: int, *, simplices: bool = False) -> tuple[Any, Any]:
     def bend(x: Array) -> Array:
         return np.column_stack([x[:, 0] * np.cos(x[:, 1]), x[:, 0] * np.sin(x[:, 1])])
 
-    return block(COMM, lengths=(1.0, pi / 2.0), corner=(1.0, 0.0), divisions=(2, n), simplices=simplices, deform=bend)
+    return block(
+        COMM,
+        lengths=(1.0, pi / 2.0),
+        corner=(1.0, 0.0),
+        divisions=(2, n),
+        simplices=simplices,
+        deform=bend,
+    )
 
 
 # Nodes, weights, normals ----------------------------------------------------------------------------------------------
+
 
 @pytest.mark.two_ranks
 @bodies
 def test_weights_and_normals_of_a_flat_side(name):
     """Weights sum to the area, all normals are the side's, every node of the side is there once and in the order of the
     mesh's numbers, equal on all ranks."""
-    d, lengths, angle = len(BODIES[name]["lengths"]), BODIES[name]["lengths"], BODIES[name].get("angle", 0.0)
+    d, lengths, angle = (
+        len(BODIES[name]["lengths"]),
+        BODIES[name]["lengths"],
+        BODIES[name].get("angle", 0.0),
+    )
     system, tags = body(name)
     surface = contact_surface(system, tags["right"])
     n = np.zeros(d)
@@ -57,13 +69,17 @@ def test_weights_and_normals_of_a_flat_side(name):
     assert seen(surface).weights.sum() == pytest.approx(np.prod(lengths[1:]), rel=1e-13)
     assert seen(surface).weights.min() > 0.0
     assert seen(surface).normals == pytest.approx(np.tile(n, (seen(surface).count, 1)), abs=1e-13)
-    assert seen(surface).points @ n == pytest.approx(np.full(seen(surface).count, lengths[0]), rel=1e-13)
+    assert seen(surface).points @ n == pytest.approx(
+        np.full(seen(surface).count, lengths[0]), rel=1e-13
+    )
     assert seen(surface).count == np.prod(np.array(BODIES[name]["divisions"][1:]) + 1)
     points = field(system, system.u0)[0]
     numbers = system.space.find_nodes(seen(surface).points)
     assert np.all(np.diff(numbers) > 0) and np.array_equal(points[numbers], seen(surface).points)
     assert sum(COMM.allgather(len(surface.owned))) == seen(surface).count
-    assert sorted(np.concatenate(COMM.allgather(surface.slots)).tolist()) == list(range(seen(surface).count))
+    assert sorted(np.concatenate(COMM.allgather(surface.slots)).tolist()) == list(
+        range(seen(surface).count)
+    )
 
 
 def test_weights_are_tributary_lengths():
@@ -71,7 +87,9 @@ def test_weights_are_tributary_lengths():
     system, tags = body(section=PlaneStress(0.2))
     surface = contact_surface(system, tags["right"])
     h = 1.5 / 4
-    assert seen(surface).weights == pytest.approx(0.2 * h * np.array([0.5, 1.0, 1.0, 1.0, 0.5]), rel=1e-13)
+    assert seen(surface).weights == pytest.approx(
+        0.2 * h * np.array([0.5, 1.0, 1.0, 1.0, 0.5]), rel=1e-13
+    )
     listed = contact_surface(system, tags["right"], points=[(2.0, 1.5), (2.0, 0.01), (1.99, 0.76)])
     assert seen(listed).points.tolist() == [[2.0, 1.5], [2.0, 0.0], [2.0, 0.75]]
     assert seen(listed).weights == pytest.approx(0.2 * h * np.array([0.5, 0.5, 1.0]), rel=1e-13)
@@ -88,10 +106,14 @@ def test_normals_of_a_curved_side_are_those_of_the_chords(simplices):
     angle = np.arctan2(seen(surface).points[:, 1], seen(surface).points[:, 0])
     half = pi / 4.0 / n
     found = np.arctan2(seen(surface).normals[:, 1], seen(surface).normals[:, 0])
-    shift = np.where(np.isclose(angle, 0.0, atol=1e-9), half, np.where(np.isclose(angle, pi / 2.0), -half, 0.0))
+    shift = np.where(
+        np.isclose(angle, 0.0, atol=1e-9), half, np.where(np.isclose(angle, pi / 2.0), -half, 0.0)
+    )
     assert found == pytest.approx(angle + shift, abs=1e-12)
     assert np.linalg.norm(seen(surface).normals, axis=1) == pytest.approx(np.ones(n + 1), rel=1e-14)
-    assert seen(surface).weights == pytest.approx(4.0 * sin(half) * np.where(shift == 0.0, 1.0, 0.5), rel=1e-12)
+    assert seen(surface).weights == pytest.approx(
+        4.0 * sin(half) * np.where(shift == 0.0, 1.0, 0.5), rel=1e-12
+    )
 
 
 def test_gaps_of_obstacles():
@@ -103,8 +125,12 @@ def test_gaps_of_obstacles():
     surface = contact_surface(system, tags["bottom"], obstacle=slope)
     x, y = seen(surface).points.T
     assert seen(surface).gap0 == pytest.approx(0.6 * x + 0.8 * (y + 0.1), rel=1e-13)
-    assert seen(surface).normals == pytest.approx(np.tile([-0.6, -0.8], (seen(surface).count, 1)), rel=1e-13)
-    curved = contact_surface(system, tags["bottom"], obstacle=AnalyticGap(lambda x: 0.1 * x[:, 0] ** 2))
+    assert seen(surface).normals == pytest.approx(
+        np.tile([-0.6, -0.8], (seen(surface).count, 1)), rel=1e-13
+    )
+    curved = contact_surface(
+        system, tags["bottom"], obstacle=AnalyticGap(lambda x: 0.1 * x[:, 0] ** 2)
+    )
     assert curved.gap0 == pytest.approx(0.1 * curved.points[:, 0] ** 2, rel=1e-13)
     assert curved.normals == pytest.approx(np.tile([0.0, -1.0], (curved.count, 1)), abs=1e-13)
 
@@ -116,7 +142,9 @@ def test_gaps_of_obstacles():
             return np.full(len(points), 0.25)
 
     own = contact_surface(system, tags["bottom"], obstacle=Own())
-    assert seen(own).normals == pytest.approx(np.tile(turned((0.0, -1.0), 0.1), (seen(own).count, 1)), rel=1e-13)
+    assert seen(own).normals == pytest.approx(
+        np.tile(turned((0.0, -1.0), 0.1), (seen(own).count, 1)), rel=1e-13
+    )
     assert seen(own).gap0.tolist() == [0.25] * seen(own).count
 
 
@@ -129,6 +157,7 @@ def test_gap_of_round_off_is_no_penetration():
 
 
 # Frames ---------------------------------------------------------------------------------------------------------------
+
 
 def some_field(x: Array) -> Array:
     d = x.shape[1]
@@ -146,24 +175,34 @@ def test_normal_unknown_is_the_normal_displacement(name, side):
     turned_u = u if surface.basis is None else surface.basis.transpose_apply(u)
     assert max_over_ranks(COMM, problem.cartesian(turned_u) - u) < 1e-14 * max_over_ranks(COMM, u)
     expected = np.sum(some_field(seen(surface).points) * seen(surface).normals, axis=1)
-    assert seen(surface).normal_values(turned_u) == pytest.approx(expected, abs=1e-13 * np.abs(expected).max())
+    assert seen(surface).normal_values(turned_u) == pytest.approx(
+        expected, abs=1e-13 * np.abs(expected).max()
+    )
     assert (surface.basis is None) == (side == "right" and "angle" not in BODIES[name])
     tangents = turned_u[surface.tangents]
     along = some_field(surface.points) - expected[surface.slots, None] * surface.normals
-    assert np.linalg.norm(tangents, axis=1) == pytest.approx(np.linalg.norm(along, axis=1), abs=1e-12)
+    assert np.linalg.norm(tangents, axis=1) == pytest.approx(
+        np.linalg.norm(along, axis=1), abs=1e-12
+    )
 
 
 @pytest.mark.parametrize("name", ["triangles", "tetrahedra"])
 def test_turned_system_is_the_same_system(name):
     """Energies, loads, initial values and inertia loads do not depend on the frames: TᵀMT, TᵀKT, Tᵀf, Tᵀr."""
     down = BodyForce(tuple(np.eye(len(BODIES[name]["lengths"]))[-1]))
-    system, tags = body(name, loads=down, initial_velocity=some_field, initial_displacement=some_field)
+    system, tags = body(
+        name, loads=down, initial_velocity=some_field, initial_displacement=some_field
+    )
     far = AnalyticGap(lambda x: np.full(len(x), 1e3))
     problem = ContactProblem(system, contact_surface(system, tags["left"], obstacle=far))
     other = problem.equations
     assert problem.surface.basis is not None
-    assert other.kinetic_energy(other.v0) == pytest.approx(system.kinetic_energy(system.v0), rel=1e-13)
-    assert other.strain_energy(other.u0) == pytest.approx(system.strain_energy(system.u0), rel=1e-12)
+    assert other.kinetic_energy(other.v0) == pytest.approx(
+        system.kinetic_energy(system.v0), rel=1e-13
+    )
+    assert other.strain_energy(other.u0) == pytest.approx(
+        system.strain_energy(system.u0), rel=1e-12
+    )
     pairs = [(other.v0, system.v0), (other.load(0.0), system.load(0.0))]
     for a, b in (*pairs, *zip(other.influence.T, system.influence.T, strict=True)):
         assert max_over_ranks(COMM, problem.cartesian(a) - b) < 1e-13 * max_over_ranks(COMM, b)
@@ -182,7 +221,10 @@ def test_rollers_beside_an_oblique_contact_in_space(angle):
     mesh, tags = block(COMM, lengths=(1.0, 1.0, 1.0), divisions=(2, 2, 2))
     towards = np.array([-sin(angle), 0.0, -cos(angle)]) * np.sign(cos(angle))
     side = tags["back"] if towards[2] < 0 else tags["front"]
-    rollers = [Prescribed(tags["bottom"], components=(1,)), Prescribed(tags["top"], components=(1,))]
+    rollers = [
+        Prescribed(tags["bottom"], components=(1,)),
+        Prescribed(tags["top"], components=(1,)),
+    ]
     system = assemble(mesh, CONCRETE, prescribed=rollers)
     plane = HalfSpace(point=tuple(5.0 * towards), normal=tuple(-towards))
     surface = contact_surface(system, side, obstacle=plane)
@@ -197,12 +239,17 @@ def test_rollers_beside_an_oblique_contact_in_space(angle):
 
 # Refusals, each with its sentence, on all ranks -----------------------------------------------------------------------
 
+
 def test_no_contact_nodes():
     system, tags = body(clamped=())
     nothing = Facets("nothing", np.zeros(0, dtype=np.int32), system.space.mesh)
-    with pytest.raises(InputError, match="no contact nodes: boundary group 'nothing' is empty: choose a group"):
+    with pytest.raises(
+        InputError, match="no contact nodes: boundary group 'nothing' is empty: choose a group"
+    ):
         contact_surface(system, nothing)
-    with pytest.raises(InputError, match="no contact nodes: the list of contact points on 'right' is empty"):
+    with pytest.raises(
+        InputError, match="no contact nodes: the list of contact points on 'right' is empty"
+    ):
         contact_surface(system, tags["right"], points=[])
 
 
@@ -215,9 +262,13 @@ def test_clamped_contact_nodes():
     clamped = assemble(mesh, CONCRETE, clamped=tags["bottom"])
     surface = contact_surface(clamped, tags["right"])
     assert seen(surface).count == whole - 1 and seen(surface).points[:, 1].min() > 0.0
-    with pytest.raises(InputError, match="no contact nodes: every node of boundary group 'bottom' is also clamped"):
+    with pytest.raises(
+        InputError, match="no contact nodes: every node of boundary group 'bottom' is also clamped"
+    ):
         contact_surface(clamped, tags["bottom"])
-    with pytest.raises(InputError, match=r"contact point \(2, 0\) is also clamped: leave it out, or clamp less"):
+    with pytest.raises(
+        InputError, match=r"contact point \(2, 0\) is also clamped: leave it out, or clamp less"
+    ):
         contact_surface(clamped, tags["right"], points=[(2.0, 1.5), (2.0, 0.0)])
 
 
@@ -232,13 +283,18 @@ def test_contact_direction_partly_prescribed():
     with pytest.raises(InputError, match=sentence):
         contact_surface(along, tags["bottom"])
     with pytest.raises(InputError, match=sentence):
-        contact_surface(across, tags["bottom"], obstacle=HalfSpace(point=(-9.0, -9.0), normal=(1.0, 1.0)))
+        contact_surface(
+            across, tags["bottom"], obstacle=HalfSpace(point=(-9.0, -9.0), normal=(1.0, 1.0))
+        )
 
 
 def test_points_off_the_boundary():
     system, tags = body()
     for points, sentence in (
-        ([(9.0, 0.0)], r"contact point \(9, 0\) is 7 m away from boundary group 'right': give a point on it"),
+        (
+            [(9.0, 0.0)],
+            r"contact point \(9, 0\) is 7 m away from boundary group 'right': give a point on it",
+        ),
         ([(2.0, 0.0), (2.0, 0.01)], r"contact point \(2, 0.01\) is listed twice"),
         ([(2.0,)], "give 2 coordinates"),
     ):
@@ -252,9 +308,18 @@ def test_obstacles_that_cannot_be():
     bottom = tags["bottom"]
     for obstacle, sentence in (
         (HalfSpace((0.0, 0.0), (0.0, -1.0)), r"points into the body .*turn its sign"),
-        (HalfSpace((0.0, 0.0, 0.0), (0.0, 1.0, 0.0)), r"what directions returns has shape \(\d+, 3\); give numbers of"),
-        (HalfSpace((0.0, 0.02), (0.0, 1.0)), r"the body penetrates its obstacle by 0.02 m at \(.*, 0\) before"),
-        (AnalyticGap(lambda x: x[:, 0] - 1.0), r"the body penetrates its obstacle by 1 m at \(0, 0\)"),
+        (
+            HalfSpace((0.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+            r"what directions returns has shape \(\d+, 3\); give numbers of",
+        ),
+        (
+            HalfSpace((0.0, 0.02), (0.0, 1.0)),
+            r"the body penetrates its obstacle by 0.02 m at \(.*, 0\) before",
+        ),
+        (
+            AnalyticGap(lambda x: x[:, 0] - 1.0),
+            r"the body penetrates its obstacle by 1 m at \(0, 0\)",
+        ),
         (AnalyticGap(lambda x: x[:, 0] * np.nan), "the initial gap contains NaN"),
         (AnalyticGap(lambda x: x), "AnalyticGap: gap returned float64 of shape"),
     ):
@@ -267,10 +332,14 @@ def test_initial_displacement_into_the_obstacle():
     mesh, tags = block(COMM, **BODIES["quadrilaterals"])
     system = assemble(mesh, CONCRETE, initial_displacement=(0.0, -0.03))
     touching = ContactProblem(system, contact_surface(system, tags["bottom"], obstacle=GROUND))
-    with pytest.raises(InputError, match="the initial displacement penetrates the obstacle by 0.03 m: reduce it"):
+    with pytest.raises(
+        InputError, match="the initial displacement penetrates the obstacle by 0.03 m: reduce it"
+    ):
         initial_state(touching)
     apart = HalfSpace(point=(0.0, -0.03), normal=(0.0, 1.0))
-    assert not initial_state(ContactProblem(system, contact_surface(system, tags["bottom"], obstacle=apart))).r_n.any()
+    assert not initial_state(
+        ContactProblem(system, contact_surface(system, tags["bottom"], obstacle=apart))
+    ).r_n.any()
 
 
 @pytest.mark.two_ranks
@@ -278,7 +347,9 @@ def test_support_stiffness():
     system, tags = body()
     surface = contact_surface(system, tags["bottom"], obstacle=Touching())
     for stiffness in (0.0, -1.0, float("nan"), float("inf")):
-        with pytest.raises(InputError, match=f"foundation modulus is {stiffness}; give a finite number above zero"):
+        with pytest.raises(
+            InputError, match=f"foundation modulus is {stiffness}; give a finite number above zero"
+        ):
             surface.on_springs(stiffness)
 
 
@@ -298,5 +369,11 @@ def test_a_listed_point_between_nodes_is_told(caplog: pytest.LogCaptureFixture) 
     system = assemble(mesh, CONCRETE, clamped=tags["bottom"])
     surface = contact_surface(system, tags["right"], points=[(2.0, 0.5), (2.0, 0.98)])
     assert np.allclose(seen(surface).points, [(2.0, 0.5), (2.0, 1.0)])
-    told = [record.getMessage() for record in caplog.records if "nearest node" in record.getMessage()]
-    assert told == (["contact point (2, 0.98) is replaced by the nearest node, 0.02 m away"] if COMM.rank == 0 else [])
+    told = [
+        record.getMessage() for record in caplog.records if "nearest node" in record.getMessage()
+    ]
+    assert told == (
+        ["contact point (2, 0.98) is replaced by the nearest node, 0.02 m away"]
+        if COMM.rank == 0
+        else []
+    )

@@ -19,7 +19,9 @@ def test_the_same_sets_on_any_number_of_ranks():
     sets, forces = [], []
     for comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
         problem = thrown_blocks(comm, friction=0.4, bent=0.2)
-        reports = [report for _, report in vc.march(problem, solver=vc.Condensed(), dt=4e-3, steps=14)]
+        reports = [
+            report for _, report in vc.march(problem, solver=vc.Condensed(), dt=4e-3, steps=14)
+        ]
         sets.append(np.array([status(report) for report in reports]))
         forces.append(np.array([problem.surface.everywhere(report.new.r_n) for report in reports]))
     assert all(np.bincount(sets[1].ravel(), minlength=3) > 20)

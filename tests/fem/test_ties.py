@@ -23,52 +23,82 @@ def test_tied_layers_are_a_column(comm, simplices):
     soft = fem.Cells("soft", np.flatnonzero(middles(mesh)[:, 1] > 4.0).astype(np.int32), mesh)
     stiff = fem.Cells("stiff", np.flatnonzero(middles(mesh)[:, 1] < 4.0).astype(np.int32), mesh)
     damping = vc.Rayleigh(0.8, 1e-3)
-    system = fem.assemble(mesh, [(stiff, STIFF), (soft, SOIL)], clamped=tags["bottom"],
-                          tied=fem.Tied(tags["left"], tags["right"]), damping=damping)
+    system = fem.assemble(
+        mesh,
+        [(stiff, STIFF), (soft, SOIL)],
+        clamped=tags["bottom"],
+        tied=fem.Tied(tags["left"], tags["right"]),
+        damping=damping,
+    )
     assert system.space.unknowns == 2 * 2 * 8 and not system.floating
     heights = np.arange(9.0)
     points = [(x, y) for y in heights for x in (0.0, 1.5, 3.0)]
     found = history(linear(system, excitation=SHAKE), points, dt=2e-3, steps=150)
     layers = [STIFF] * 4 + [SOIL] * 4
-    column = SoilColumn(heights, *np.array([(m.lame_lambda, m.shear_modulus, m.rho, 0.8, 1e-3) for m in layers]).T)
+    column = SoilColumn(
+        heights, *np.array([(m.lame_lambda, m.shear_modulus, m.rho, 0.8, 1e-3) for m in layers]).T
+    )
     problem = column.on_rigid_base(lambda t: np.sum([one(t) for one in SHAKE], axis=0))
-    exact = np.array([state.u for state, _ in vc.march(problem, dt=2e-3, steps=150)]).reshape(150, 8, 2)
+    exact = np.array([state.u for state, _ in vc.march(problem, dt=2e-3, steps=150)]).reshape(
+        150, 8, 2
+    )
     for x in range(3):
         assert np.abs(found[:, x::3][:, 1:] - exact).max() < 1e-11 * np.abs(exact).max()
     assert not found[:, :3].any()
 
 
-SHAKE_IN_SPACE = tuple(vc.Ricker(2.0, f, direction=tuple(e)) for f, e in zip((4.0, 6.0, 5.0), np.eye(3), strict=True))
+SHAKE_IN_SPACE = tuple(
+    vc.Ricker(2.0, f, direction=tuple(e)) for f, e in zip((4.0, 6.0, 5.0), np.eye(3), strict=True)
+)
 ROUND = [("left", "right"), ("back", "front")]  # pairs of vertical sides of a box
 
 
 @pytest.mark.two_ranks
-@pytest.mark.parametrize("simplices, solver", [(False, vc.Condensed()), (True, vc.Iterative(tolerance=1e-12))])
+@pytest.mark.parametrize(
+    "simplices, solver", [(False, vc.Condensed()), (True, vc.Iterative(tolerance=1e-12))]
+)
 def test_tied_box_is_a_column(comm, simplices, solver):
     """All three components at once, two layers, damping: four vertical edges are one, and all is the column."""
     mesh, tags = block(comm, lengths=(2.0, 6.0, 3.0), divisions=(2, 6, 3), simplices=simplices)
-    soft, stiff = (fem.Cells("cells", np.flatnonzero(m).astype(np.int32), mesh)
-                   for m in (middles(mesh)[:, 1] > 3.0, middles(mesh)[:, 1] < 3.0))
-    system = fem.assemble(mesh, [(stiff, STIFF), (soft, SOIL)], clamped=tags["bottom"], damping=vc.Rayleigh(0.8, 1e-3),
-                          tied=[fem.Tied(tags[one], tags[two]) for one, two in ROUND])
+    soft, stiff = (
+        fem.Cells("cells", np.flatnonzero(m).astype(np.int32), mesh)
+        for m in (middles(mesh)[:, 1] > 3.0, middles(mesh)[:, 1] < 3.0)
+    )
+    system = fem.assemble(
+        mesh,
+        [(stiff, STIFF), (soft, SOIL)],
+        clamped=tags["bottom"],
+        damping=vc.Rayleigh(0.8, 1e-3),
+        tied=[fem.Tied(tags[one], tags[two]) for one, two in ROUND],
+    )
     assert system.space.unknowns == 3 * 2 * 3 * 6
     heights = np.arange(7.0)
     points = [(x, y, z) for y in heights[1:] for x in (0.0, 1.0, 2.0) for z in (0.0, 1.0, 3.0)]
     run = {"dt": 5e-3, "steps": 60}
-    found = history(linear(system, excitation=SHAKE_IN_SPACE), points, solver=solver, **run).reshape(60, 6, 9, 3)
+    found = history(
+        linear(system, excitation=SHAKE_IN_SPACE), points, solver=solver, **run
+    ).reshape(60, 6, 9, 3)
     layers = [STIFF] * 3 + [SOIL] * 3
-    column = SoilColumn(heights, *np.array([(m.lame_lambda, m.shear_modulus, m.rho, 0.8, 1e-3) for m in layers]).T)
+    column = SoilColumn(
+        heights, *np.array([(m.lame_lambda, m.shear_modulus, m.rho, 0.8, 1e-3) for m in layers]).T
+    )
     for plane in ([0, 1], [2, 1]):
-        problem = column.on_rigid_base(lambda t, c=plane: np.sum([one(t) for one in SHAKE_IN_SPACE], axis=0)[c])
+        problem = column.on_rigid_base(
+            lambda t, c=plane: np.sum([one(t) for one in SHAKE_IN_SPACE], axis=0)[c]
+        )
         exact = np.array([state.u for state, _ in vc.march(problem, **run)]).reshape(60, 6, 1, 2)
-        error = np.abs(found[..., plane] - exact).max(axis=(0, 1, 2)) / np.abs(exact).max(axis=(0, 1, 2))
+        error = np.abs(found[..., plane] - exact).max(axis=(0, 1, 2)) / np.abs(exact).max(
+            axis=(0, 1, 2)
+        )
         assert error.max() < (1e-9 if isinstance(solver, vc.Iterative) else 1e-11)
 
 
 def test_edges_of_a_box_move_as_one(comm):
     """An uneven push: opposite sides move alike, their four edges as one; which side is given first does not matter."""
     mesh, tags = block(comm, lengths=(2.0, 1.0, 3.0), divisions=(2, 2, 3), simplices=True)
-    push = fem.Traction(tags["top"], lambda x, t: 1e4 * np.column_stack([x[:, 0], x[:, 2] - 1.0, x[:, 0] * x[:, 2]]))
+    push = fem.Traction(
+        tags["top"], lambda x, t: 1e4 * np.column_stack([x[:, 0], x[:, 2] - 1.0, x[:, 0] * x[:, 2]])
+    )
     solved = []
     for ties in (ROUND, [pair[::-1] for pair in ROUND[::-1]], [*ROUND, ROUND[0]]):
         tied = [fem.Tied(tags[one], tags[two]) for one, two in ties]
@@ -81,7 +111,9 @@ def test_edges_of_a_box_move_as_one(comm):
         assert np.array_equal(low, high)
     top = solved[0][points[:, 1] == 1.0]
     assert np.ptp(top, axis=0).min() > 0.01 * np.abs(top).max()
-    edge = solved[0][(points[:, 1] == 1.0) & (points[:, 0] % 2.0 == 0.0) & (points[:, 2] % 3.0 == 0.0)]
+    edge = solved[0][
+        (points[:, 1] == 1.0) & (points[:, 0] % 2.0 == 0.0) & (points[:, 2] % 3.0 == 0.0)
+    ]
     assert len(edge) == 4 and np.array_equal(edge, np.tile(edge[0], (4, 1)))
 
 
@@ -89,17 +121,34 @@ def test_edges_of_a_box_move_as_one(comm):
 def test_forces_on_one_side_act_on_the_pair(comm):
     """A traction on the second side, which has no unknowns of its own, moves both; one component tied, one not."""
     mesh, tags = block(comm, lengths=(2.0, 1.0), divisions=(4, 3))
-    system = fem.assemble(mesh, SOIL, clamped=tags["bottom"], loads=fem.Traction(tags["right"], (1e4, 2e4)),
-                          tied=fem.Tied(tags["left"], tags["right"], components=(1,)))
+    system = fem.assemble(
+        mesh,
+        SOIL,
+        clamped=tags["bottom"],
+        loads=fem.Traction(tags["right"], (1e4, 2e4)),
+        tied=fem.Tied(tags["left"], tags["right"], components=(1,)),
+    )
     points, u = field(system, system.algebra.factor(system.K).solve(system.load(0.0)))
     left, right = (u[points[:, 0] == x] for x in (0.0, 2.0))
     assert np.array_equal(left[:, 1], right[:, 1]) and left[-1, 1] > 0.0
     assert np.abs(left[1:, 0] - right[1:, 0]).min() > 0.1 * np.abs(right[:, 0]).max()
-    reference = fem.assemble(mesh, SOIL, clamped=tags["bottom"], loads=fem.Traction(tags["left"], (0.0, 2e4)),
-                             tied=fem.Tied(tags["right"], tags["left"]))
-    other = fem.assemble(mesh, SOIL, clamped=tags["bottom"], loads=fem.Traction(tags["right"], (0.0, 2e4)),
-                         tied=fem.Tied(tags["left"], tags["right"]))
-    solved = [field(one, one.algebra.factor(one.K).solve(one.load(0.0)))[1] for one in (reference, other)]
+    reference = fem.assemble(
+        mesh,
+        SOIL,
+        clamped=tags["bottom"],
+        loads=fem.Traction(tags["left"], (0.0, 2e4)),
+        tied=fem.Tied(tags["right"], tags["left"]),
+    )
+    other = fem.assemble(
+        mesh,
+        SOIL,
+        clamped=tags["bottom"],
+        loads=fem.Traction(tags["right"], (0.0, 2e4)),
+        tied=fem.Tied(tags["left"], tags["right"]),
+    )
+    solved = [
+        field(one, one.algebra.factor(one.K).solve(one.load(0.0)))[1] for one in (reference, other)
+    ]
     assert np.abs(solved[0] - solved[1]).max() < 1e-12 * np.abs(solved[0]).max()
 
 
@@ -110,16 +159,24 @@ def test_contact_between_tied_sides(comm):
     ties = fem.Tied(tags["left"], tags["right"])
     held = fem.Prescribed(tags["top"], components=(0,))
     system = fem.assemble(mesh, SOIL, tied=ties, prescribed=held, loads=fem.BodyForce((0.0, -2e4)))
-    surface = fem.contact_surface(system, tags["bottom"], points=[(0.5, 0.0), (1.0, 0.0), (1.5, 0.0)])
+    surface = fem.contact_surface(
+        system, tags["bottom"], points=[(0.5, 0.0), (1.0, 0.0), (1.5, 0.0)]
+    )
     state = vc.static_equilibrium(vc.ContactProblem(system, surface), solver=vc.Condensed())
     assert np.isclose(surface.everywhere(state.r_n).sum(), 4e4, rtol=1e-9)
     surface = fem.contact_surface(system, tags["bottom"])
     state = vc.static_equilibrium(vc.ContactProblem(system, surface), solver=vc.Condensed())
-    assert surface.total == 4 and surface.everywhere(state.r_n) == pytest.approx(np.full(4, 1e4), rel=1e-9)
-    with pytest.raises(InputError, match=r"\(2, 0\) of 'bottom' is tied to a node outside this contact: leave it"):
+    assert surface.total == 4 and surface.everywhere(state.r_n) == pytest.approx(
+        np.full(4, 1e4), rel=1e-9
+    )
+    with pytest.raises(
+        InputError, match=r"\(2, 0\) of 'bottom' is tied to a node outside this contact: leave it"
+    ):
         fem.contact_surface(system, tags["bottom"], points=[(2.0, 0.0), (1.0, 0.0)])
     system = fem.assemble(mesh, SOIL, tied=fem.Tied(tags["left"], tags["right"], components=(0,)))
-    with pytest.raises(InputError, match=r"\(0, 0\) of 'bottom' is tied in some components only: leave it out"):
+    with pytest.raises(
+        InputError, match=r"\(0, 0\) of 'bottom' is tied in some components only: leave it out"
+    ):
         fem.contact_surface(system, tags["bottom"])
 
 
@@ -132,7 +189,9 @@ def test_a_tie_beside_a_contact_is_a_weld(comm, graded, whole):
     side have no condition. Pressed by 1 MPa the pressure is 1 MPa; pulled the right half opens like a crack."""
 
     def right_graded(x):
-        return np.column_stack([np.where(x[:, 0] > 1.0, 1.0 + (x[:, 0] - 1.0) ** 1.5, x[:, 0]), x[:, 1]])
+        return np.column_stack(
+            [np.where(x[:, 0] > 1.0, 1.0 + (x[:, 0] - 1.0) ** 1.5, x[:, 0]), x[:, 1]]
+        )
 
     lower = BlockMesh(lengths=(2.0, 1.0), divisions=(8, 4))
     upper = BlockMesh(lengths=(2.0, 1.0), divisions=(8, 4), deform=right_graded if graded else None)
@@ -141,22 +200,33 @@ def test_a_tie_beside_a_contact_is_a_weld(comm, graded, whole):
     halves = {}
     for name, group in (("top", tops), ("bottom", bottoms)):
         x = facet_middles(mesh, group)
-        halves[name] = [fem.Facets(f"{name}_{side}", group.indices[mask], mesh)
-                        for side, mask in (("left", x < 1.0), ("right", x > 1.0))]
+        halves[name] = [
+            fem.Facets(f"{name}_{side}", group.indices[mask], mesh)
+            for side, mask in (("left", x < 1.0), ("right", x > 1.0))
+        ]
     one, two = (bottoms, tops) if whole else (halves["bottom"][1], halves["top"][1])
     material = vc.LinearElastic(E=1e9, nu=0.0, rho=2000.0)
     found = {}
     for load in (-1e6, 1e6):
         pressed = fem.Traction(tags["upper_top"], (0.0, load))
-        system = fem.assemble(mesh, material, clamped=tags["lower_bottom"], loads=pressed,
-                              tied=fem.Tied(halves["top"][0], halves["bottom"][0]))
+        system = fem.assemble(
+            mesh,
+            material,
+            clamped=tags["lower_bottom"],
+            loads=pressed,
+            tied=fem.Tied(halves["top"][0], halves["bottom"][0]),
+        )
         surface = fem.contact_pair(system, one, two, matching=fem.DualMortar() if graded else None)
-        assert surface.total == 4 and len(surface.censuses[0].places["tied to the other side"]) == (5 if whole else 1)
+        assert surface.total == 4 and len(surface.censuses[0].places["tied to the other side"]) == (
+            5 if whole else 1
+        )
         problem = vc.ContactProblem(system, surface)
         state = vc.static_equilibrium(problem)
         found[load] = surface.everywhere(state.r_n / surface.weights)
         corner = np.sort(displacements_at(system, problem.cartesian(state.u), (2.0, 1.0)))
-        expected = (-1e-3, -1e-3) if load < 0.0 else (-0.09695e-3, 17.24968e-3)  # of the mesh that is cut open
+        expected = (
+            (-1e-3, -1e-3) if load < 0.0 else (-0.09695e-3, 17.24968e-3)
+        )  # of the mesh that is cut open
         if load < 0.0 or not graded:
             assert corner == pytest.approx(expected, abs=1e-8)
     assert found[1e6] == pytest.approx(np.zeros(4), abs=1e-3)
@@ -183,8 +253,14 @@ def test_contact_with_a_boundary_that_is_tied_at_its_edges(comm, solver):
     layer also where they are tied; with the box tied too, a uniform pressure on conditions that are there once."""
     lower, upper = (BlockMesh(lengths=(2.0, 1.0, 2.0), divisions=(n, 2, n)) for n in (2, 3))
     mesh, tags = fem.build_mesh(TwoBlocks(lower=lower, upper=upper), comm)
-    ties = {name: [fem.Tied(tags[f"{name}_{a}"], tags[f"{name}_{b}"]) for a, b in ROUND] for name in ("lower", "upper")}
-    data = {"clamped": tags["lower_bottom"], "loads": fem.Traction(tags["upper_top"], (0.0, -2e4, 0.0))}
+    ties = {
+        name: [fem.Tied(tags[f"{name}_{a}"], tags[f"{name}_{b}"]) for a, b in ROUND]
+        for name in ("lower", "upper")
+    }
+    data = {
+        "clamped": tags["lower_bottom"],
+        "loads": fem.Traction(tags["upper_top"], (0.0, -2e4, 0.0)),
+    }
     sides, matching = (tags["upper_bottom"], tags["lower_top"]), fem.DualMortar()
     system = fem.assemble(mesh, SOIL, tied=ties["lower"], **data)
     problem = vc.ContactProblem(system, fem.contact_pair(system, *sides, matching=matching))
@@ -198,14 +274,18 @@ def test_contact_with_a_boundary_that_is_tied_at_its_edges(comm, solver):
     problem = vc.ContactProblem(both, fem.contact_pair(both, *sides, matching=matching))
     state = vc.static_equilibrium(problem, solver=solver)
     assert problem.surface.total == 9
-    assert problem.surface.everywhere(state.r_n / problem.surface.weights) == pytest.approx(np.full(9, 2e4), rel=1e-9)
+    assert problem.surface.everywhere(state.r_n / problem.surface.weights) == pytest.approx(
+        np.full(9, 2e4), rel=1e-9
+    )
 
 
 @pytest.mark.two_ranks
 def test_mass_beside_a_tie_is_handed_over_alike(comm):
     """A periodic block falls on a plane: left and right contact points press alike, tied ones too; mass is kept."""
     mesh, tags = block(comm, lengths=(2.0, 1.0), divisions=(4, 4))
-    system = fem.assemble(mesh, SOIL, tied=fem.Tied(tags["left"], tags["right"]), initial_velocity=(0.0, -0.5))
+    system = fem.assemble(
+        mesh, SOIL, tied=fem.Tied(tags["left"], tags["right"]), initial_velocity=(0.0, -0.5)
+    )
     plane = vc.HalfSpace((0.0, -1e-4), (0.0, 1.0))
     for points in (None, [(x, 0.0) for x in (0.5, 1.0, 1.5)]):
         surface = fem.contact_surface(system, tags["bottom"], points=points, obstacle=plane)
@@ -214,7 +294,9 @@ def test_mass_beside_a_tie_is_handed_over_alike(comm):
             mass = problem.equations.algebra.dot(r, problem.equations.M @ r)
             assert np.isclose(mass, 2.0 * SOIL.rho, rtol=1e-12)
         steps = vc.march(problem, dt=2e-5, steps=200)
-        reactions = np.array([surface.everywhere(state.r_n) for state, _ in steps])[:, surface.total - 3 :]
+        reactions = np.array([surface.everywhere(state.r_n) for state, _ in steps])[
+            :, surface.total - 3 :
+        ]
         assert reactions.max() > 0.0
         assert np.abs(reactions[:, 0] - reactions[:, 2]).max() < 1e-10 * reactions.max()
 
@@ -222,6 +304,7 @@ def test_mass_beside_a_tie_is_handed_over_alike(comm):
 @pytest.mark.two_ranks
 def test_what_does_not_fit_is_refused(comm):
     """Sides meshed differently, held on one side only, not opposite, components that do not exist."""
+
     def bent(x):
         return x + np.outer(0.02 * x[:, 0] * np.sin(np.pi * x[:, 1]), [0.0, 1.0])
 
@@ -235,7 +318,9 @@ def test_what_does_not_fit_is_refused(comm):
     tie = fem.Tied(tags["left"], tags["right"])
     with pytest.raises(InputError, match="prescribed on one side only"):
         fem.assemble(mesh, SOIL, tied=tie, clamped=tags["left"])
-    with pytest.raises(InputError, match=r"'left' and 'bottom' share the node \(0, 0\): tie boundaries without"):
+    with pytest.raises(
+        InputError, match=r"'left' and 'bottom' share the node \(0, 0\): tie boundaries without"
+    ):
         fem.assemble(mesh, SOIL, tied=fem.Tied(tags["left"], tags["bottom"]))
     with pytest.raises(InputError, match="component 2 does not exist"):
         fem.assemble(mesh, SOIL, tied=fem.Tied(tags["left"], tags["right"], components=(2,)))
@@ -243,17 +328,24 @@ def test_what_does_not_fit_is_refused(comm):
 
 def test_sides_of_a_box_that_do_not_fit_are_refused(comm):
     """Sides with as many nodes elsewhere; an edge held although its partners are free; one side with itself."""
+
     def bent(x):
         return x + np.outer(0.02 * x[:, 0] * np.sin(np.pi * x[:, 1]), [0.0, 0.0, 1.0])
 
     mesh, tags = block(comm, lengths=(2.0, 1.0, 2.0), divisions=(2, 2, 2), deform=bent)
     tie = fem.Tied(tags["left"], tags["right"])
-    with pytest.raises(InputError, match="no partner opposite it on the other: mesh both sides alike"):
+    with pytest.raises(
+        InputError, match="no partner opposite it on the other: mesh both sides alike"
+    ):
         fem.assemble(mesh, SOIL, tied=tie)
     mesh, tags = block(comm, lengths=(2.0, 1.0, 2.0), divisions=(2, 2, 2))
     tied = [fem.Tied(tags[one], tags[two]) for one, two in ROUND]
-    with pytest.raises(InputError, match="component 0 of a tied node is prescribed on one side only"):
-        fem.assemble(mesh, SOIL, tied=tied[1], prescribed=fem.Prescribed(tags["front"], components=(0,)))
+    with pytest.raises(
+        InputError, match="component 0 of a tied node is prescribed on one side only"
+    ):
+        fem.assemble(
+            mesh, SOIL, tied=tied[1], prescribed=fem.Prescribed(tags["front"], components=(0,))
+        )
     with pytest.raises(InputError, match="'left' and 'left' share the node"):
         fem.assemble(mesh, SOIL, tied=fem.Tied(tags["left"], tags["left"]))
 

@@ -14,7 +14,9 @@ from vi_contact import fem
 UNIT = vc.LinearElastic(E=1.0, nu=0.0, rho=1.0)
 
 
-@pytest.mark.parametrize("cells, consistent, lumped", [(10, 1.01652, 0.98363), (20, 1.004117, 0.995893)])
+@pytest.mark.parametrize(
+    "cells, consistent, lumped", [(10, 1.01652, 0.98363), (20, 1.004117, 0.995893)]
+)
 def test_speed_of_waves_on_linear_elements(comm, cells, consistent, lumped):
     """V8.4: c_h/c of a harmonic wave, which is an eigenvector of a periodic mesh: the root of uᵀKu / uᵀMu."""
     mesh, tags = strip(comm, 1.0, 1.0 / cells, (cells, 1))
@@ -37,11 +39,19 @@ def test_speed_of_rayleigh_waves(comm):
         U, V = rayleigh_motion(soil, 3.0 - points[:, 1], 1.0)
         if derivative == 0:
             return np.column_stack([U * np.cos(k * points[:, 0]), V * np.sin(k * points[:, 0])])
-        return speed * k * np.column_stack([U * np.sin(k * points[:, 0]), -V * np.cos(k * points[:, 0])])
+        return (
+            speed
+            * k
+            * np.column_stack([U * np.sin(k * points[:, 0]), -V * np.cos(k * points[:, 0])])
+        )
 
     system = fem.assemble(
-        mesh, soil, tied=fem.Tied(tags["left"], tags["right"]), dashpots=fem.Dashpots(tags["bottom"]),
-        initial_displacement=lambda x: motion(x, 0), initial_velocity=lambda x: motion(x, 1),
+        mesh,
+        soil,
+        tied=fem.Tied(tags["left"], tags["right"]),
+        dashpots=fem.Dashpots(tags["bottom"]),
+        initial_displacement=lambda x: motion(x, 0),
+        initial_velocity=lambda x: motion(x, 1),
     )
     x = np.arange(20) / 20.0
     nodes = system.space.find_nodes(np.column_stack([x, np.full(20, 3.0)]))

@@ -19,10 +19,20 @@ def test_ec8_type_1_ground_b():
 
 
 TABLES = {  # EN 1998-1:2004, tables 3.2 and 3.3
-    1: {"A": (1.0, 0.15, 0.4, 2.0), "B": (1.2, 0.15, 0.5, 2.0), "C": (1.15, 0.2, 0.6, 2.0),
-        "D": (1.35, 0.2, 0.8, 2.0), "E": (1.4, 0.15, 0.5, 2.0)},
-    2: {"A": (1.0, 0.05, 0.25, 1.2), "B": (1.35, 0.05, 0.25, 1.2), "C": (1.5, 0.1, 0.25, 1.2),
-        "D": (1.8, 0.1, 0.3, 1.2), "E": (1.6, 0.05, 0.25, 1.2)},
+    1: {
+        "A": (1.0, 0.15, 0.4, 2.0),
+        "B": (1.2, 0.15, 0.5, 2.0),
+        "C": (1.15, 0.2, 0.6, 2.0),
+        "D": (1.35, 0.2, 0.8, 2.0),
+        "E": (1.4, 0.15, 0.5, 2.0),
+    },
+    2: {
+        "A": (1.0, 0.05, 0.25, 1.2),
+        "B": (1.35, 0.05, 0.25, 1.2),
+        "C": (1.5, 0.1, 0.25, 1.2),
+        "D": (1.8, 0.1, 0.3, 1.2),
+        "E": (1.6, 0.05, 0.25, 1.2),
+    },
 }
 
 
@@ -40,25 +50,36 @@ def test_ec8_branches_of_every_ground(kind, ground, damping):
     late = [2.0 * top * tc / (tc + td), top * tc / td, top * tc / td / 4.0]
     exact = [3.0 * s, 0.5 * (3.0 * s + top), top, top, top, *late]
     assert np.allclose(spectrum.acceleration(periods), exact, rtol=1e-13, atol=0.0)
-    assert np.allclose(spectrum.displacement(periods), np.array(exact) * (np.array(periods) / (2.0 * np.pi)) ** 2)
+    assert np.allclose(
+        spectrum.displacement(periods), np.array(exact) * (np.array(periods) / (2.0 * np.pi)) ** 2
+    )
 
 
 def test_ec8_eta_has_a_floor_and_the_vertical_spectrum_its_own_numbers():
     assert EC8Spectrum.on_ground("A", ag=1.0, damping=0.4).eta == 0.55
     first, second = (EC8Spectrum.vertical(ag=2.0, kind=kind) for kind in (1, 2))
-    assert np.allclose(first.acceleration([0.0, 0.1, 0.5, 2.0]), [1.8, 5.4, 5.4 * 0.15 / 0.5, 5.4 * 0.15 / 4.0])
+    assert np.allclose(
+        first.acceleration([0.0, 0.1, 0.5, 2.0]), [1.8, 5.4, 5.4 * 0.15 / 0.5, 5.4 * 0.15 / 4.0]
+    )
     assert np.allclose(second.acceleration([0.0, 0.1, 0.5]), [0.9, 2.7, 2.7 * 0.15 / 0.5])
 
 
-@pytest.mark.parametrize("act, word", [
-    (lambda: EC8Spectrum.on_ground("F", ag=1.0), "'F'"), (lambda: EC8Spectrum.on_ground("A", ag=1.0, kind=3), "type 3"),
-    (lambda: EC8Spectrum.on_ground("A", ag=0.0), "ag is 0.0"), (lambda: EC8Spectrum.vertical(ag=1.0, kind=3), "type 3"),
-    (lambda: EC8Spectrum(1.0, 1.0, 0.5, 0.4, 2.0), "tb <= tc"),
-    (lambda: EC8Spectrum.on_ground("A", ag=1.0, damping=5.0), "0.05 for 5 %"),
-    (lambda: EC8Spectrum.on_ground("A", ag=1.0).acceleration([-1.0]), "negative"),
-    (lambda: KanaiTajimi(0.0), "s0 is 0.0"), (lambda: KanaiTajimi(1.0, omega_f=-1.0), "omega_f"),
-    (lambda: Envelope(5.0, 1.0, 0.1), "rise <= end"), (lambda: synthetic(KanaiTajimi(1.0), 1.0, 2.0, seed=1), "dt"),
-])
+@pytest.mark.parametrize(
+    "act, word",
+    [
+        (lambda: EC8Spectrum.on_ground("F", ag=1.0), "'F'"),
+        (lambda: EC8Spectrum.on_ground("A", ag=1.0, kind=3), "type 3"),
+        (lambda: EC8Spectrum.on_ground("A", ag=0.0), "ag is 0.0"),
+        (lambda: EC8Spectrum.vertical(ag=1.0, kind=3), "type 3"),
+        (lambda: EC8Spectrum(1.0, 1.0, 0.5, 0.4, 2.0), "tb <= tc"),
+        (lambda: EC8Spectrum.on_ground("A", ag=1.0, damping=5.0), "0.05 for 5 %"),
+        (lambda: EC8Spectrum.on_ground("A", ag=1.0).acceleration([-1.0]), "negative"),
+        (lambda: KanaiTajimi(0.0), "s0 is 0.0"),
+        (lambda: KanaiTajimi(1.0, omega_f=-1.0), "omega_f"),
+        (lambda: Envelope(5.0, 1.0, 0.1), "rise <= end"),
+        (lambda: synthetic(KanaiTajimi(1.0), 1.0, 2.0, seed=1), "dt"),
+    ],
+)
 def test_bad_spectra_are_refused_in_one_sentence(act, word):
     with pytest.raises(InputError, match=word):
         act()
@@ -69,7 +90,9 @@ def test_kanai_tajimi_density_at_marked_frequencies():
     soft = KanaiTajimi(0.02, omega_f=0.0)
     assert soft.density(0.0) == 0.02 and KanaiTajimi(0.02).density(0.0) == 0.0
     assert soft.density(15.6) == pytest.approx(0.02 * (1.0 + 4.0 * 0.36) / (4.0 * 0.36), rel=1e-13)
-    assert KanaiTajimi(0.02).density(1.5) == pytest.approx(soft.density(1.5) / (4.0 * 0.36), rel=1e-13)
+    assert KanaiTajimi(0.02).density(1.5) == pytest.approx(
+        soft.density(1.5) / (4.0 * 0.36), rel=1e-13
+    )
 
 
 def test_kanai_tajimi_variance():
@@ -78,13 +101,19 @@ def test_kanai_tajimi_variance():
     exact = math.pi * 0.02 * 15.6 * (1.0 + 4.0 * 0.36) / 1.2
     omega = np.linspace(0.0, 4e4, 4_000_001)
     tail = 2.0 * spectrum.s0 * 4.0 * 0.36 * 15.6**2 / 4e4  # beyond, S = S0 4 zeta² wg² / w²
-    assert 2.0 * np.sum(spectrum.density(omega)) * 0.01 - 0.01 * 0.02 + tail == pytest.approx(exact, rel=1e-4)
+    assert 2.0 * np.sum(spectrum.density(omega)) * 0.01 - 0.01 * 0.02 + tail == pytest.approx(
+        exact, rel=1e-4
+    )
     record = synthetic(spectrum, 600.0, 0.002, seed=7)
-    above = 2.0 * spectrum.s0 * 4.0 * 0.36 * 15.6**2 / (math.pi / 0.002)  # what lies above the Nyquist frequency
+    above = (
+        2.0 * spectrum.s0 * 4.0 * 0.36 * 15.6**2 / (math.pi / 0.002)
+    )  # what lies above the Nyquist frequency
     assert np.mean(record.acceleration**2) == pytest.approx(exact - above, rel=0.05)
 
 
-MOTIONS = np.array([synthetic(KanaiTajimi(0.02), 20.0, 0.02, seed=seed).acceleration for seed in range(400)])
+MOTIONS = np.array(
+    [synthetic(KanaiTajimi(0.02), 20.0, 0.02, seed=seed).acceleration for seed in range(400)]
+)
 
 
 def variance(spectrum, dt, size):
@@ -112,13 +141,17 @@ def test_motions_have_the_spectrum():
     density = lines * 0.02 / (2.0 * np.pi * np.sum(window**2))
     omega = 2.0 * np.pi * np.fft.rfftfreq(n, 0.02)
     bands = [np.arange(k, k + 20) for k in range(10, 450, 20)]
-    ratios = [np.mean(density[band]) / np.mean(KanaiTajimi(0.02).density(omega[band])) for band in bands]
+    ratios = [
+        np.mean(density[band]) / np.mean(KanaiTajimi(0.02).density(omega[band])) for band in bands
+    ]
     assert np.max(np.abs(np.array(ratios) - 1.0)) < 0.08
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.01)
 
 
 def test_the_same_seed_gives_the_same_motion_and_another_seed_another():
-    first, again, other = (synthetic(KanaiTajimi(0.02), 10.0, 0.01, seed=seed) for seed in (3, 3, 4))
+    first, again, other = (
+        synthetic(KanaiTajimi(0.02), 10.0, 0.01, seed=seed) for seed in (3, 3, 4)
+    )
     assert np.array_equal(first.acceleration, again.acceleration)
     assert abs(np.corrcoef(first.acceleration, other.acceleration)[0, 1]) < 0.5
     assert first.acceleration.size == 1001 and first.notes[1] == "seed 3, envelope None"
@@ -135,6 +168,8 @@ def test_envelope_shapes_the_motion():
     envelope = Envelope(2.0, 5.0, 0.4)
     times = np.array([0.0, 1.0, 2.0, 3.0, 5.0, 7.5])
     assert np.allclose(envelope(times), [0.0, 0.25, 1.0, 1.0, 1.0, math.exp(-1.0)], rtol=1e-14)
-    plain, shaped = (synthetic(KanaiTajimi(0.02), 10.0, 0.01, seed=3, envelope=e) for e in (None, envelope))
+    plain, shaped = (
+        synthetic(KanaiTajimi(0.02), 10.0, 0.01, seed=3, envelope=e) for e in (None, envelope)
+    )
     assert np.allclose(shaped.acceleration, plain.acceleration * envelope(plain.times), rtol=1e-14)
     assert np.all(Envelope(0.0, 1.0, 0.0)(times) == 1.0)

@@ -22,11 +22,15 @@ import vi_contact
 pytestmark = pytest.mark.serial
 PACKAGE = Path(vi_contact.__file__).parent
 SOURCES = {  # module, as "solvers.normal.lcp" -> its text
-    path.relative_to(PACKAGE).with_suffix("").as_posix().replace("/", "."): path.read_text(encoding="utf-8")
+    path.relative_to(PACKAGE).with_suffix("").as_posix().replace("/", "."): path.read_text(
+        encoding="utf-8"
+    )
     for path in sorted(PACKAGE.rglob("*.py"))
 }
 ROOT_MODULES = {"__init__", "__main__"}
-ROW = re.compile(r"^\| (?P<floor>\d) \| `(?P<room>\w+)/` \| [^|]+ \|(?P<foreign>[^|]*)\|$", re.MULTILINE)
+ROW = re.compile(
+    r"^\| (?P<floor>\d) \| `(?P<room>\w+)/` \| [^|]+ \|(?P<foreign>[^|]*)\|$", re.MULTILINE
+)
 
 
 @dataclass(frozen=True)
@@ -42,7 +46,9 @@ def rooms() -> dict[str, Room]:
     found = {}
     for row in ROW.finditer(text):
         names = [name.split() for name in row["foreign"].split(",") if name.strip()]
-        found[row["room"]] = Room(int(row["floor"]), {name[0]: name[1:] == ["late"] for name in names})
+        found[row["room"]] = Room(
+            int(row["floor"]), {name[0]: name[1:] == ["late"] for name in names}
+        )
     return found
 
 
@@ -86,7 +92,11 @@ def _one(source: str, start: str, name: str, late: bool) -> Iterator[Import]:
         return
     inside = start.removeprefix("vi_contact").lstrip(".")
     deeper = f"{inside}.{name}".lstrip(".")
-    found = [one for one in (deeper, f"{deeper}.__init__", inside, f"{inside}.__init__") if one in SOURCES]
+    found = [
+        one
+        for one in (deeper, f"{deeper}.__init__", inside, f"{inside}.__init__")
+        if one in SOURCES
+    ]
     yield Import(source, found[0] if found else "__init__", late, own=True)
 
 
@@ -116,7 +126,9 @@ def circles(found: list[Import]) -> list[str]:
     for one in found:
         if one.own and one.source != one.target:
             below.setdefault(one.source, set()).add(one.target)
-    while leaves := [module for module, targets in below.items() if not any(one in below for one in targets)]:
+    while leaves := [
+        module for module, targets in below.items() if not any(one in below for one in targets)
+    ]:
         for module in leaves:
             del below[module]
     roots = [module for module in below if any(module in targets for targets in below.values())]
@@ -142,9 +154,16 @@ def test_what_is_imported_by_name_stands_below_too():
 
 def test_one_upward_import_is_found():
     """The rule has teeth: any single import of a room on the same floor or above makes it fail."""
-    for here, there in (("core.errors", "laws.friction"), ("solvers.condensed", "run.march"), ("fem.mesh", "solvers"),
-                        ("schemes.newmark", "cli.entry"), ("laws.mass", "ground_motion.record")):
-        text = SOURCES[here] + f"\ndef late() -> None:\n    from vi_contact.{there} import anything\n"
+    for here, there in (
+        ("core.errors", "laws.friction"),
+        ("solvers.condensed", "run.march"),
+        ("fem.mesh", "solvers"),
+        ("schemes.newmark", "cli.entry"),
+        ("laws.mass", "ground_motion.record"),
+    ):
+        text = (
+            SOURCES[here] + f"\ndef late() -> None:\n    from vi_contact.{there} import anything\n"
+        )
         found = upward(every_import(SOURCES | {here: text}))
         assert len(found) == 1 and found[0].startswith(f"{here} imports {there}"), found
 
@@ -169,10 +188,16 @@ def test_foreign_packages_stay_at_home():
 
 def test_petsc_in_the_solvers_stays_in_the_volume_routes():
     found = every_import(SOURCES)
-    direct = {one.source for one in found if one.target == "petsc4py" and one.source.startswith("solvers.")}
+    direct = {
+        one.source
+        for one in found
+        if one.target == "petsc4py" and one.source.startswith("solvers.")
+    }
     assert direct == {"solvers.petsc"}  # which imports MPI first
     users = {one.source for one in found if one.own and one.target.startswith("solvers.petsc")}
-    assert users and all(module.startswith(("solvers.volume.", "solvers.iterative.")) for module in users)
+    assert users and all(
+        module.startswith(("solvers.volume.", "solvers.iterative.")) for module in users
+    )
 
 
 SMALL_RUN = """
@@ -201,7 +226,11 @@ from vi_contact.solvers.normal.hildreth import Hildreth
 
 def _python(script: str) -> str:
     done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, cwd=PACKAGE.parent, check=False,
+        [sys.executable, "-c", script],
+        capture_output=True,
+        text=True,
+        cwd=PACKAGE.parent,
+        check=False,
         env=dict(os.environ),
     )
     assert done.returncode == 0, done.stderr

@@ -91,12 +91,12 @@ def accepted(command: str) -> str:
     words = shlex.split(command, comments=True)
     while words and (re.match(r"[A-Z_]+=", words[0]) or words[0] in ("mpirun", "srun")):
         start = [k for k, word in enumerate(words) if word in ("vi-contact", "python3")]
-        words = words[1:] if "=" in words[0] else words[start[0]:] if start else []
+        words = words[1:] if "=" in words[0] else words[start[0] :] if start else []
     if words and "/bin/" in words[0]:  # of a virtual environment
         words[0] = {"python": "python3"}.get(Path(words[0]).name, Path(words[0]).name)
     if words[:1] == ["vi-contact"] or words[:3] == ["python3", "-m", "vi_contact"]:
-        own, _ = split_petsc(words[1 if words[0] == "vi-contact" else 3:])
-        own = own[:own.index(">")] if ">" in own else own
+        own, _ = split_petsc(words[1 if words[0] == "vi-contact" else 3 :])
+        own = own[: own.index(">")] if ">" in own else own
         try:
             PARSER.parse_args(own)
         except SystemExit as end:
@@ -114,18 +114,28 @@ def accepted(command: str) -> str:
             if not (ROOT / "demos" / f"{name}.py").is_file():
                 return f"there is no demo {name}"
             sources.append(ROOT / "demos" / f"{name}.py")
-            if name in ("wall", "channel"):  # their options are those of the command run, and --case
-                given = words[words.index(name) + 1:]
+            if name in (
+                "wall",
+                "channel",
+            ):  # their options are those of the command run, and --case
+                given = words[words.index(name) + 1 :]
                 if "--case" in given:
                     at = given.index("--case")
-                    del given[at: at + 2]
+                    del given[at : at + 2]
                 return accepted(shlex.join(["vi-contact", "run", name, *given]))
         if words[1] == "meshes":  # its options are the fields of meshes
             sources += (ROOT / "vi_contact" / "meshes").glob("*.py")
         text = "".join(source.read_text(encoding="utf-8") for source in sources)
         options = [word for word in words[2:] if re.fullmatch(r"--?[a-z][a-z-]*", word)]
-        unknown = [word for word in options if not re.search(rf"(?<![\w-]){word}(?![\w-])", text) and not (
-            words[1] == "meshes" and re.search(rf"^    {word[2:].replace('-', '_')}: ", text, re.MULTILINE))]
+        unknown = [
+            word
+            for word in options
+            if not re.search(rf"(?<![\w-]){word}(?![\w-])", text)
+            and not (
+                words[1] == "meshes"
+                and re.search(rf"^    {word[2:].replace('-', '_')}: ", text, re.MULTILINE)
+            )
+        ]
         return f"{words[1]} does not know {' '.join(unknown)}" if unknown else ""
     return ""
 
@@ -142,8 +152,12 @@ def by_page() -> dict[str, list[str]]:
     seen: set[str] = set()
     for page in program.pages():
         name = page.relative_to(ROOT).as_posix()
-        own = [one for one in program.commands(page) if here(one) and (
-            name in program.FILES and ".toml" in one or program.to_run(one) not in seen)]
+        own = [
+            one
+            for one in program.commands(page)
+            if here(one)
+            and (name in program.FILES and ".toml" in one or program.to_run(one) not in seen)
+        ]
         seen |= {program.to_run(one) for one in own}
         found |= {name: own} if own else {}
     return found
@@ -162,7 +176,9 @@ def test_every_command_is_known_and_accepted() -> None:
             seen += 1
             why = program.elsewhere(command)
             if why is None and ran.get(command, ("", ""))[1] != program.key(command):
-                wrong.append(f"{page.name}: {command}: nothing has run it" + " so" * (command in ran))
+                wrong.append(
+                    f"{page.name}: {command}: nothing has run it" + " so" * (command in ran)
+                )
             whole = why not in (program.NAME, program.BEGINNING)
             if whole and (said := accepted(program.to_run(command))):
                 wrong.append(f"{page.name}: {command}: {said}")
@@ -188,7 +204,10 @@ def test_what_is_only_named_is_there() -> None:
 def test_what_runs_elsewhere_is_on_a_page_and_there() -> None:
     """No row without a command, and the tests and programs that the rows name exist."""
     every = {command for page in program.pages() for command in program.commands(page)}
-    for form, why in [*program.ELSEWHERE.items(), *((form, f"tests/{why}") for form, why in program.SHORTER.items())]:
+    for form, why in [
+        *program.ELSEWHERE.items(),
+        *((form, f"tests/{why}") for form, why in program.SHORTER.items()),
+    ]:
         assert any(re.fullmatch(form, command) for command in every), form
         for name in re.findall(r"[\w/*.]+\.(?:py|sh)\b", why):
             assert (ROOT / name).is_file(), name
@@ -221,9 +240,11 @@ def needle(command: str) -> str:
     if found := re.match(r"bash demos/run\.sh (?:-n \d )?(\w+)", command):
         return rf'"{found[1]}(\.py)?"'
     if found := re.match(r"python3 benchmarks/(?:peers/)?(\w+)\.py", command):
-        return rf'\b{found[1]}\b'
+        return rf"\b{found[1]}\b"
     if found := re.match(r"(?:mpirun -n 3 )?vi-contact (\w+)", command):
-        printed = {"run": "[01]", "report": "2"}.get(found[1], "")  # by the command new, which tests give again
+        printed = {"run": "[01]", "report": "2"}.get(
+            found[1], ""
+        )  # by the command new, which tests give again
         return rf'"{found[1]}"|main\(\[?\*?commands\[{printed}\]'
     return ""
 
@@ -235,7 +256,7 @@ def source(test: str) -> str:
     parts = {}
     for node in ast.parse(text).body:
         first = min([node.lineno, *(one.lineno for one in getattr(node, "decorator_list", []))])
-        whole = "\n".join(text.splitlines()[first - 1: node.end_lineno])
+        whole = "\n".join(text.splitlines()[first - 1 : node.end_lineno])
         if isinstance(node, ast.FunctionDef):
             parts[node.name] = whole
         elif isinstance(node, ast.Assign | ast.AnnAssign):
@@ -251,13 +272,20 @@ def source(test: str) -> str:
 
 
 @serial
-def test_rows_of_commands_that_fail_are_dropped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rows_of_commands_that_fail_are_dropped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Kept are rows of commands that pages have and that succeeded when they were last run, with today's key."""
     monkeypatch.setattr(program, "NOTE", tmp_path / "list.txt")
     kept, failed = "vi-contact cases", "vi-contact new pier"
-    (tmp_path / "list.txt").write_text(f"# one\n   1 00000000 {kept}\n   1 00000000 {failed}\n   1 00000000 ls\n")
+    (tmp_path / "list.txt").write_text(
+        f"# one\n   1 00000000 {kept}\n   1 00000000 {failed}\n   1 00000000 ls\n"
+    )
     program.keep({failed: None, "vi-contact schema": 1.2})
-    assert program.recorded() == {kept: ("1", "00000000"), "vi-contact schema": ("1", program.key("vi-contact schema"))}
+    assert program.recorded() == {
+        kept: ("1", "00000000"),
+        "vi-contact schema": ("1", program.key("vi-contact schema")),
+    }
 
 
 @serial
@@ -276,12 +304,22 @@ def test_a_key_is_that_of_the_files_of_the_page(monkeypatch: pytest.MonkeyPatch)
 def test_commands_that_do_not_exist_are_found() -> None:
     """The check has teeth, and each kind of line is taken for a command."""
     for command in (
-        "vi-contact run wall --stepz 3", "vi-contact paint results/wall", "bash demos/run.sh wall --stepz 1",
-        "bash docs/built.sh", "python3 benchmarks/scale.py --wrong", "mpirun -n 3 vi-contact run",
-        "PYTHONPATH=. vi-contact runs wall.toml", "venv/bin/vi-contact --versions", "bash tests/run.sh --quik",
+        "vi-contact run wall --stepz 3",
+        "vi-contact paint results/wall",
+        "bash demos/run.sh wall --stepz 1",
+        "bash docs/built.sh",
+        "python3 benchmarks/scale.py --wrong",
+        "mpirun -n 3 vi-contact run",
+        "PYTHONPATH=. vi-contact runs wall.toml",
+        "venv/bin/vi-contact --versions",
+        "bash tests/run.sh --quik",
     ):
         assert accepted(command), command
-    for command in ("vi-contact run wall --steps 3", "bash demos/run.sh -n 3 wall --case b", "bash tests/run.sh -k a"):
+    for command in (
+        "vi-contact run wall --steps 3",
+        "bash demos/run.sh -n 3 wall --case b",
+        "bash tests/run.sh -k a",
+    ):
         assert not accepted(command), command
     assert program.elsewhere("vi-contact run wall --steps 4") is None
 
@@ -292,14 +330,28 @@ def test_commands_of_the_gallery_are_those_of_its_list() -> None:
     its parser knows."""
     made = loaded(DOCS / "gallery" / "make.py").entries()
     for page in sorted((DOCS / "gallery").glob("*.md")):
-        ours = {line for entry in made.values() if entry["page"].partition("#")[0] == page.name
-                for line in entry["commands"]}
-        lines = [" ".join(re.sub(r"\s+#.*", "", line).split()) for block in
-                 blocks(f"docs/gallery/{page.name}", "sh") for line in block.splitlines() if line.strip()]
+        ours = {
+            line
+            for entry in made.values()
+            if entry["page"].partition("#")[0] == page.name
+            for line in entry["commands"]
+        }
+        lines = [
+            " ".join(re.sub(r"\s+#.*", "", line).split())
+            for block in blocks(f"docs/gallery/{page.name}", "sh")
+            for line in block.splitlines()
+            if line.strip()
+        ]
         assert ours <= set(lines), page.name
         assert [line for line in lines if accepted(line)] == [], page.name
-        assert [line for line in lines if line not in ours and re.sub(r" -n \d+", "", line) not in ours
-                and program.elsewhere(line) is None and line not in program.recorded()] == [], page.name
+        assert [
+            line
+            for line in lines
+            if line not in ours
+            and re.sub(r" -n \d+", "", line) not in ours
+            and program.elsewhere(line) is None
+            and line not in program.recorded()
+        ] == [], page.name
 
 
 @serial
@@ -331,25 +383,39 @@ def short(words: list[str]) -> list[str]:
     case = Path(words[1])
     if case.name == "house.toml":  # has stages
         return [*words, "--quiet", "--set", "stage.3.run.t_end=", "--set", "stage.3.run.steps=2"]
-    more = ["--set", "mesh.refine=0"] if case.is_file() and "refine =" in case.read_text(encoding="utf-8") else []
+    more = (
+        ["--set", "mesh.refine=0"]
+        if case.is_file() and "refine =" in case.read_text(encoding="utf-8")
+        else []
+    )
     return [*words, *more, "--quiet", "--set", "run.t_end=", "--steps", "2"]
 
 
 @serial
 @pytest.mark.slow
 @pytest.mark.parametrize("page", by_page())
-def test_commands_of_a_page_run(page: str, small_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                                capsys: pytest.CaptureFixture[str]) -> None:
+def test_commands_of_a_page_run(
+    page: str,
+    small_run: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     """In the order of the page, in a folder as its reader has it. What they write is there."""
     folder = tmp_path / "reader"
     program.furnish(folder, ROOT / page, ROOT)
     monkeypatch.chdir(folder)
-    for starter in re.findall(r"^vi-contact new (\w+)", "\n".join(program.BEFORE.get(page, [])), re.MULTILINE):
+    for starter in re.findall(
+        r"^vi-contact new (\w+)", "\n".join(program.BEFORE.get(page, [])), re.MULTILINE
+    ):
         assert main(["new", starter]) == 0
     if page == "docs/guide/clusters.md":
         shutil.copytree("dam", ".", dirs_exist_ok=True)
     if page == "docs/guide/studies.md":
-        exec(compile(Path("make.py").read_text(encoding="utf-8"), "make.py", "exec"), {"__name__": "__main__"})
+        exec(
+            compile(Path("make.py").read_text(encoding="utf-8"), "make.py", "exec"),
+            {"__name__": "__main__"},
+        )
     for command in by_page()[page]:
         if command.startswith(DRAWN):
             name = command.removeprefix(DRAWN)
@@ -359,7 +425,7 @@ def test_commands_of_a_page_run(page: str, small_run: Path, tmp_path: Path, monk
             assert Path("results", f"practice_{name}.png").stat().st_size > 5_000
             continue
         words = shlex.split(program.to_run(command))[1:]
-        words = words[:words.index(">")] if ">" in words else words
+        words = words[: words.index(">")] if ">" in words else words
         if words[0] in ("post", "plot", "film"):
             run = Path(next(word for word in words if word.startswith("results/")))
             if not (run / "history.csv").is_file() or words[0] != "post":
@@ -380,27 +446,34 @@ def test_commands_of_a_page_run(page: str, small_run: Path, tmp_path: Path, monk
             assert Path(name).exists(), command
 
 
-def test_a_run_on_several_ranks(comm: Any, shared_tmp: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_on_several_ranks(
+    comm: Any, shared_tmp: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The command run, and README's program."""
     pytest.importorskip("dolfinx")
     monkeypatch.chdir(shared_tmp)
     assert main(["run", "wall", "--steps", "2", "--quiet", "--out", "wall"]) == 0
     code = blocks("README.md", "python")[0]
     assert code.count("steps=400") == 1
-    exec(compile(code.replace("steps=400", "steps=4"), "first.py", "exec"), {"__name__": "__main__"})
+    exec(
+        compile(code.replace("steps=400", "steps=4"), "first.py", "exec"), {"__name__": "__main__"}
+    )
     comm.Barrier()
     assert (shared_tmp / "wall" / "history.csv").is_file()
 
 
 @serial
-def test_a_figure_of_the_theory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                                capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_figure_of_the_theory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """The one that docs/theory/index.md draws; its page says what it shows."""
     pytest.importorskip("dolfinx")
     command = "python3 docs/theory/figures.py step --out results/theory"
     assert command in program.commands(DOCS / "theory" / "index.md")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", command.split()[1:])
-    monkeypatch.setattr(logging.getLogger("vi_contact"), "level", logging.WARNING)  # the program changes it
+    monkeypatch.setattr(
+        logging.getLogger("vi_contact"), "level", logging.WARNING
+    )  # the program changes it
     assert loaded(DOCS / "theory" / "figures.py").main() == 0
     assert "step: " in capsys.readouterr().out and Path("results/theory/theory_step.png").is_file()

@@ -31,11 +31,9 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "core/test_step.py": "core.errors core.problem",
     "core/test_surfaces.py": "core.obstacles",
     "engineering/test_engineering_checks.py": "engineering.checks.comparison engineering.checks.earth_pressure_static",
-    "engineering/test_seismic_checks.py":
-        "engineering.checks.earth_pressure_seismic engineering.checks.shaken_block "
-        "engineering.checks.racking_ratio",
-    "engineering/test_resultants.py":
-        "engineering.floor_spectra engineering.peak_values engineering.racking plots.maps",
+    "engineering/test_seismic_checks.py": "engineering.checks.earth_pressure_seismic engineering.checks.shaken_block "
+    "engineering.checks.racking_ratio",
+    "engineering/test_resultants.py": "engineering.floor_spectra engineering.peak_values engineering.racking plots.maps",
     "fem/test_assembly.py": "fem.assembly_checks",
     "fem/test_bubbles.py": "fem.hierarchical",
     "fem/test_corners.py": "core.corners laws.mass_transfer",
@@ -46,25 +44,21 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "fem/test_mortar_in_space.py": "fem.contact.clipping fem.contact.sight",
     "fem/test_pairs.py": "fem.contact.matching",
     "fem/test_second_order.py": "fem.numbering",
-    "fem/test_section_forces.py":
-        "fem.contact.frames fem.output.nodal_work fem.output.reactions laws.weight",
+    "fem/test_section_forces.py": "fem.contact.frames fem.output.nodal_work fem.output.reactions laws.weight",
     "fem/test_own_matrices.py": "fem.contact.points",
     "fem/test_space.py": "fem.nodal_space",
     "fem/test_surface.py": "fem.contact.faces",
     "fem/test_ties.py": "soil.soil_column",
-    "ground_motion/test_columns_of_records.py":
-        "ground_motion.formats.columns ground_motion.formats.gaps ground_motion.formats.headings "
-        "ground_motion.formats.statements ground_motion.formats.times",
+    "ground_motion/test_columns_of_records.py": "ground_motion.formats.columns ground_motion.formats.gaps ground_motion.formats.headings "
+    "ground_motion.formats.statements ground_motion.formats.times",
     "ground_motion/test_formats.py": "ground_motion.formats.at2 ground_motion.formats.writer",
-    "ground_motion/test_networks.py":
-        "ground_motion.formats.cwa ground_motion.formats.geonet ground_motion.formats.unam "
-        "ground_motion.formats.unread ground_motion.formats.volume1",
+    "ground_motion/test_networks.py": "ground_motion.formats.cwa ground_motion.formats.geonet ground_motion.formats.unam "
+    "ground_motion.formats.unread ground_motion.formats.volume1",
     "ground_motion/test_processing.py": "ground_motion.chain",
-    "ground_motion/test_readers.py":
-        "ground_motion.formats.afad "
-        "ground_motion.formats.cosmos ground_motion.formats.esm ground_motion.formats.knet "
-        "ground_motion.formats.reader ground_motion.formats.smc "
-        "ground_motion.formats.text",
+    "ground_motion/test_readers.py": "ground_motion.formats.afad "
+    "ground_motion.formats.cosmos ground_motion.formats.esm ground_motion.formats.knet "
+    "ground_motion.formats.reader ground_motion.formats.smc "
+    "ground_motion.formats.text",
     "ground_motion/test_spectra.py": "ground_motion.intensity",
     "ground_motion/test_synthetic.py": "ground_motion.ec8 ground_motion.kanai_tajimi",
     "house/test_architecture.py": "core.lazy",
@@ -78,8 +72,7 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "models/test_channel.py": "studies.cases.short_settings",
     "models/test_wall.py": "core.units",
     "plots/test_faces.py": "plots.bodies",
-    "plots/test_report.py":
-        "cli.pictures cli.post plots.charts plots.pages plots.sections run.files.reading studies.report",
+    "plots/test_report.py": "cli.pictures cli.post plots.charts plots.pages plots.sections run.files.reading studies.report",
     "core/test_own_files.py": "core.hdf5",
     "house/test_wrong_types.py": "core.arguments",
     "run/test_folder.py": "core.files run.files.history run.files.stored_rows run.files.table",
@@ -95,32 +88,25 @@ COVERS = {  # test file -> modules without a test file of their own; tests reach
     "solvers/test_condensed_on_finite_elements.py": "core.condensation fem.copied_factor fem.petsc_rows",
     "solvers/test_nothing_stays.py": "fem.communicators",
     "solvers/test_friction_condensed.py": "solvers.certified solvers.friction.newton",
-    "solvers/test_friction_methods.py":
-        "solvers.friction.fixed_point solvers.friction.given_forces solvers.friction.linear",
+    "solvers/test_friction_methods.py": "solvers.friction.fixed_point solvers.friction.given_forces solvers.friction.linear",
     "solvers/test_friction_on_finite_elements.py": "solvers.friction.problem",
-    "solvers/test_iterative.py":
-        "solvers.iterative.contact solvers.iterative.layout solvers.iterative.projected_gradients "
-        "solvers.iterative.route solvers.iterative.search",
-    "solvers/test_iterative_friction.py":
-        "solvers.iterative.friction solvers.iterative.friction_krylov "
-        "solvers.iterative.friction_states",
-    "solvers/test_iterative_on_finite_elements.py":
-        "solvers.iterative.conjugate_gradients solvers.iterative.measures "
-        "solvers.iterative.operator solvers.iterative.preconditioners",
+    "solvers/test_iterative.py": "solvers.iterative.contact solvers.iterative.layout solvers.iterative.projected_gradients "
+    "solvers.iterative.route solvers.iterative.search",
+    "solvers/test_iterative_friction.py": "solvers.iterative.friction solvers.iterative.friction_krylov "
+    "solvers.iterative.friction_states",
+    "solvers/test_iterative_on_finite_elements.py": "solvers.iterative.conjugate_gradients solvers.iterative.measures "
+    "solvers.iterative.operator solvers.iterative.preconditioners",
     "solvers/test_volume.py": "solvers.volume.snes solvers.volume.tao",
     "solvers/test_volume_friction.py": "solvers.friction.nsgs solvers.volume.friction solvers.volume.route",
-    "solvers/test_volume_options.py":
-        "solvers.volume.failures solvers.volume.friction_jacobian "
-        "solvers.volume.friction_system solvers.volume.options solvers.petsc",
+    "solvers/test_volume_options.py": "solvers.volume.failures solvers.volume.friction_jacobian "
+    "solvers.volume.friction_system solvers.volume.options solvers.petsc",
     "solvers/test_volume_system.py": "solvers.volume.bounded_system solvers.volume.scaled_step",
-    "studies/test_case.py":
-        "cli.case studies.cases.parsing studies.cases.toml_file studies.cases.vocabulary",
+    "studies/test_case.py": "cli.case studies.cases.parsing studies.cases.toml_file studies.cases.vocabulary",
     "studies/test_case_inputs.py": "studies.cases.table_calls",
     "studies/test_description.py": "fem.output.outline plots.sketch",
     "studies/test_case_stages.py": "studies.cases.stage_tables studies.cases.stages",
     "studies/test_strain_compatible_case.py": "studies.cases.strain_compatible",
-    "studies/test_ida.py":
-        "cli.batch cli.ida plots.studies studies.ida.measures studies.ida.processes studies.ida.runs",
+    "studies/test_ida.py": "cli.batch cli.ida plots.studies studies.ida.measures studies.ida.processes studies.ida.runs",
     "vi/test_inequality.py": "vi.judged",
     "vi/test_load_steps.py": "vi.linear_steps vi.newton",
     "vi/test_minimum.py": "vi.model",
@@ -133,10 +119,13 @@ BY = {module: test for test, modules in COVERS.items() for module in modules.spl
 @cache
 def modules() -> dict[str, ast.Module]:
     """Modules as "solvers.normal.lcp", without packages, which hand names on, and ``__main__``, which calls cli."""
-    paths = {p.relative_to(PACKAGE).with_suffix("").as_posix(): p for p in sorted(PACKAGE.rglob("*.py"))}
+    paths = {
+        p.relative_to(PACKAGE).with_suffix("").as_posix(): p for p in sorted(PACKAGE.rglob("*.py"))
+    }
     return {
         name.replace("/", "."): ast.parse(path.read_text(encoding="utf-8"))
-        for name, path in paths.items() if path.name not in ("__init__.py", "__main__.py")
+        for name, path in paths.items()
+        if path.name not in ("__init__.py", "__main__.py")
     }
 
 
@@ -148,7 +137,9 @@ def users() -> dict[str, list[str]]:
         for node in ast.walk(tree):
             if isinstance(node, ast.ImportFrom):
                 above = user.split(".")[: -node.level] if node.level else []
-                base = ".".join([*above, *([node.module] if node.module else [])]).removeprefix("vi_contact.")
+                base = ".".join([*above, *([node.module] if node.module else [])]).removeprefix(
+                    "vi_contact."
+                )
                 for target in {base, *(f"{base}.{alias.name}".lstrip(".") for alias in node.names)}:
                     found.setdefault(target, []).append(user)
     return found
@@ -160,7 +151,9 @@ def own_test(module: str) -> str:
 
 def names_of(module: str) -> list[str]:
     """The module's path and its public functions and classes."""
-    public = [one for one in modules()[module].body if not getattr(one, "name", "_").startswith("_")]
+    public = [
+        one for one in modules()[module].body if not getattr(one, "name", "_").startswith("_")
+    ]
     names = [one.name for one in public if isinstance(one, ast.ClassDef | ast.FunctionDef)]
     room, _, name = f"vi_contact.{module}".rpartition(".")
     return [f"{room}.{name}", f"{room} import {name}", *names]
@@ -181,7 +174,11 @@ def test_every_module_has_a_test():
 
 
 def test_the_table_is_true():
-    wrong = [f"{one} stands twice in COVERS" for one in BY if " ".join(COVERS.values()).split().count(one) > 1]
+    wrong = [
+        f"{one} stands twice in COVERS"
+        for one in BY
+        if " ".join(COVERS.values()).split().count(one) > 1
+    ]
     for module, test in BY.items():
         if module not in modules():
             wrong.append(f"{module} is no module")
@@ -208,8 +205,11 @@ def test_a_file_with_tests_for_two_ranks_has_one_for_three():
     for path in TESTS.glob("*/test_*.py"):
         text = path.read_text(encoding="utf-8")
         if "pytest.mark.two_ranks" in text:
-            tests = [one for one in ast.parse(text).body
-                     if isinstance(one, ast.FunctionDef) and one.name.startswith("test_")]
+            tests = [
+                one
+                for one in ast.parse(text).body
+                if isinstance(one, ast.FunctionDef) and one.name.startswith("test_")
+            ]
             if all(marks(one) & {"serial", "slow", "two_ranks"} for one in tests):
                 lone.append(path.name)
     assert not lone

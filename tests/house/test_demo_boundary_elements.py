@@ -23,18 +23,30 @@ def test_the_boundary_elements_demo(
     """V7.1 to V7.3 on 4 to 24 elements: energies within 2 % (rms) of coarse finite elements, impulses within 8 % (ball)
     and 1 %; Uzawa's iteration and the march agree; every step certified."""
     module, drawn = demo("boundary_elements"), list[Any]()
-    monkeypatch.setattr(module, "plot_panels", lambda rows, *a, **k: drawn.append(rows) or plot_panels(rows, *a, **k))
+    monkeypatch.setattr(
+        module,
+        "plot_panels",
+        lambda rows, *a, **k: drawn.append(rows) or plot_panels(rows, *a, **k),
+    )
     numbers: dict[str, Any] = module.main(quick=True, out=tmp_path, progress=False)
-    shear = drawn[0][1][2]  # concrete on steel: the support holds the corners together, by both methods
+    shear = drawn[0][1][
+        2
+    ]  # concrete on steel: the support holds the corners together, by both methods
     assert shear.quantity == SHEAR and all(curve.y[0] > 0.0 > curve.y[-1] for curve in shear.curves)
     of = {name.split(": ")[0] for name in numbers}
     assert len(of) == 9
     for name in of:
         assert 0.0 < numbers[f"{name}: energy off"] < 0.02, name
         impulse = numbers[f"{name}: fem impulse"]
-        assert numbers[f"{name}: impulse"] == pytest.approx(impulse, rel=0.08 if "ball" in name else 0.01), name
-        assert numbers[f"{name}: friction"] == pytest.approx(numbers[f"{name}: fem friction"], rel=0.06, abs=1e-4), name
-        assert 0.0 < numbers[f"{name}: uzawa off"] < 1e-6 and 5 < numbers[f"{name}: uzawa"] < 600, name
+        assert numbers[f"{name}: impulse"] == pytest.approx(
+            impulse, rel=0.08 if "ball" in name else 0.01
+        ), name
+        assert numbers[f"{name}: friction"] == pytest.approx(
+            numbers[f"{name}: fem friction"], rel=0.06, abs=1e-4
+        ), name
+        assert 0.0 < numbers[f"{name}: uzawa off"] < 1e-6 and 5 < numbers[f"{name}: uzawa"] < 600, (
+            name
+        )
         assert numbers[f"{name}: certificate"] < 1e-12
     for figure in ("snapshots.png", "tractions.png", "energies.png"):
         assert (tmp_path / figure).stat().st_size > 4_000, figure
@@ -49,8 +61,12 @@ def test_the_shear_of_histories_is_drawn_on_the_body(
     shown: list[Any] = []
     monkeypatch.setattr(deformed, "save", lambda figure, path: shown.append(figure))
     history = {"t": [1.0], "pressure": [[1.0, 2.0]], "traction_t": [[[3.0], [-3.0]]]}
-    contact = SimpleNamespace(points=np.array([(0.0, 0.0), (1.0, 0.0)]), normals=np.array([normal, normal]))
-    run = SimpleNamespace(contact=contact, history={name: np.array(values) for name, values in history.items()})
+    contact = SimpleNamespace(
+        points=np.array([(0.0, 0.0), (1.0, 0.0)]), normals=np.array([normal, normal])
+    )
+    run = SimpleNamespace(
+        contact=contact, history={name: np.array(values) for name, values in history.items()}
+    )
     monkeypatch.setattr("demos.pictures.tractions.read_run", lambda folder: run)
     deformed.plot_tractions({"box": tmp_path}, (1.0,), tmp_path / "none.png", title="")
     axis = shown[0].axes[1]

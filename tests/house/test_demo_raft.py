@@ -26,11 +26,18 @@ def test_the_raft_demo(shared_tmp, capsys):
     numbers = module.main(quick=True, out=shared_tmp, progress=False)
     assert 0.0 < numbers["worst certificate"] <= 1e-9 and numbers["energy defect"] <= 1e-10
     (wide, deep, thick), (*_, length, width) = module.RAFT, module.CORE
-    walls = (length * width - (length - 1.6) * (width - 1.6)) * 3 * (4.0 - 0.6)  # of 0.8 m between slabs of 0.6 m
+    walls = (
+        (length * width - (length - 1.6) * (width - 1.6)) * 3 * (4.0 - 0.6)
+    )  # of 0.8 m between slabs of 0.6 m
     weight = 2500.0 * 9.80665 * (wide * deep * (thick + 3 * 0.6) + walls)
     assert numbers["weight [MN]"] == pytest.approx(1e-6 * weight, rel=1e-9)
-    assert numbers["open share of the raft at rest"] < 0.05 and numbers["largest open share of the raft"] > 0.5
-    assert 1.0 < numbers["largest slip [mm]"] < 20.0 and 2.0 < numbers["largest opening [mm]"] < 20.0
+    assert (
+        numbers["open share of the raft at rest"] < 0.05
+        and numbers["largest open share of the raft"] > 0.5
+    )
+    assert (
+        1.0 < numbers["largest slip [mm]"] < 20.0 and 2.0 < numbers["largest opening [mm]"] < 20.0
+    )
     assert numbers["rotation about x [mrad]"] > 0.3 and numbers["friction work [kJ]"] > 5.0
     history = read_run(shared_tmp).history
     shear = np.hypot(history["force_x_raft"], history["force_y_raft"])
@@ -70,11 +77,16 @@ def test_the_case_of_the_raft(comm, shared_tmp, monkeypatch):
     layer = 42.0 * 36.0 * 12.0 * 1900.0 * 9.80665
     before = read_run(shared_tmp / "run" / "stages" / "1_gravity").history
     assert before["reaction_z_rock"][0] == pytest.approx(before["N_raft"][0] + layer, rel=1e-9)
-    assert np.abs([history[f"force_{axis}_raft"][0] for axis in "xy"]).max() < 1e-9 * history["N_raft"][0]
+    assert (
+        np.abs([history[f"force_{axis}_raft"][0] for axis in "xy"]).max()
+        < 1e-9 * history["N_raft"][0]
+    )
     raft = demo("raft")
     monkeypatch.setattr(raft, "earthquake", case.excitations)
     problem, start = raft.stages(2.0, comm)
-    expected = simulate(problem, dt=0.01, steps=20, state=start, record=raft.recorders(), progress=False).history
+    expected = simulate(
+        problem, dt=0.01, steps=20, state=start, record=raft.recorders(), progress=False
+    ).history
     for name in ("N_raft", "force_x_raft", "force_y_raft", "u_x_roof", "u_y_roof", "a_z_field"):
         size = np.abs(expected["N_raft" if name.startswith("force") else name]).max()
         assert size > 0.0 and np.abs(history[name] - expected[name]).max() < 1e-7 * size, name

@@ -20,11 +20,23 @@ from demo_runs import ROOT, demo
 from vi_contact.cli.entry import main
 from vi_contact.ground_motion import Record, pga, read_record
 
-SHARED = Path(os.environ.get("VI_CONTACT_GROUND_MOTIONS", ROOT.parent / "shared" / "ground_motions"))
+SHARED = Path(
+    os.environ.get("VI_CONTACT_GROUND_MOTIONS", ROOT.parent / "shared" / "ground_motions")
+)
 FIGURES = ("excitation.png", "displacements_x.png", "energy.png", "certificate.png", "contact.png")
 SUMMARY = (
-    "versions", "ranks", "unknowns", "contact_points", "steps", "iterations_per_step", "worst_certificate",
-    "cross_check", "energy", "energy_defect", "seconds_per_step", "seconds_per_linear_step",
+    "versions",
+    "ranks",
+    "unknowns",
+    "contact_points",
+    "steps",
+    "iterations_per_step",
+    "worst_certificate",
+    "cross_check",
+    "energy",
+    "energy_defect",
+    "seconds_per_step",
+    "seconds_per_linear_step",
 )
 
 
@@ -48,7 +60,10 @@ def check_folder(
     assert min(summary["seconds_per_linear_step"], summary["seconds_per_step"]) > 0.0
     index = (folder / "fields.xdmf").read_text(encoding="utf-8")
     for k in range(0, steps + 1, frames_every):
-        assert f"fields/frame_{k:06d}.h5:/u" in index and (folder / f"fields/frame_{k:06d}.h5").is_file()
+        assert (
+            f"fields/frame_{k:06d}.h5:/u" in index
+            and (folder / f"fields/frame_{k:06d}.h5").is_file()
+        )
     for figure in figures:
         picture = (folder / figure).read_bytes()
         assert picture.startswith(b"\x89PNG") and len(picture) > 2_000, figure
@@ -68,8 +83,13 @@ def test_the_wall_demo(comm: Any, shared_tmp: Path) -> None:
         assert comm.rank or (shared_tmp / name).stat().st_size > 20_000
     for page in ("README.md", "docs/index.md"):  # whose first picture is frames.png
         told = f"displacements drawn {numbers.get('magnified', 0.0):g} times larger"
-        assert comm.rank or told in " ".join((ROOT / page).read_text(encoding="utf-8").split()), page
-    for case, expected in {"a": (-58.38955, -1.74828, -9.18182), "b": (-58.38955, -1.74828, 0.0)}.items():
+        assert comm.rank or told in " ".join((ROOT / page).read_text(encoding="utf-8").split()), (
+            page
+        )
+    for case, expected in {
+        "a": (-58.38955, -1.74828, -9.18182),
+        "b": (-58.38955, -1.74828, 0.0),
+    }.items():
         assert 0.0 < numbers[f"{case}_certificate"] <= 1e-9
         assert 0.0 < numbers[f"{case}_cross_check"] <= 1e-9
         assert numbers[f"{case}_energy_defect"] <= 1e-10
@@ -79,7 +99,10 @@ def test_the_wall_demo(comm: Any, shared_tmp: Path) -> None:
         assert list(summary["cross_check"]) == ["Volume(ReducedNewton)"]
         top = 1e6 * column(shared_tmp / case, "u_x_12")
         assert top[[10, 20, 40]] == pytest.approx(expected, abs=5.001e-6)
-        assert (1e6 * numbers[f"{case}_top_min"], 1e6 * numbers[f"{case}_top_max"]) == (top.min(), top.max())
+        assert (1e6 * numbers[f"{case}_top_min"], 1e6 * numbers[f"{case}_top_max"]) == (
+            top.min(),
+            top.max(),
+        )
         assert column(shared_tmp / case, "contact_active").max() > 0
 
 
@@ -97,7 +120,9 @@ def test_the_command_line_of_the_wall_demo(
     for name in ("deformed.png", "report.pdf", "peaks.csv"):
         assert (tmp_path / "demo" / name).stat().st_size > 500, name
     assert main(["run", "wall", "--out", str(tmp_path / "run"), "--steps", "9", "--quiet"]) == 0
-    assert (tmp_path / "demo" / "history.csv").read_bytes() == (tmp_path / "run" / "history.csv").read_bytes()
+    assert (tmp_path / "demo" / "history.csv").read_bytes() == (
+        tmp_path / "run" / "history.csv"
+    ).read_bytes()
 
 
 def vi_contact(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
@@ -105,7 +130,10 @@ def vi_contact(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str
     quiet = f'. "{ROOT}/install/setup.sh"; vi_clean_environment; vi_mpi_environment; exec "$0" "$@"'
     return subprocess.run(
         ["bash", "-c", quiet, sys.executable, "-m", "vi_contact", *arguments],
-        cwd=folder, capture_output=True, encoding="utf-8", timeout=600,
+        cwd=folder,
+        capture_output=True,
+        encoding="utf-8",
+        timeout=600,
         env=dict(os.environ),  # see shell() in test_cli.py
     )
 
@@ -132,16 +160,32 @@ def test_the_wall_on_a_record(
     """The ground acceleration of the run is the record in m/s², scaled to 5 m/s², sample k at t = k dt."""
     path = recorded(tmp_path)
     monkeypatch.chdir(tmp_path)
-    status = main([
-        "run", "wall", "--motion", str(path), "--set", "excitation.1.record.processing.pga=5", "--dt", "0.02",
-        "--steps", "50", "--out", "out/quake", "--set", "fields.every=25", "--quiet",
-    ])
+    status = main(
+        [
+            "run",
+            "wall",
+            "--motion",
+            str(path),
+            "--set",
+            "excitation.1.record.processing.pga=5",
+            "--dt",
+            "0.02",
+            "--steps",
+            "50",
+            "--out",
+            "out/quake",
+            "--set",
+            "fields.every=25",
+            "--quiet",
+        ]
+    )
     told = capsys.readouterr()
     assert (status, told.err) == (0, "")
     assert "run finished: 50 steps" in told.out and "output: out/quake" in told.out
     assert main(["report", "out/quake"]) == 0
-    summary = check_folder(tmp_path / "out" / "quake", steps=50, frames_every=25,
-                           figures=["model.png", "deformed.png"])
+    summary = check_folder(
+        tmp_path / "out" / "quake", steps=50, frames_every=25, figures=["model.png", "deformed.png"]
+    )
     assert summary["worst_certificate"] <= 1e-9 and summary["energy_defect"] <= 1e-10
     record: Record = read_record(path)
     expected = record.acceleration[:51] * 5.0 / pga(record)
@@ -156,7 +200,10 @@ BAD = {
     "record that is no text": (["--motion", "binary.at2"], ["binary.at2", "not a text file"]),
     "unknown table": (["--set", "model.case=c"], ["the table [model] is unknown", "Known: "]),
     "unknown solver": (["--solver", "magic"], ["'magic'", "Known: Automatic, Condensed"]),
-    "folder below a file": (["--set", "contact.points=", "--out", "file/run"], ["file/run", "choose another"]),
+    "folder below a file": (
+        ["--set", "contact.points=", "--out", "file/run"],
+        ["file/run", "choose another"],
+    ),
     "dt zero": (["--set", "contact.points=", "--dt", "0"], ["dt is 0", "positive"]),
 }
 
@@ -185,7 +232,9 @@ def test_bad_input_is_one_sentence(
 
 @pytest.mark.slow
 @pytest.mark.serial
-def test_the_bouncing_bar_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_bouncing_bar_demo(
+    comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """V1.3, one bounce: every scheme certified, its ledger closed; energy stays, but for Newmark on consistent mass."""
     numbers = demo("bouncing_bar").main(quick=True, out=shared_tmp, progress=False)
     comm.Barrier()  # rank 0 draws
@@ -193,16 +242,26 @@ def test_the_bouncing_bar_demo(comm: Any, shared_tmp: Path, capsys: pytest.Captu
     assert len(named) == 9
     for name in named:
         prefix = next(key for key in numbers if key.startswith(name)).rsplit(":", 1)[0]
-        assert numbers[f"{prefix}: certificate"] <= 1e-9 and numbers[f"{prefix}: ledger defect"] <= 1e-10
+        assert (
+            numbers[f"{prefix}: certificate"] <= 1e-9
+            and numbers[f"{prefix}: ledger defect"] <= 1e-10
+        )
         energy = numbers[f"{prefix}: energy at the end"]
-        assert (energy > 2.0) if "do not use" in prefix else (0.85 < energy <= 1.0 + 1e-9), (prefix, energy)
+        assert (energy > 2.0) if "do not use" in prefix else (0.85 < energy <= 1.0 + 1e-9), (
+            prefix,
+            energy,
+        )
     assert (shared_tmp / "bouncing_bar.png").stat().st_size > 10_000
-    assert len([path for path in shared_tmp.iterdir() if path.is_dir()]) == 9  # each run has a folder of its own
+    assert (
+        len([path for path in shared_tmp.iterdir() if path.is_dir()]) == 9
+    )  # each run has a folder of its own
     assert comm.rank or "trapezoidal, redistributed mass (default)" in capsys.readouterr().out
 
 
 @pytest.mark.slow
-def test_the_hertz_impact_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_hertz_impact_demo(
+    comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """V3.3 with 4 cells in the contact radius: within 5 % of the theory, certified, rebound with full speed."""
     numbers = demo("hertz_impact").main(quick=True, out=shared_tmp, progress=False)
     comm.Barrier()  # rank 0 draws
@@ -220,7 +279,16 @@ def test_the_hertz_impact_demo(comm: Any, shared_tmp: Path, capsys: pytest.Captu
 def test_a_demo_in_a_folder_that_takes_no_files_says_so_in_a_sentence(tmp_path: Path) -> None:
     """What main() raises ends a script as it ends a command."""
     (tmp_path / "results").write_text("no folder\n")
-    done = subprocess.run([sys.executable, str(ROOT / "demos" / "timoshenko_beam.py")], cwd=tmp_path,
-                          capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "demos" / "timoshenko_beam.py")],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 1
-    assert done.stderr.startswith("vi-contact: ") and "results" in done.stderr and done.stderr.count("\n") == 1
+    assert (
+        done.stderr.startswith("vi-contact: ")
+        and "results" in done.stderr
+        and done.stderr.count("\n") == 1
+    )

@@ -23,7 +23,11 @@ DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 
 def blocks(document: Path, language: str) -> list[str]:
     """The fenced blocks of a language."""
-    return re.findall(rf"^```{language}\n(.*?)^```$", document.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    return re.findall(
+        rf"^```{language}\n(.*?)^```$",
+        document.read_text(encoding="utf-8"),
+        re.MULTILINE | re.DOTALL,
+    )
 
 
 def run(code: str, folder: Path) -> str:
@@ -31,7 +35,12 @@ def run(code: str, folder: Path) -> str:
     (folder / "example.py").write_text(code, encoding="utf-8")
     environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "utf-8"}
     done = subprocess.run(
-        [sys.executable, "example.py"], cwd=folder, env=environment, capture_output=True, encoding="utf-8", timeout=600
+        [sys.executable, "example.py"],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        encoding="utf-8",
+        timeout=600,
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
@@ -53,7 +62,9 @@ def test_first_example_prints_what_readme_says(first: tuple[Path, str]) -> None:
 def test_reading_examples_run_on_its_output(first: tuple[Path, str]) -> None:
     """reference/files.md: rows of 400 steps and the initial state, the same minimum as README prints, a picture."""
     page = ROOT / "docs" / "reference" / "files.md"
-    table, arrays, picture = run("\nprint('---')\n".join(blocks(page, "python")), first[0]).split("---\n")
+    table, arrays, picture = run("\nprint('---')\n".join(blocks(page, "python")), first[0]).split(
+        "---\n"
+    )
     lowest = re.search(r"top of the wall: (\S+) to", first[1])
     words = re.fullmatch(r"401 rows, u_x_top in m: (\S+)\n", table)
     assert lowest and words and f"{1e6 * float(words[1]):.1f}" == lowest[1]
@@ -66,7 +77,9 @@ def together(codes: list[str], folder: Path) -> list[str]:
     names = [f"page_{number}.py" for number in range(len(codes))]
     for name, code in zip(names, codes, strict=True):
         (folder / name).write_text(code, encoding="utf-8")
-    return run(f"import runpy\nfor name in {names}: runpy.run_path(name); print('---')\n", folder).split("---\n")[:-1]
+    return run(
+        f"import runpy\nfor name in {names}: runpy.run_path(name); print('---')\n", folder
+    ).split("---\n")[:-1]
 
 
 @pytest.mark.slow
@@ -75,8 +88,13 @@ def test_other_examples_run_on_its_problem(tmp_path: Path) -> None:
     (code,) = blocks(ROOT / "README.md", "python")
     ready = code[: code.index("solution = ")]
     samples = "\n".join(f"{0.3 * (-1) ** k:.3f}" for k in range(50))
-    (tmp_path / "elcentro.at2").write_text(f"A motion\nunits of g\nNPTS= 50, DT= .02000 SEC\n{samples}")
-    examples = [blocks(ROOT / "docs" / "guide" / name, "python")[-1] for name in ("records.md", "solvers.md")]
+    (tmp_path / "elcentro.at2").write_text(
+        f"A motion\nunits of g\nNPTS= 50, DT= .02000 SEC\n{samples}"
+    )
+    examples = [
+        blocks(ROOT / "docs" / "guide" / name, "python")[-1]
+        for name in ("records.md", "solvers.md")
+    ]
     together([ready + example for example in examples], tmp_path)
 
 
@@ -86,15 +104,25 @@ def test_programs_print_what_their_pages_say(tmp_path: Path) -> None:
     names that spaces have there."""
     from vi_contact.fem import compat
 
-    soil, bounds, own = (ROOT / "docs" / "guide" / f"{name}.md" for name in ("soil", "bounds", "bring_your_own"))
+    soil, bounds, own = (
+        ROOT / "docs" / "guide" / f"{name}.md" for name in ("soil", "bounds", "bring_your_own")
+    )
     code = "".join(blocks(own, "python"))
     if compat.VERSION < (0, 7):
-        code = code.replace('functionspace(mesh, ("Lagrange", 1, (2,)))', 'VectorFunctionSpace(mesh, ("Lagrange", 1))')
+        code = code.replace(
+            'functionspace(mesh, ("Lagrange", 1, (2,)))',
+            'VectorFunctionSpace(mesh, ("Lagrange", 1))',
+        )
         code = code.replace("fem.functionspace(", "fem.FunctionSpace(")
     faq = ROOT / "docs" / "reference" / "faq.md"
     bounded = "".join(blocks(bounds, "python"))  # the second block goes on with the first
     found = together([blocks(soil, "python")[-1], bounded, *blocks(faq, "python"), code], tmp_path)
-    pages = [blocks(soil, "text"), ["".join(blocks(bounds, "text"))], blocks(faq, "text"), blocks(own, "text")]
+    pages = [
+        blocks(soil, "text"),
+        ["".join(blocks(bounds, "text"))],
+        blocks(faq, "text"),
+        blocks(own, "text"),
+    ]
     assert found == [text for page in pages for text in page]
 
 
@@ -106,11 +134,15 @@ def test_commands_exist(document: Path) -> None:
         subprocess.run(["bash", "-n", str(ROOT / script)], check=True)
     for demo in set(re.findall(r"\bdemos/run\.sh (?:-n \d+ )?([a-z]\w*)", text)):
         assert (ROOT / "demos" / f"{demo}.py").is_file(), demo
-    for script in set(re.findall(r"\bpython3 ((?:meshes|demos|benchmarks|docs)/[\w./]+\.py)", text)):
+    for script in set(
+        re.findall(r"\bpython3 ((?:meshes|demos|benchmarks|docs)/[\w./]+\.py)", text)
+    ):
         assert (ROOT / script).is_file(), script
     for wanted in set(re.findall(r"\btests/run\.sh -k (test_\w+)", text)):
-        assert any(f"{wanted}(" in file.read_text(encoding="utf-8") or wanted == file.stem
-                   for file in (ROOT / "tests").rglob("test_*.py")), wanted
+        assert any(
+            f"{wanted}(" in file.read_text(encoding="utf-8") or wanted == file.stem
+            for file in (ROOT / "tests").rglob("test_*.py")
+        ), wanted
 
 
 commands = cache(parser)  # read only
@@ -124,11 +156,16 @@ def test_options_exist(document: Path) -> None:
         demo = start != "vi-contact"  # it takes the options of run, and one of its own
         words, command = ["run"] * demo + line.split(), commands()
         for word in words:
-            below = next((one for one in command._actions if isinstance(one, argparse._SubParsersAction)), None)
+            below = next(
+                (one for one in command._actions if isinstance(one, argparse._SubParsersAction)),
+                None,
+            )
             if below is None or word not in below.choices:
                 break
             command = below.choices[word]
-        given = {word for word in words if re.fullmatch(r"--[a-z][a-z-]*", word)} - ({"--case"} if demo else set())
+        given = {word for word in words if re.fullmatch(r"--[a-z][a-z-]*", word)} - (
+            {"--case"} if demo else set()
+        )
         assert given - set(command._option_string_actions) == set(), line
 
 
@@ -161,7 +198,9 @@ def test_every_document_is_reached_from_readme() -> None:
     while waiting:
         reached.add(page := waiting.pop())
         if page.name != "CHANGELOG.md":
-            found = re.findall(r"\]\(([^)\s#:]+\.md)(?:#[^)\s]*)?\)", page.read_text(encoding="utf-8"))
+            found = re.findall(
+                r"\]\(([^)\s#:]+\.md)(?:#[^)\s]*)?\)", page.read_text(encoding="utf-8")
+            )
             waiting += {(page.parent / target).resolve() for target in found} - reached
     assert [str(page.relative_to(ROOT)) for page in DOCUMENTS if page not in reached] == []
 
@@ -180,17 +219,31 @@ def test_the_page_of_names_is_what_the_docstrings_say() -> None:
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("hidden", [("dolfinx",), ("h5py", "petsc4py", "dolfinx", "mpi4py", "matplotlib", "tqdm")])
+@pytest.mark.parametrize(
+    "hidden", [("dolfinx",), ("h5py", "petsc4py", "dolfinx", "mpi4py", "matplotlib", "tqdm")]
+)
 def test_import_needs_numpy_and_scipy_only(hidden: tuple[str, ...]) -> None:
     """With packages hidden, ``import vi_contact`` and the names that need no finite elements are there."""
     names = "vc.Condensed, vc.Trapezoidal, vc.march"
     code = f"import sys; sys.modules.update(dict.fromkeys({hidden!r})); import vi_contact as vc; {names}"
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, encoding="utf-8", timeout=600)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, encoding="utf-8", timeout=600
+    )
     assert done.returncode == 0, done.stderr
 
 
-ROOMS = ["core", "fem", "solvers", "schemes", "soil", "engineering", "ground_motion", "bem",
-         "studies", "plots"]
+ROOMS = [
+    "core",
+    "fem",
+    "solvers",
+    "schemes",
+    "soil",
+    "engineering",
+    "ground_motion",
+    "bem",
+    "studies",
+    "plots",
+]
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
@@ -198,12 +251,21 @@ def test_names_are_public(document: Path) -> None:
     """Every ``vc.name`` and ``room.name`` that a document writes; the files that it names are there."""
     if document.name in ("CHANGELOG.md", "extend.md"):  # old names; its reader's: test_extend
         return
-    text = re.sub(r"--set \S+", "", document.read_text(encoding="utf-8"))  # keys of a case: others check them
+    text = re.sub(
+        r"--set \S+", "", document.read_text(encoding="utf-8")
+    )  # keys of a case: others check them
     unknown = set(re.findall(r"\bvc\.(\w+)", text)) - set(vi_contact.__all__)
     for room in ROOMS:
         written = set(re.findall(rf"(?<![\w./]){room}\.([A-Za-z]\w*)", text))
-        inside = {path.stem for path in (ROOT / "vi_contact" / room).iterdir()} | {"md", "py", "csv"}
-        unknown |= {f"{room}.{name}" for name in written - inside - set(import_module(f"vi_contact.{room}").__all__)}
+        inside = {path.stem for path in (ROOT / "vi_contact" / room).iterdir()} | {
+            "md",
+            "py",
+            "csv",
+        }
+        unknown |= {
+            f"{room}.{name}"
+            for name in written - inside - set(import_module(f"vi_contact.{room}").__all__)
+        }
     assert not unknown
     files = set(re.findall(r"`((?:\w+/)+\w+\.(?:py|toml))`", text))
     tops = (ROOT, ROOT / "vi_contact", ROOT / "tests")
@@ -225,7 +287,9 @@ def test_nothing_is_cited_by_a_private_name(document: Path) -> None:
 def test_import_alone_is_quick() -> None:
     """It imports nothing outside the standard library, so it costs less than numpy and scipy do."""
     code = "import sys, vi_contact; print({'numpy', 'scipy'} & set(sys.modules))"
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, encoding="utf-8", timeout=600)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, encoding="utf-8", timeout=600
+    )
     assert done.stdout == "set()\n", done.stderr
 
 
@@ -235,15 +299,25 @@ IDS = {"reference/verification.md": r"\bV\d+\.\d+[a-z]?\b", "reference/petsc.md"
 @pytest.mark.parametrize("document", IDS)
 def test_every_cited_id_is_explained(document: str) -> None:
     """What code and tests cite is in the table of ids."""
-    files = [path for folder in ("vi_contact", "tests", "demos") for path in (ROOT / folder).rglob("*.py")]
-    text = "".join(path.read_text(encoding="utf-8") for path in files if path.name != Path(__file__).name)
+    files = [
+        path
+        for folder in ("vi_contact", "tests", "demos")
+        for path in (ROOT / folder).rglob("*.py")
+    ]
+    text = "".join(
+        path.read_text(encoding="utf-8") for path in files if path.name != Path(__file__).name
+    )
     explained = (ROOT / "docs" / document).read_text(encoding="utf-8")
     assert set(re.findall(IDS[document], text)) - set(re.findall(IDS[document], explained)) == set()
 
 
 def test_supported_versions_are_the_same_everywhere() -> None:
     """README's table, that of install.md and that of releases.md, which gives the first numbers only."""
-    pages = [ROOT / "README.md", ROOT / "docs" / "start" / "install.md", ROOT / "docs" / "reference" / "releases.md"]
+    pages = [
+        ROOT / "README.md",
+        ROOT / "docs" / "start" / "install.md",
+        ROOT / "docs" / "reference" / "releases.md",
+    ]
     readme, install, releases = (page.read_text(encoding="utf-8") for page in pages)
     named = re.findall(r"^\| (?:12|13|sid) \| (\S+) \| (\S+) \| (\S+) \|", releases, re.MULTILINE)
     rows = ("DOLFINx", "PETSc, petsc4py (real numbers)", "Python")
@@ -255,9 +329,19 @@ def test_supported_versions_are_the_same_everywhere() -> None:
 
 def test_version_is_the_same_everywhere() -> None:
     version = vi_contact.__version__
-    assert re.search(rf'^version = "{re.escape(version)}"$', (ROOT / "pyproject.toml").read_text(), re.MULTILINE)
-    assert re.search(rf"^version: {re.escape(version)}$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)
+    assert re.search(
+        rf'^version = "{re.escape(version)}"$', (ROOT / "pyproject.toml").read_text(), re.MULTILINE
+    )
+    assert re.search(
+        rf"^version: {re.escape(version)}$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE
+    )
     newest = re.search(r"^## (\S+) \((\S+)\)$", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
-    assert newest and newest[1] == version and f'date-released: "{newest[2]}"' in (ROOT / "CITATION.cff").read_text()
+    assert (
+        newest
+        and newest[1] == version
+        and f'date-released: "{newest[2]}"' in (ROOT / "CITATION.cff").read_text()
+    )
     for page in ("README.md", "docs/index.md", "docs/reference/releases.md", "SECURITY.md"):
-        assert re.search(rf"\b{re.escape(version)}\b", (ROOT / page).read_text(encoding="utf-8")), page
+        assert re.search(rf"\b{re.escape(version)}\b", (ROOT / page).read_text(encoding="utf-8")), (
+            page
+        )

@@ -20,10 +20,21 @@ def told(name: str, call: Callable[[], object]) -> str:
         call()
     except InputError as error:
         text = str(error)
-        words = [word for word in re.findall(r"[A-Z]?[a-z0-9]+|[A-Z]+", name) if word.lower() not in ("a", "of", "the")]
-        named = any(re.search(rf"(?i)(\b|_){word}(\b|_|s\b)", text) or len(word) > 3 and word in text for word in words)
+        words = [
+            word
+            for word in re.findall(r"[A-Z]?[a-z0-9]+|[A-Z]+", name)
+            if word.lower() not in ("a", "of", "the")
+        ]
+        named = any(
+            re.search(rf"(?i)(\b|_){word}(\b|_|s\b)", text) or len(word) > 3 and word in text
+            for word in words
+        )
         short = len(text) < LONGEST and "\n" not in text and len(text.split()) > 3
-        return "" if short and named else f"not one short sentence that names the thing: {text[:LONGEST]!r}"
+        return (
+            ""
+            if short and named
+            else f"not one short sentence that names the thing: {text[:LONGEST]!r}"
+        )
     except Exception as error:  # what the interface must never raise here
         return f"{type(error).__name__}: {str(error)[:200]}"
     return "accepted"

@@ -12,7 +12,7 @@ from fuzz import Fuzz, read_input, write_input
 
 pytestmark = pytest.mark.serial
 TESTS = Path(__file__).resolve().parents[1]
-FAULTY = '''
+FAULTY = """
 import sys
 sys.path.insert(0, {support!r})
 import pytest
@@ -31,16 +31,32 @@ def test_sums(value):
 
 def check(right):
     assert right {mended}
-'''
+"""
 
 
 def ran(file: Path, seed: int | None) -> tuple[int, str]:
     """(status, what pytest said) of the faulty tests."""
-    clean = {name: value for name, value in os.environ.items() if not name.startswith(("VI_CONTACT_", "PYTEST"))}
+    clean = {
+        name: value
+        for name, value in os.environ.items()
+        if not name.startswith(("VI_CONTACT_", "PYTEST"))
+    }
     if seed is not None:
         clean |= {"VI_CONTACT_FUZZ_SEED": str(seed), "VI_CONTACT_FUZZ_KEEP": "1"}
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-W", "ignore", str(file)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=clean, cwd=file.parent)
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        "-W",
+        "ignore",
+        str(file),
+    ]
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=False, env=clean, cwd=file.parent
+    )
     return done.returncode, done.stdout + done.stderr
 
 
@@ -57,7 +73,9 @@ def test_what_fails_is_kept_and_tried_first(tmp_path: Path) -> None:
     assert read_input(number) >= 90
     assert read_input(tmp_path / "fixed" / "sums" / "seed-3.json") == {"value": 90}
     status, said = ran(file, None)
-    assert status == 1 and f"fixed/numbers/{number.name}" in said and "fixed/sums/seed-3.json" in said
+    assert (
+        status == 1 and f"fixed/numbers/{number.name}" in said and "fixed/sums/seed-3.json" in said
+    )
     file.write_text(FAULTY.format(support=str(TESTS / "support"), mended="or True"))
     assert ran(file, None)[0] == 0
 
@@ -77,7 +95,11 @@ def test_an_input_is_read_as_it_was_written(tmp_path: Path) -> None:
     assert read_input(tmp_path / "x.json") == value
 
 
-@pytest.mark.parametrize("words", [[], ["--seed"], ["--seed", "x"], ["--seed", "1", "--count", "-2"]])
+@pytest.mark.parametrize(
+    "words", [[], ["--seed"], ["--seed", "x"], ["--seed", "1", "--count", "-2"]]
+)
 def test_the_script_asks_for_a_seed(words: list[str]) -> None:
-    done = subprocess.run(["bash", str(TESTS / "fuzz.sh"), *words], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        ["bash", str(TESTS / "fuzz.sh"), *words], capture_output=True, text=True, check=False
+    )
     assert done.returncode == 2 and "usage: bash tests/fuzz.sh --seed N" in done.stderr

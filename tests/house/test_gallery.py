@@ -46,14 +46,20 @@ def test_every_entry_is_whole(make: Any) -> None:
         assert make.said(entry), name
         shown = set(re.findall(r"\]\(\.\./figures/(\w+\.png)\)", text))
         assert entry["pictures"] and shown & set(entry["pictures"]), name
-        assert all((ROOT / "docs" / "figures" / picture).is_file() for picture in entry["pictures"]), name
+        assert all(
+            (ROOT / "docs" / "figures" / picture).is_file() for picture in entry["pictures"]
+        ), name
         if "#" not in entry["page"]:
             assert shown <= set(entry["pictures"]), name
             sources = make.imported(ROOT / "demos" / f"{name}.py", set())
             source = "".join(path.read_text(encoding="utf-8") for path in sources)
-            names = [re.sub(r"\{.*?\}", "{}", one) for one in re.findall(r'"([^"\n]*\.png)"', source)]
+            names = [
+                re.sub(r"\{.*?\}", "{}", one) for one in re.findall(r'"([^"\n]*\.png)"', source)
+            ]
             drawn = re.compile("|".join(re.escape(one).replace(r"\{\}", r"\w+") for one in names))
-            assert [made for made in entry["pictures"].values() if not drawn.fullmatch(Path(made).name)] == [], name
+            assert [
+                made for made in entry["pictures"].values() if not drawn.fullmatch(Path(made).name)
+            ] == [], name
 
 
 def test_every_figure_has_something_that_makes_it(make: Any) -> None:
@@ -62,7 +68,11 @@ def test_every_figure_has_something_that_makes_it(make: Any) -> None:
     After a new picture: enter it in docs/gallery/made_by.toml, or in docs/gallery/demos.toml.
     """
     stored = tomllib.loads((GALLERY / "made_by.toml").read_text(encoding="utf-8"))["stored"]
-    made = [picture for entry in (make.entries() | make.page_entries()).values() for picture in entry["pictures"]]
+    made = [
+        picture
+        for entry in (make.entries() | make.page_entries()).values()
+        for picture in entry["pictures"]
+    ]
     theory = [f"theory_{path.stem}.png" for path in (ROOT / "docs" / "theory").glob("*.md")]
     notebooks = [f"notebook_{path.stem}.png" for path in (ROOT / "docs" / "notebooks").glob("*.md")]
     figures = {path.name for path in (ROOT / "docs" / "figures").glob("*.png")}
@@ -70,9 +80,14 @@ def test_every_figure_has_something_that_makes_it(make: Any) -> None:
     assert {*made, *stored} <= figures <= {*made, *stored, *theory, *notebooks}
     for entry in make.page_entries().values():
         text = (ROOT / entry["page"]).read_text(encoding="utf-8")
-        assert all(f"../figures/{picture})" in text for picture in entry["pictures"]) and make.files(entry) is not None
+        assert (
+            all(f"../figures/{picture})" in text for picture in entry["pictures"])
+            and make.files(entry) is not None
+        )
     for picture, told in stored.items():
-        assert f"../figures/{picture})" in (ROOT / told["page"]).read_text(encoding="utf-8"), picture
+        assert f"../figures/{picture})" in (ROOT / told["page"]).read_text(encoding="utf-8"), (
+            picture
+        )
         assert told["command"] and told["why"], picture
         scripts = [word for word in told["command"].split() if word.endswith(".py")]
         assert all((ROOT / script).is_file() for script in scripts), picture
@@ -81,7 +96,9 @@ def test_every_figure_has_something_that_makes_it(make: Any) -> None:
 def test_lines_agree_but_for_rounding(make: Any) -> None:
     """Words count, numbers to two per mille; of residuals the order does, but none above the bound is one below."""
     assert make.agree("force 1.0005 N,  worst 2.6e-14", "force 1.0001 N, worst 1.2e-15")
-    assert make.agree("worst certificate 8.75e-13", "worst certificate 4e-12") and make.agree("gap 0", "gap -3e-17")
+    assert make.agree("worst certificate 8.75e-13", "worst certificate 4e-12") and make.agree(
+        "gap 0", "gap -3e-17"
+    )
     assert make.agree("difference 1.7e-08", "difference 5.2e-08")
     assert not make.agree("worst certificate 8.75e-13", "worst certificate 9e-8")
     assert not make.agree("worst certificate 8.75e-13", "worst certificate 1.1e-9")
@@ -94,8 +111,16 @@ def test_lines_agree_but_for_rounding(make: Any) -> None:
 def test_the_cache_sees_changes(make: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """The hash follows the files that a demo imports and its entry, and nothing else."""
     name, entry = "bouncing_bar", make.entries()["bouncing_bar"]
-    used = {str(path.relative_to(ROOT)) for path in make.imported(ROOT / "demos" / "bouncing_bar.py", set())}
-    assert {"demos/bouncing_bar.py", "demos/pictures/bars.py", "demos/exact/bar.py", "demos/problems/bar.py"} <= used
+    used = {
+        str(path.relative_to(ROOT))
+        for path in make.imported(ROOT / "demos" / "bouncing_bar.py", set())
+    }
+    assert {
+        "demos/bouncing_bar.py",
+        "demos/pictures/bars.py",
+        "demos/exact/bar.py",
+        "demos/problems/bar.py",
+    } <= used
     assert "demos/crack.py" not in used and "demos/pictures/raft.py" not in used
     before = make.key(name, entry)
     other = {**entry, "commands": ["bash demos/run.sh -n 2 bouncing_bar"]}
@@ -109,9 +134,16 @@ def test_entries_run_beside_each_other_and_complaints_end_the_build(
 ) -> None:
     """A run that fails, a line that is not printed and a picture that no page shows: each is told and is status 1."""
     usual = {"page": "one.md", "title": "", "sentence": ""}
-    draw = "\"$vi_python\" -c 'from PIL import Image; Image.new(\"RGB\", (9, 9)).save(\"a.png\")'"
-    commands = {"good": ["echo force 1 N", draw], "bad": ["echo no >&2", "false"], "hidden": ["echo force 2 N", draw]}
-    every = {name: usual | {"commands": one, "pictures": {f"{name}.png": "a.png"}} for name, one in commands.items()}
+    draw = '"$vi_python" -c \'from PIL import Image; Image.new("RGB", (9, 9)).save("a.png")\''
+    commands = {
+        "good": ["echo force 1 N", draw],
+        "bad": ["echo no >&2", "false"],
+        "hidden": ["echo force 2 N", draw],
+    }
+    every = {
+        name: usual | {"commands": one, "pictures": {f"{name}.png": "a.png"}}
+        for name, one in commands.items()
+    }
     monkeypatch.setattr(make, "MADE", tmp_path / "made")
     monkeypatch.setattr(make, "HERE", tmp_path)
     monkeypatch.setattr(make, "entries", lambda: every)
@@ -120,7 +152,10 @@ def test_entries_run_beside_each_other_and_complaints_end_the_build(
     site = tmp_path / "site"
     site.mkdir()
     (site / "good.png").touch()
-    assert make.main(["--only", "good", "--into", str(site)]) == 0 and (site / "good.png").stat().st_size > 50
+    assert (
+        make.main(["--only", "good", "--into", str(site)]) == 0
+        and (site / "good.png").stat().st_size > 50
+    )
     out, err = capsys.readouterr()
     assert "good " in out and err == ""
     assert make.main(["--into", str(site), "--jobs", "2"]) == 1

@@ -34,7 +34,11 @@ TABLES = ("system", "contact", "stage", "run")
 
 def shipped() -> list[Path]:
     """The case files of the package and of the demos."""
-    folders = (PACKAGE / "studies" / "starters", PACKAGE / "studies" / "cases" / "builtin", ROOT / "demos" / "cases")
+    folders = (
+        PACKAGE / "studies" / "starters",
+        PACKAGE / "studies" / "cases" / "builtin",
+        ROOT / "demos" / "cases",
+    )
     return sorted(path for folder in folders for path in folder.glob("*.toml"))
 
 
@@ -44,8 +48,12 @@ def test_words_of_the_field_have_entries() -> None:
 
 
 def test_tables_of_case_files_are_named() -> None:
-    schema = json.loads((PACKAGE / "studies" / "cases" / "case.schema.json").read_text(encoding="utf-8"))
-    missing = {name for name in schema["properties"] if not {name, f"[{name}]", f"[[{name}]]"} & CODE}
+    schema = json.loads(
+        (PACKAGE / "studies" / "cases" / "case.schema.json").read_text(encoding="utf-8")
+    )
+    missing = {
+        name for name in schema["properties"] if not {name, f"[{name}]", f"[[{name}]]"} & CODE
+    }
     assert missing == set()
 
 
@@ -57,14 +65,18 @@ def test_keys_of_shipped_case_files_are_named() -> None:
         case = tomllib.loads(path.read_text(encoding="utf-8"))
         for name in TABLES:
             found = case.get(name, [])
-            keys |= {key for table in (found if isinstance(found, list) else [found]) for key in table}
+            keys |= {
+                key for table in (found if isinstance(found, list) else [found]) for key in table
+            }
     assert keys - CODE - {"type", "name", "system"} == set()
 
 
 @pytest.mark.parametrize("command", ["run", "ida"])
 def test_options_are_named(command: str) -> None:
     (commands,) = (one for one in parser()._actions if isinstance(one, argparse._SubParsersAction))
-    options = {one for one in commands.choices[command]._option_string_actions if one.startswith("--")}
+    options = {
+        one for one in commands.choices[command]._option_string_actions if one.startswith("--")
+    }
     assert len(options) > 10 and options - CODE - {"--help", "--quiet"} == set()
 
 

@@ -21,8 +21,15 @@ from vi_contact.studies.cases.library import FOLDER
 ROOT = Path(__file__).resolve().parents[2]
 
 MINIMUM = {
-    "numpy": (1, 24), "scipy": (1, 10), "h5py": (3, 7), "matplotlib": (3, 6), "tqdm": (4, 64),
-    "dolfinx": (0, 5), "petsc4py": (3, 18), "mpi4py": (3, 1), "gmsh": (4, 8),
+    "numpy": (1, 24),
+    "scipy": (1, 10),
+    "h5py": (3, 7),
+    "matplotlib": (3, 6),
+    "tqdm": (4, 64),
+    "dolfinx": (0, 5),
+    "petsc4py": (3, 18),
+    "mpi4py": (3, 1),
+    "gmsh": (4, 8),
 }
 
 
@@ -61,15 +68,26 @@ def test_the_cases_that_ship_are_installed() -> None:
     """pip installs files that are no modules only where pyproject.toml names them."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     patterns = project["tool"]["setuptools"]["package-data"]["vi_contact.studies.cases"]
-    files = sorted(path.relative_to(FOLDER.parent).as_posix() for path in FOLDER.rglob("*") if path.is_file())
+    files = sorted(
+        path.relative_to(FOLDER.parent).as_posix() for path in FOLDER.rglob("*") if path.is_file()
+    )
     assert len(files) == 2 and all(any(fnmatch(file, one) for one in patterns) for file in files)
-    others = {path for path in (ROOT / "vi_contact").rglob("*") if path.is_file() and "__pycache__" not in path.parts
-              and path.suffix not in (".py", ".pyi")}
+    others = {
+        path
+        for path in (ROOT / "vi_contact").rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts and path.suffix not in (".py", ".pyi")
+    }
     data = project["tool"]["setuptools"]["package-data"]
-    assert data["vi_contact"] == ["py.typed"] and data["*"] == ["*.pyi"]  # checkers of types look for them
+    assert data["vi_contact"] == ["py.typed"] and data["*"] == [
+        "*.pyi"
+    ]  # checkers of types look for them
     assert (ROOT / "vi_contact" / "py.typed").read_bytes() == b""
-    homes = {ROOT / package.replace(".", "/"): named for package, named in data.items() if package != "*"}
-    assert others == {path for home, named in homes.items() for one in named for path in home.glob(one)}
+    homes = {
+        ROOT / package.replace(".", "/"): named for package, named in data.items() if package != "*"
+    }
+    assert others == {
+        path for home, named in homes.items() for one in named for path in home.glob(one)
+    }
 
 
 @pytest.mark.serial
@@ -94,8 +112,14 @@ def test_stubs_name_what_is_public() -> None:
 
 def ran(script: str, **environment: str) -> str:
     """What a script prints in a process of its own."""
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=ROOT, check=False,
-                          env={**os.environ, **environment})
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        check=False,
+        env={**os.environ, **environment},
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()
 
@@ -115,7 +139,9 @@ for name in ("vi_contact.fem", "vi_contact.fem.compat"):
         print(error, error.name)
 """).splitlines()
     assert len(told) == 2 and told[0] == told[1]
-    assert told[0].startswith("vi_contact.fem needs DOLFINx, which is missing") and told[0].endswith("dolfinx")
+    assert told[0].startswith("vi_contact.fem needs DOLFINx, which is missing") and told[
+        0
+    ].endswith("dolfinx")
 
 
 @pytest.mark.serial
@@ -135,14 +161,20 @@ try:
 except vc.InputError as error:
     print(error)
 """).splitlines()
-    assert told[0] == "finished 2" and told[1].endswith("needs h5py, which is missing here: install it, or run without")
+    assert told[0] == "finished 2" and told[1].endswith(
+        "needs h5py, which is missing here: install it, or run without"
+    )
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.serial
 def test_nothing_is_done_to_conda(tmp_path: Path) -> None:
     """Importing takes nothing from CONDA_PREFIX and leaves nothing there; installing runs no code of this project."""
-    for name in ("bin/python", "lib/python3.11/site-packages/numpy/__init__.py", "etc/conda/activate.d/a.sh"):
+    for name in (
+        "bin/python",
+        "lib/python3.11/site-packages/numpy/__init__.py",
+        "etc/conda/activate.d/a.sh",
+    ):
         (tmp_path / name).parent.mkdir(parents=True)
         (tmp_path / name).write_text("raise SystemExit(1)\n")
     before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*")}
@@ -167,14 +199,24 @@ print(os.environ["CONDA_PREFIX"], sum(os.environ["CONDA_PREFIX"] in one for one 
 def test_pip_installs_the_command(tmp_path: Path) -> None:
     """The commands of docs/start/install.md, without a package index: the virtual environment beside the system's
     packages, and in it the command, which runs the case that ships."""
-    needed = (ROOT / "pyproject.toml").read_text(encoding="utf-8").partition('"setuptools>=')[2].partition('"')[0]
+    needed = (
+        (ROOT / "pyproject.toml")
+        .read_text(encoding="utf-8")
+        .partition('"setuptools>=')[2]
+        .partition('"')[0]
+    )
     setuptools = pytest.importorskip("setuptools")
     if int(setuptools.__version__.split(".")[0]) < int(needed) or not (
-            find_spec("packaging") and find_spec("packaging.licenses")):
-        pytest.skip(f"setuptools {setuptools.__version__} is older than {needed}, or packaging older than it needs")
+        find_spec("packaging") and find_spec("packaging.licenses")
+    ):
+        pytest.skip(
+            f"setuptools {setuptools.__version__} is older than {needed}, or packaging older than it needs"
+        )
     for name in ("pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, tmp_path)
-    shutil.copytree(ROOT / "vi_contact", tmp_path / "vi_contact", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(
+        ROOT / "vi_contact", tmp_path / "vi_contact", ignore=shutil.ignore_patterns("__pycache__")
+    )
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
     for command in (
         f"{sys.executable} -m venv --system-site-packages venv",
@@ -182,12 +224,28 @@ def test_pip_installs_the_command(tmp_path: Path) -> None:
         "venv/bin/vi-contact --version",
         "venv/bin/vi-contact run wall --steps 2 --quiet",
     ):
-        done = subprocess.run(command.split(), cwd=tmp_path, capture_output=True, encoding="utf-8", check=False,
-                              env=environment | {"PIP_DISABLE_PIP_VERSION_CHECK": "1"}, timeout=600)
+        done = subprocess.run(
+            command.split(),
+            cwd=tmp_path,
+            capture_output=True,
+            encoding="utf-8",
+            check=False,
+            env=environment | {"PIP_DISABLE_PIP_VERSION_CHECK": "1"},
+            timeout=600,
+        )
         assert done.returncode == 0, f"{command}\n{done.stderr}"
-    assert done.stdout.startswith("A concrete wall") and (tmp_path / "results" / "wall" / "history.csv").is_file()
+    assert (
+        done.stdout.startswith("A concrete wall")
+        and (tmp_path / "results" / "wall" / "history.csv").is_file()
+    )
     (installed,) = (tmp_path / "venv" / "lib").glob("python3.*/site-packages/vi_contact")
-    files = {path.relative_to(ROOT).as_posix() for path in (ROOT / "vi_contact").rglob("*")
-             if path.is_file() and "__pycache__" not in path.parts}
-    assert files == {f"vi_contact/{path.relative_to(installed).as_posix()}" for path in installed.rglob("*")
-                     if path.is_file() and "__pycache__" not in path.parts}
+    files = {
+        path.relative_to(ROOT).as_posix()
+        for path in (ROOT / "vi_contact").rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+    assert files == {
+        f"vi_contact/{path.relative_to(installed).as_posix()}"
+        for path in installed.rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    }

@@ -46,9 +46,17 @@ print(json.dumps([[{"text": one.get("text", ""), "kinds": list(one.get("data", {
 
 def test_there_are_notebooks() -> None:
     """Those that run.py knows are those of the folder, and the index lists each."""
-    listed = re.findall(r"^(\w+)$", (FOLDER / "index.md").read_text("utf-8").partition("```{toctree}")[2], re.MULTILINE)
+    listed = re.findall(
+        r"^(\w+)$",
+        (FOLDER / "index.md").read_text("utf-8").partition("```{toctree}")[2],
+        re.MULTILINE,
+    )
     known = re.search(r"^NAMES = \((.*)\)$", RUN.read_text("utf-8"), re.MULTILINE)
-    assert known and set(re.findall(r'"(\w+)"', known[1])) == set(NAMES) == set(listed) and len(NAMES) >= 6
+    assert (
+        known
+        and set(re.findall(r'"(\w+)"', known[1])) == set(NAMES) == set(listed)
+        and len(NAMES) >= 6
+    )
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -57,14 +65,22 @@ def test_a_notebook_is_text_without_outputs(name: str) -> None:
     text = (FOLDER / f"{name}.md").read_text(encoding="utf-8")
     assert text.startswith(HEADER)
     fences = re.findall(r"^```(.*)$", text, re.MULTILINE)
-    assert fences[::2] == ["{code-cell} ipython3"] * (len(fences) // 2) and set(fences[1::2]) == {""}
-    assert len(fences) >= 16 and not re.search(r"base64,[A-Za-z0-9+/]{40}|^ *outputs?:|https?://", text, re.MULTILINE)
+    assert fences[::2] == ["{code-cell} ipython3"] * (len(fences) // 2) and set(fences[1::2]) == {
+        ""
+    }
+    assert len(fences) >= 16 and not re.search(
+        r"base64,[A-Za-z0-9+/]{40}|^ *outputs?:|https?://", text, re.MULTILINE
+    )
     told = text.split("\n\n")[2]
     assert told.startswith("This notebook is for ") and "minutes to read" in told.replace("\n", " ")
     assert "to run" in told
     assert re.search(r"^## Exercises\n\n1\. ", text, re.MULTILINE)
-    *cells, last = re.findall(r"^```\{code-cell\} ipython3\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
-    assert len(re.findall(r"^ *assert ", last, re.MULTILINE)) >= 5 and "assert" not in "".join(cells)
+    *cells, last = re.findall(
+        r"^```\{code-cell\} ipython3\n(.*?)^```$", text, re.MULTILINE | re.DOTALL
+    )
+    assert len(re.findall(r"^ *assert ", last, re.MULTILINE)) >= 5 and "assert" not in "".join(
+        cells
+    )
     for cell in (*cells, last):
         compile(cell, name, "exec")
 
@@ -72,8 +88,13 @@ def test_a_notebook_is_text_without_outputs(name: str) -> None:
 def plain(names: tuple[str, ...], folder: Path) -> str:
     """What notebooks print as plain programs, run in a folder of their own."""
     done = subprocess.run(
-        [sys.executable, str(RUN), *names, "--out", "pictures"], cwd=folder, capture_output=True, encoding="utf-8",
-        timeout=600, check=False, env=os.environ | {"PYTHONIOENCODING": "utf-8"},
+        [sys.executable, str(RUN), *names, "--out", "pictures"],
+        cwd=folder,
+        capture_output=True,
+        encoding="utf-8",
+        timeout=600,
+        check=False,
+        env=os.environ | {"PYTHONIOENCODING": "utf-8"},
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
@@ -86,7 +107,9 @@ def test_the_quick_ones_run_as_programs(tmp_path: Path) -> None:
     ends = re.findall(told, plain(QUICK, tmp_path), re.MULTILINE)
     assert ends == list(QUICK)  # the one line that docs/start/ten_minutes_bar.md tells of
     for name in QUICK:
-        assert all((tmp_path / "pictures" / f"{name}_{k}.png").stat().st_size > 5000 for k in (1, 2))
+        assert all(
+            (tmp_path / "pictures" / f"{name}_{k}.png").stat().st_size > 5000 for k in (1, 2)
+        )
 
 
 @pytest.mark.slow
@@ -95,17 +118,26 @@ def test_a_notebook_runs_in_jupyter(name: str, tmp_path: Path) -> None:
     """As the site's build runs it: from its folder, without anything installed; each has pictures or a film."""
     pytest.importorskip("dolfinx")
     installed = SITE / "installed"
-    if not installed.is_file() or installed.read_bytes() != (ROOT / "install" / "site-requirements.txt").read_bytes():
+    if (
+        not installed.is_file()
+        or installed.read_bytes() != (ROOT / "install" / "site-requirements.txt").read_bytes()
+    ):
         pytest.skip("Jupyter's kernel and jupytext are missing: bash install/site.sh brings them")
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
     done = subprocess.run(
-        [str(SITE / "bin" / "python"), "-c", EXECUTE, str(FOLDER / f"{name}.md"), str(FOLDER)], cwd=tmp_path,
-        env=environment | {"JUPYTER_PREFER_ENV_PATH": "1", "PYTHONIOENCODING": "utf-8"}, capture_output=True,
-        encoding="utf-8", timeout=600, check=False,
+        [str(SITE / "bin" / "python"), "-c", EXECUTE, str(FOLDER / f"{name}.md"), str(FOLDER)],
+        cwd=tmp_path,
+        env=environment | {"JUPYTER_PREFER_ENV_PATH": "1", "PYTHONIOENCODING": "utf-8"},
+        capture_output=True,
+        encoding="utf-8",
+        timeout=600,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
     cells = json.loads(done.stdout.splitlines()[-1])
-    told = "".join(one["text"] for one in cells[-1])  # a busy kernel sends one line in several messages
+    told = "".join(
+        one["text"] for one in cells[-1]
+    )  # a busy kernel sends one line in several messages
     assert told == "all numbers are as the page says\n"
     kinds = [kind for cell in cells for one in cell for kind in one["kinds"]]
     assert kinds.count("image/png") >= 2 and ("text/html" in kinds) == (name == "shaken_wall")

@@ -12,7 +12,9 @@ pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 WORDS = 50  # of a sentence
-FOR = re.compile(r"\bThis (?:page|demo|notebook) is for \w|\b(?:These pages are|It is|documentation,) for \w")
+FOR = re.compile(
+    r"\bThis (?:page|demo|notebook) is for \w|\b(?:These pages are|It is|documentation,) for \w"
+)
 # code inside a line, equations, and the addresses of links
 CODE = re.compile(r"``[^`]*``|`[^`]*`|\$[^$]*\$|\w\([^()]*…[^()]*\)|\]\([^)]*\)")
 ENDS = re.compile(r"(?<=[.!?])[\"*)\]]*\s+(?=[\"*(\[]*[A-ZÀ-Þ\d`])")
@@ -21,7 +23,9 @@ ENDS = re.compile(r"(?<=[.!?])[\"*)\]]*\s+(?=[\"*(\[]*[A-ZÀ-Þ\d`])")
 def blocks(text: str) -> Iterator[str]:
     """Paragraphs, items of lists, headings and rows of tables, each on one line, without code and equations."""
     text = re.sub(r"\A---\n.*?\n---\n", "", text, flags=re.DOTALL)
-    text = re.sub(r"^ *```.*?^ *```$|\$\$.*?\$\$|<!--.*?-->", "\n", text, flags=re.MULTILINE | re.DOTALL)
+    text = re.sub(
+        r"^ *```.*?^ *```$|\$\$.*?\$\$|<!--.*?-->", "\n", text, flags=re.MULTILINE | re.DOTALL
+    )
     held = [""]
     quoted = False
     for line in [*text.splitlines(), ""]:
@@ -37,12 +41,16 @@ def blocks(text: str) -> Iterator[str]:
 def prose(page: Path) -> list[str]:
     """The blocks of a page, with C for what is code in them."""
     text = page.read_text(encoding="utf-8")
-    return [CODE.sub(lambda code: "]" if code[0][0] == "]" else "C", block) for block in blocks(text)]
+    return [
+        CODE.sub(lambda code: "]" if code[0][0] == "]" else "C", block) for block in blocks(text)
+    ]
 
 
 def long_sentences(block: str) -> list[str]:
     """Those of a paragraph that have too many words; a colon or a semicolon does not end a sentence."""
-    return [] if block[:1] in "|#" else [one for one in ENDS.split(block) if len(one.split()) > WORDS]
+    return (
+        [] if block[:1] in "|#" else [one for one in ENDS.split(block) if len(one.split()) > WORDS]
+    )
 
 
 def ellipses(block: str) -> list[str]:
@@ -78,13 +86,27 @@ def test_entries_of_names_are_whole() -> None:
 
 def test_bad_language_is_found() -> None:
     """The rules have teeth."""
-    for told in ("", "It has `.columns`.", "Damp with w = 2 pi f and It has `.start`.", "Hold names, see there.",
-                 "Sums since the start: It has `.row`.", "Match sides (head of this file).",
-                 "Record columns; the module's head lists them.", "Let forces not ring. , which need mass."):
+    for told in (
+        "",
+        "It has `.columns`.",
+        "Damp with w = 2 pi f and It has `.start`.",
+        "Hold names, see there.",
+        "Sums since the start: It has `.row`.",
+        "Match sides (head of this file).",
+        "Record columns; the module's head lists them.",
+        "Let forces not ring. , which need mass.",
+    ):
         assert broken(told), told
     assert not broken("Record the ledger. It has `.row`.") and not broken("Make it.")
-    assert ellipses("`u_x_1`, … of the points") and ellipses("from 1 ... 3") and not ellipses("x = 1 + 2 y + ...")
+    assert (
+        ellipses("`u_x_1`, … of the points")
+        and ellipses("from 1 ... 3")
+        and not ellipses("x = 1 + 2 y + ...")
+    )
     assert long_sentences("so " * WORDS + "it ends.")
     assert not long_sentences("so " * 40 + "it ends. " + "So " * 40 + "it ends.")
-    assert list(blocks("# A\n\nOne\ntwo.\n\n    code ...\n    more ...\n\n- an item\n  of two lines\n- next\n")) == [
-        "# A", "One two.", "- an item of two lines", "- next"]
+    assert list(
+        blocks(
+            "# A\n\nOne\ntwo.\n\n    code ...\n    more ...\n\n- an item\n  of two lines\n- next\n"
+        )
+    ) == ["# A", "One two.", "- an item of two lines", "- next"]

@@ -36,8 +36,13 @@ def cycles(n: int = 401, m: int = 6) -> dict[str, Any]:
     active = np.ones((n, m), dtype=bool)
     for point in range(m):
         active[60 * point : 60 * point + 30, point] = False
-    return {"t": t, "friction_force_x": -force, "friction_force_y": 0.1 * force,
-            "slip": -np.repeat(slip[:, None], m, axis=1)[:, :, None], "active": active}
+    return {
+        "t": t,
+        "friction_force_x": -force,
+        "friction_force_y": 0.1 * force,
+        "slip": -np.repeat(slip[:, None], m, axis=1)[:, :, None],
+        "active": active,
+    }
 
 
 @pytest.fixture
@@ -53,9 +58,13 @@ def test_loop_of_a_slider(figures: list[Any], tmp_path: Path) -> None:
     (axis,) = figures[0].axes
     x, y = axis.lines[2].get_xdata(), axis.lines[2].get_ydata()
     assert axis.get_xlabel() == "mean slip [mm]" and "x [kN]" in axis.get_ylabel()
-    assert np.max(np.abs(y)) == pytest.approx(1.0) and np.max(np.abs(x)) == pytest.approx(1.0, rel=1e-3)
+    assert np.max(np.abs(y)) == pytest.approx(1.0) and np.max(np.abs(x)) == pytest.approx(
+        1.0, rel=1e-3
+    )
     last = slice(200, None)
-    assert np.sum(0.5 * (y[last][1:] + y[last][:-1]) * np.diff(x[last])) == pytest.approx(4.0, rel=1e-2)
+    assert np.sum(0.5 * (y[last][1:] + y[last][:-1]) * np.diff(x[last])) == pytest.approx(
+        4.0, rel=1e-2
+    )
     plot_hysteresis(cycles(), tmp_path / "other.png", axis="y")
     assert np.max(np.abs(figures[1].axes[0].lines[2].get_ydata())) == pytest.approx(100.0)
 
@@ -74,7 +83,9 @@ def test_map_has_all_points(figures: list[Any], tmp_path: Path) -> None:
     (axis,) = figures[0].axes
     (mesh,) = axis.collections
     shown = np.asarray(mesh.get_array()).reshape(6, 401)
-    assert set(np.unique(shown)) == {1, 2, 3} and np.array_equal(shown[::-1], contact_states(cycles()).T)
+    assert set(np.unique(shown)) == {1, 2, 3} and np.array_equal(
+        shown[::-1], contact_states(cycles()).T
+    )
     assert [text.get_text() for text in axis.get_legend().get_texts()] == ["open", "stick", "slip"]
     assert axis.get_xlabel() == "time [s]" and axis.get_ylabel() == "position [m]"
 
@@ -82,14 +93,22 @@ def test_map_has_all_points(figures: list[Any], tmp_path: Path) -> None:
 def test_a_run(figures: list[Any], tmp_path: Path) -> None:
     """The states of a recorded run are those that the solver's steps had."""
     problem = rubbing_block(Coulomb(0.3))
-    solution = simulate(problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=0.05, steps=80,
-                        record=[Contact()])
+    solution = simulate(
+        problem,
+        scheme=ZienkiewiczWoodTaylor(),
+        solver=Condensed(),
+        dt=0.05,
+        steps=80,
+        record=[Contact()],
+    )
     plot_states(solution.history, tmp_path / "map.png", position=problem.surface.points[:, 1])
     plot_hysteresis(solution.history, tmp_path / "loop.png")
     assert len(figures) == 2
     states = contact_states(solution.history)
     assert set(np.unique(states)) == {1, 2, 3}
-    assert np.array_equal(states > 1, np.asarray(solution.history["active"], dtype=bool).reshape(states.shape))
+    assert np.array_equal(
+        states > 1, np.asarray(solution.history["active"], dtype=bool).reshape(states.shape)
+    )
 
 
 def test_histories_without_friction_are_refused(tmp_path: Path) -> None:

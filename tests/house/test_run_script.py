@@ -22,13 +22,21 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_last_line(tmp_path: Path, name: str) -> None:
     """Counts are summed; a run that ends before it could count is one failure."""
-    (tmp_path / "killed.py").write_text("import os\n\ndef test_it():\n    os.kill(os.getpid(), 9)\n")
+    (tmp_path / "killed.py").write_text(
+        "import os\n\ndef test_it():\n    os.kill(os.getpid(), 9)\n"
+    )
     (tmp_path / "slow.py").write_text("import time\n\ndef test_it():\n    time.sleep(3600)\n")
     arguments, ranks, line, status = CASES[name]
-    more = {"VI_CONTACT_RANKS": ranks} | ({"VI_CONTACT_TIMEOUT": "2"} if name == "is too slow" else {})
-    arguments = [str(tmp_path / word) if word in ("killed.py", "slow.py") else word for word in arguments]
+    more = {"VI_CONTACT_RANKS": ranks} | (
+        {"VI_CONTACT_TIMEOUT": "2"} if name == "is too slow" else {}
+    )
+    arguments = [
+        str(tmp_path / word) if word in ("killed.py", "slow.py") else word for word in arguments
+    ]
     clean = {key: value for key, value in os.environ.items() if not key.startswith("VI_CONTACT_")}
     command = ["bash", str(TESTS / "run.sh"), *arguments]
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=clean | more)
-    assert done.stdout.splitlines()[-1] == line and done.returncode == status, done.stdout + done.stderr
+    assert done.stdout.splitlines()[-1] == line and done.returncode == status, (
+        done.stdout + done.stderr
+    )
     assert ("VI_CONTACT_TIMEOUT are over" in done.stderr) == (name == "is too slow")

@@ -29,31 +29,93 @@ from vi_contact import __version__
 
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[2]
-WANTED, INSTALLED = ROOT / "install" / "site-requirements.txt", ROOT / ".venv" / "site" / "installed"
+WANTED, INSTALLED = (
+    ROOT / "install" / "site-requirements.txt",
+    ROOT / ".venv" / "site" / "installed",
+)
 if not INSTALLED.is_file() or INSTALLED.read_bytes() != WANTED.read_bytes():
-    pytest.skip("the tools of the site are missing: bash install/site.sh brings them", allow_module_level=True)
+    pytest.skip(
+        "the tools of the site are missing: bash install/site.sh brings them",
+        allow_module_level=True,
+    )
 
 # every page of version 0.1; where a page moves to, docs/redirects.txt says
 OLD = {
-    "docs/guide/bounds", "docs/guide/bring_your_own", "docs/guide/channel", "docs/guide/check", "docs/guide/checks",
-    "docs/guide/clusters", "docs/guide/extend", "docs/guide/outputs", "docs/guide/practice",
-    "docs/guide/pressed_blocks", "docs/guide/raft", "docs/guide/records", "docs/guide/report",
-    "docs/guide/rocking_block", "docs/guide/schemes", "docs/guide/second_order", "docs/guide/soil",
-    "docs/guide/solvers", "docs/guide/spheres", "docs/guide/stages", "docs/guide/studies", "docs/reference/api",
-    "docs/reference/faq", "docs/reference/files", "docs/reference/limitations", "docs/reference/petsc",
-    "docs/reference/sources", "docs/reference/verification", "docs/start/first_wall", "docs/start/install",
-    "docs/start/model", "docs/theory/beam", "docs/theory/bem", "docs/theory/boundary_layer", "docs/theory/routes",
-    "README", "CONTRIBUTING", "CHANGELOG", "docs/api", "docs/beam", "docs/bem", "docs/boundary_layer", "docs/channel",
-    "docs/faq", "docs/install", "docs/limitations", "docs/model", "docs/output", "docs/outputs_engineering",
-    "docs/petsc", "docs/records", "docs/rocking_block", "docs/schemes", "docs/seed003", "docs/soil_boundaries",
-    "docs/solvers", "docs/sources", "docs/studies", "docs/verification", "docs/wall",
+    "docs/guide/bounds",
+    "docs/guide/bring_your_own",
+    "docs/guide/channel",
+    "docs/guide/check",
+    "docs/guide/checks",
+    "docs/guide/clusters",
+    "docs/guide/extend",
+    "docs/guide/outputs",
+    "docs/guide/practice",
+    "docs/guide/pressed_blocks",
+    "docs/guide/raft",
+    "docs/guide/records",
+    "docs/guide/report",
+    "docs/guide/rocking_block",
+    "docs/guide/schemes",
+    "docs/guide/second_order",
+    "docs/guide/soil",
+    "docs/guide/solvers",
+    "docs/guide/spheres",
+    "docs/guide/stages",
+    "docs/guide/studies",
+    "docs/reference/api",
+    "docs/reference/faq",
+    "docs/reference/files",
+    "docs/reference/limitations",
+    "docs/reference/petsc",
+    "docs/reference/sources",
+    "docs/reference/verification",
+    "docs/start/first_wall",
+    "docs/start/install",
+    "docs/start/model",
+    "docs/theory/beam",
+    "docs/theory/bem",
+    "docs/theory/boundary_layer",
+    "docs/theory/routes",
+    "README",
+    "CONTRIBUTING",
+    "CHANGELOG",
+    "docs/api",
+    "docs/beam",
+    "docs/bem",
+    "docs/boundary_layer",
+    "docs/channel",
+    "docs/faq",
+    "docs/install",
+    "docs/limitations",
+    "docs/model",
+    "docs/output",
+    "docs/outputs_engineering",
+    "docs/petsc",
+    "docs/records",
+    "docs/rocking_block",
+    "docs/schemes",
+    "docs/seed003",
+    "docs/soil_boundaries",
+    "docs/solvers",
+    "docs/sources",
+    "docs/studies",
+    "docs/verification",
+    "docs/wall",
 }
 MOVED = {  # old address -> the page of the site that it leads to
     line.split()[0]: str(Path(line.split()[0]).parent / line.split()[1])
-    for line in (ROOT / "docs" / "redirects.txt").read_text(encoding="utf-8").splitlines() if not line.startswith("#")
+    for line in (ROOT / "docs" / "redirects.txt").read_text(encoding="utf-8").splitlines()
+    if not line.startswith("#")
 }
 WIDTHS = 1280, 320, 390, 700, 900, 1100  # of windows; on the first one a page is opened
-LOADED = {"script": "src", "img": "src", "iframe": "src", "source": "src", "video": "src", "link": "href"}
+LOADED = {
+    "script": "src",
+    "img": "src",
+    "iframe": "src",
+    "source": "src",
+    "video": "src",
+    "link": "href",
+}
 
 
 class Page(HTMLParser):
@@ -83,7 +145,11 @@ class Page(HTMLParser):
 def without_network() -> list[str]:
     """The words that start a command without any network, where this user may: what is installed must suffice."""
     words = ["unshare", "--net"]
-    may = os.geteuid() == 0 and shutil.which(words[0]) and subprocess.run([*words, "true"], capture_output=True)
+    may = (
+        os.geteuid() == 0
+        and shutil.which(words[0])
+        and subprocess.run([*words, "true"], capture_output=True)
+    )
     return words if may and may.returncode == 0 else []
 
 
@@ -93,7 +159,10 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("site") / "site"
     done = subprocess.run(
         [*without_network(), "bash", str(ROOT / "docs" / "build.sh"), "--quick", str(folder)],
-        capture_output=True, encoding="utf-8", timeout=500, check=False,
+        capture_output=True,
+        encoding="utf-8",
+        timeout=500,
+        check=False,
     )
     assert done.returncode == 0, done.stderr[-3000:]
     assert "no warnings" in done.stdout
@@ -105,7 +174,9 @@ def pages(site: Path) -> dict[Path, Page]:
     return {path: Page(path) for path in site.rglob("*.html") if "_static" not in path.parts}
 
 
-def test_every_document_is_a_page_and_old_addresses_live(site: Path, pages: dict[Path, Page]) -> None:
+def test_every_document_is_a_page_and_old_addresses_live(
+    site: Path, pages: dict[Path, Page]
+) -> None:
     documents = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
     wanted = {str(path.relative_to(ROOT).with_suffix("")) for path in documents} | OLD | {"index"}
     assert wanted - {str(path.relative_to(site).with_suffix("")) for path in pages} == set()
@@ -116,7 +187,9 @@ def test_every_page_says_which_version_it_describes(site: Path, pages: dict[Path
     for path in pages:
         if str(path.relative_to(site).with_suffix("")) not in MOVED:
             text = path.read_text(encoding="utf-8")
-            assert re.search(rf"<title>(?:[^<]* - )?vi_contact {re.escape(__version__)}</title>", text), path
+            assert re.search(
+                rf"<title>(?:[^<]* - )?vi_contact {re.escape(__version__)}</title>", text
+            ), path
             assert f'<span class="sidebar-brand-text">vi_contact {__version__}</span>' in text, path
             foot = text.partition('<div class="copyright">')[2].partition("</div>")[0]
             assert f"This page describes version {__version__}" in foot, path
@@ -130,7 +203,9 @@ def test_every_link_of_the_site_leads_somewhere(pages: dict[Path, Page]) -> None
                 continue
             target, _, anchor = unquote(link).partition("#")
             there = (path.parent / target.partition("?")[0]).resolve() if target else path
-            if not there.is_file() or (anchor and there in pages and anchor not in pages[there].anchors):
+            if not there.is_file() or (
+                anchor and there in pages and anchor not in pages[there].anchors
+            ):
                 broken.append(f"{path.name}: {link}")
     assert broken == []
 
@@ -139,7 +214,9 @@ def test_nothing_is_loaded_from_another_host(site: Path, pages: dict[Path, Page]
     """Neither by pages nor by style sheets. Scripts are watched in the browser below."""
     loaded = [one for page in pages.values() for one in page.loaded]
     for sheet in site.rglob("*.css"):
-        loaded += re.findall(r"(?:url\(|@import\s+)[\"']?([^\"')\s]+)", sheet.read_text(encoding="utf-8"))
+        loaded += re.findall(
+            r"(?:url\(|@import\s+)[\"']?([^\"')\s]+)", sheet.read_text(encoding="utf-8")
+        )
     assert len(loaded) > 1000
     assert [one for one in loaded if re.match(r"(?:[a-z]+:)?//", one)] == []
 
@@ -297,21 +374,35 @@ def opened(site: Path, pages: dict[Path, Page], tmp_path_factory: pytest.TempPat
     urls = [f"/{name}" for name in names if name.removesuffix(".html") not in MOVED]
     list_: list[tuple[str, Sequence[int]]] = [(url, WIDTHS) for url in urls]
     list_ += [("/docs/reference/releases.html", range(420, 1900, 40))]
-    list_ += [(f"/search.html?q={word}", (390,)) for word in ("certificate", "build_mesh", "Signorini")]
+    list_ += [
+        (f"/search.html?q={word}", (390,)) for word in ("certificate", "build_mesh", "Signorini")
+    ]
     for number, (old, new) in enumerate(MOVED.items()):  # every second one to a section
         list_ += [(f"/{old}.html" + number % 2 * f"#{section(pages[site / new])}", (1280,))]
     list_ += [("/spoiled.html", (1280, 390))]
-    (site / "probe.html").write_text(PROBE.replace("LIST", json.dumps([(u, list(w)) for u, w in list_])), "utf-8")
+    (site / "probe.html").write_text(
+        PROBE.replace("LIST", json.dumps([(u, list(w)) for u, w in list_])), "utf-8"
+    )
     (site / "spoiled.html").write_text(SPOILED, encoding="utf-8")
     profile, log = tmp_path_factory.mktemp("profile"), tmp_path_factory.mktemp("log") / "log"
-    with Server(("127.0.0.1", 0), partial(Handler, directory=str(site))) as server, log.open("w") as said:
+    with (
+        Server(("127.0.0.1", 0), partial(Handler, directory=str(site))) as server,
+        log.open("w") as said,
+    ):
         server.found, server.absent, server.told = [], [], threading.Event()
         threading.Thread(target=server.serve_forever, daemon=True).start()
         chromium = subprocess.Popen(
-            [command, *CHROMIUM_FLAGS, "--enable-logging=stderr", "--remote-debugging-port=0",
-             "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1", f"--user-data-dir={profile}",
-             f"http://127.0.0.1:{server.server_port}/probe.html"],
-            stdout=said, stderr=said,
+            [
+                command,
+                *CHROMIUM_FLAGS,
+                "--enable-logging=stderr",
+                "--remote-debugging-port=0",
+                "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
+                f"--user-data-dir={profile}",
+                f"http://127.0.0.1:{server.server_port}/probe.html",
+            ],
+            stdout=said,
+            stderr=said,
         )
         server.told.wait(500)
         chromium.terminate()
@@ -339,7 +430,10 @@ def test_the_browser_sees_what_is_wrong(opened: Opened) -> None:
     assert hosts == {"font", "style", "script", "fetch"}
     assert {"404 /absent.js", "404 /absent.png"} <= set(opened.absent)
     assert [Path(one).name for one in spoiled["missing"]] == ["absent.png"]
-    assert [one["cut"] for one in spoiled["widths"]] == [["DIV hides"], ["DIV hides", "SECTION clips", "DIV beyond"]]
+    assert [one["cut"] for one in spoiled["widths"]] == [
+        ["DIV hides"],
+        ["DIV hides", "SECTION clips", "DIV beyond"],
+    ]
     assert not dark(spoiled["ground"]) and not light(spoiled["text"])
 
 
@@ -349,7 +443,11 @@ def test_scripts_do_not_complain(opened: Opened) -> None:
 
 
 def test_equations_are_set_and_pictures_are_there(opened: Opened) -> None:
-    assert [one["url"] for one in opened.pages if one["set"] < one["math"] or one["errors"] or one["missing"]] == []
+    assert [
+        one["url"]
+        for one in opened.pages
+        if one["set"] < one["math"] or one["errors"] or one["missing"]
+    ] == []
 
 
 def test_the_browser_asks_no_other_host_and_lacks_no_file(opened: Opened) -> None:
@@ -362,7 +460,9 @@ def test_the_browser_asks_no_other_host_and_lacks_no_file(opened: Opened) -> Non
 def test_no_page_is_wider_than_the_screen_or_cut(opened: Opened) -> None:
     found = [(one["url"], at) for one in opened.pages for at in one["widths"]]
     assert {at["width"] for _, at in found} >= set(WIDTHS)
-    assert all(at["width"] - 20 <= at["seen"] <= at["width"] for _, at in found)  # 20: the bar to scroll with
+    assert all(
+        at["width"] - 20 <= at["seen"] <= at["width"] for _, at in found
+    )  # 20: the bar to scroll with
     assert [(url, at) for url, at in found if at["wide"] > 0 or at["cut"]] == []
 
 

@@ -55,7 +55,9 @@ def peaks(folder: Path) -> dict[str, tuple[float, float, float]]:
     return {name: (min(values), max(values), values[-1]) for name, values in columns.items()}
 
 
-def test_your_wall(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+def test_your_wall(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     """The two files of the page are checked and run by its commands; the higher wall is the same files, changed."""
     (geo,), (case,) = (blocks("ten_minutes_wall.md", language) for language in ("c\\+\\+", "toml"))
     check, summary = blocks("ten_minutes_wall.md", "text")
@@ -75,11 +77,15 @@ def test_your_wall(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytes
     assert re.findall(r"^(\w+) .* nan +nan ", capfd.readouterr().out, re.MULTILINE) == [never]
 
     found = peaks(Path("results/wall"))
-    rows = re.findall(r"^\| `(\w+)` \|.*\| (-?[\d.]+) to (-?[\d.]+) [a-zA-Z/]+ \|$", page, re.MULTILINE)
+    rows = re.findall(
+        r"^\| `(\w+)` \|.*\| (-?[\d.]+) to (-?[\d.]+) [a-zA-Z/]+ \|$", page, re.MULTILINE
+    )
     assert [name for name, _, _ in rows] == ["u_x_top", "theta_base", "N_base", "T_base"]
     for name, low, high in rows:
         scale = 1e-3 if name[0] in "NT" else 1e3
-        assert [scale * value for value in found[name][:2]] == pytest.approx([float(low), float(high)], rel=0.02)
+        assert [scale * value for value in found[name][:2]] == pytest.approx(
+            [float(low), float(high)], rel=0.02
+        )
 
     Path("wall.geo").write_text(geo.replace("H = 4.0;", "H = 5.0;"), encoding="utf-8")
     changed = case.replace("points = {top = [0.0, 4.0]}", "points = {top = [0.0, 5.0]}")
@@ -88,20 +94,34 @@ def test_your_wall(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytes
     assert main(["run", "wall.toml", "--out", "results/higher"]) == 0
     for name in ("wall", "higher"):
         found = peaks(Path("results") / name)
-        assert 0.0 < found["sliding_base"][1] - found["sliding_base"][2] <= 1.1e-4  # as the page says of the peaks
-        now = 1e3 * found["sliding_base"][2], 1e3 * found["theta_base"][1], 1e-3 * found["N_base"][1]
+        assert (
+            0.0 < found["sliding_base"][1] - found["sliding_base"][2] <= 1.1e-4
+        )  # as the page says of the peaks
+        now = (
+            1e3 * found["sliding_base"][2],
+            1e3 * found["theta_base"][1],
+            1e-3 * found["N_base"][1],
+        )
         (told,) = re.findall(rf"^\| `{name}` \| (\S+) \| (\S+) \| (\S+) \|$", page, re.MULTILINE)
         assert now == pytest.approx([float(one) for one in told], rel=0.02)
 
 
 def test_your_form(tmp_path: Path) -> None:
     """The program prints what its page says on all versions of DOLFINx, draws its picture and is that short."""
-    (code,), (printed,) = blocks("ten_minutes_form.md", "python"), blocks("ten_minutes_form.md", "text")
+    (code,), (printed,) = (
+        blocks("ten_minutes_form.md", "python"),
+        blocks("ten_minutes_form.md", "text"),
+    )
     assert len(code.splitlines()) <= 60
     (tmp_path / "form.py").write_text(code, encoding="utf-8")
     environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "utf-8"}
     done = subprocess.run(
-        [sys.executable, "form.py"], cwd=tmp_path, env=environment, capture_output=True, encoding="utf-8", timeout=600
+        [sys.executable, "form.py"],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        encoding="utf-8",
+        timeout=600,
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout == printed

@@ -43,24 +43,34 @@ def figures() -> ModuleType:
 
 
 @pytest.mark.parametrize("name", ["inequality", "ledger"])
-def test_pages_state_what_their_figures_show(figures: ModuleType, name: str, tmp_path: Path) -> None:
+def test_pages_state_what_their_figures_show(
+    figures: ModuleType, name: str, tmp_path: Path
+) -> None:
     phrases = figures.PAGES[name](tmp_path / "figure.png")
     assert len(phrases) >= 3 and figures.lacking(name, phrases) == []
     assert (tmp_path / "figure.png").stat().st_size > 20_000
-    assert figures.lacking(name, ["$f = 2$ N it rests at $u = 0.03$ m"])  # a page that states another number is found
+    assert figures.lacking(
+        name, ["$f = 2$ N it rests at $u = 0.03$ m"]
+    )  # a page that states another number is found
 
 
 def test_every_figure_is_on_its_page(figures: ModuleType) -> None:
     drawn = {path.name for path in (ROOT / "docs" / "figures").glob("theory_*.png")}
     assert drawn == {f"theory_{name}.png" for name in figures.PAGES}
     for name in figures.PAGES:
-        assert f"](../figures/theory_{name}.png)" in (THEORY / f"{name}.md").read_text(encoding="utf-8")
+        assert f"](../figures/theory_{name}.png)" in (THEORY / f"{name}.md").read_text(
+            encoding="utf-8"
+        )
 
 
 def test_the_spoiled_answer_prints_what_its_page_says() -> None:
     page = (THEORY / "certificate.md").read_text(encoding="utf-8")
-    ((code, text),) = re.findall(r"^```python\n(.*?)^```\n\n```text\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, encoding="utf-8", timeout=600)
+    ((code, text),) = re.findall(
+        r"^```python\n(.*?)^```\n\n```text\n(.*?)^```$", page, re.MULTILINE | re.DOTALL
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, encoding="utf-8", timeout=600
+    )
     assert done.returncode == 0, done.stderr
     assert done.stdout == text
 
@@ -70,8 +80,12 @@ def solved_inequality(figures: ModuleType) -> list[str]:
     """Two masses of which the second never touches, and penalties in the place of the wall."""
     K = np.array([[200.0, -100.0], [-100.0, 200.0]])
     for force, reaction in ((7.5, 0.0), (9.0, 1.5), (1e6, 1e6 - 7.5)):
-        system = vc.system_from_arrays([1.0, 1.0], None, K, coordinates=[[0.0], [1.0]], load=[force, 0.0])
-        problem = vc.ContactProblem(system, vc.contact_points(system, [0, 1], [1.0], gap0=[0.05, 0.1]))
+        system = vc.system_from_arrays(
+            [1.0, 1.0], None, K, coordinates=[[0.0], [1.0]], load=[force, 0.0]
+        )
+        problem = vc.ContactProblem(
+            system, vc.contact_points(system, [0, 1], [1.0], gap0=[0.05, 0.1])
+        )
         state = vc.static_equilibrium(problem)
         assert state.u == pytest.approx([0.05, 0.025], rel=1e-9)
         assert state.r_n == pytest.approx([reaction, 0.0], rel=1e-9, abs=1e-9)
@@ -79,12 +93,18 @@ def solved_inequality(figures: ModuleType) -> list[str]:
         f"| {k_p:.0e} | {3.0 / (100.0 + k_p):.1e} | {np.linalg.cond(K + np.diag([k_p, 0.0])):.0f} |"
         for k_p in (1e4, 1e6)
     ]
-    return ["$f = \\tfrac32 k g_0 = 7.5$ N", "$u_1 = 50$ mm, $u_2 = 25$ mm and $r_1 = f - 7.5$ N", *rows]
+    return [
+        "$f = \\tfrac32 k g_0 = 7.5$ N",
+        "$u_1 = 50$ mm, $u_2 = 25$ mm and $r_1 = f - 7.5$ N",
+        *rows,
+    ]
 
 
 def solved_step(figures: ModuleType) -> list[str]:
     """The midpoint step of two masses: matrix, velocity after it, and energies."""
-    ((_, report),) = vc.march(figures.two_masses(), scheme=vc.Midpoint(), solver=vc.Condensed(), dt=0.05, steps=1)
+    ((_, report),) = vc.march(
+        figures.two_masses(), scheme=vc.Midpoint(), solver=vc.Condensed(), dt=0.05, steps=1
+    )
     A, b, (x, y), r = (
         np.column_stack([report.step.A.image(e) for e in np.eye(2)]),
         report.step.b,
@@ -124,7 +144,10 @@ def solved_blow_up(figures: ModuleType) -> list[str]:
             v, r = arrival(share, scheme)
             told = [", ".join(f"{round(one, 6) + 0.0:.2f}" for one in values) for values in (v, r)]
             rows.append(f"| {share:.2f} | {name} | {told[0]} | {told[1]} | {v[-1] ** 2:.2f} |")
-    early, late = Polynomial([-3.0, 4.0]), Polynomial([5.0, -8.0])  # velocities after Newmark's steps
+    early, late = (
+        Polynomial([-3.0, 4.0]),
+        Polynomial([5.0, -8.0]),
+    )  # velocities after Newmark's steps
     for share, speed in ((0.1, early), (0.6, early), (0.7, late), (0.9, late)):
         assert arrival(share, vc.Newmark())[0][-1] == pytest.approx(speed(share))
         assert arrival(share, vc.Midpoint())[0][-1] ** 2 == pytest.approx((2.0 * share - 1.0) ** 2)
@@ -145,7 +168,9 @@ def test_bouncing_bar_on_coarse_meshes(figures: ModuleType) -> None:
     text, case = (THEORY / "solutions.md").read_text(encoding="utf-8"), figures.PeriodicBar()
     for name, (scheme, mass) in schemes.items():
         (row,) = re.findall(rf"^ +\| {re.escape(name)} \| (.*) \|$", text, re.MULTILINE)
-        for (n, courant), cell in zip(((10, 0.5), (10, 0.1), (20, 0.5)), row.split(" | "), strict=True):
+        for (n, courant), cell in zip(
+            ((10, 0.5), (10, 0.1), (20, 0.5)), row.split(" | "), strict=True
+        ):
             problem, force = figures.bar(case, n, mass=mass), 0.0
             for _, report in vc.march(problem, scheme=scheme, dt=courant / n, t_end=case.period):
                 force = max(force, float(report.new.r_n[0]) / 0.5)
@@ -154,7 +179,9 @@ def test_bouncing_bar_on_coarse_meshes(figures: ModuleType) -> None:
             if bounds:
                 assert energy > float(bounds[1]) and force > float(bounds[2])
             else:
-                assert [float(one) for one in cell.split(", ")] == pytest.approx([energy, force], abs=0.01)
+                assert [float(one) for one in cell.split(", ")] == pytest.approx(
+                    [energy, force], abs=0.01
+                )
 
 
 def solved_certificate(figures: ModuleType) -> list[str]:
@@ -195,10 +222,14 @@ def solved_certificate(figures: ModuleType) -> list[str]:
 
 def solved_ledger(figures: ModuleType) -> list[str]:
     """The loss of a closing step that is halved, and the largest defect of the faulty scheme."""
-    losses = [1.0 - arrival(0.375, vc.Midpoint(), 1.0 / cuts, cuts)[0][-1] ** 2 for cuts in (1, 2, 4, 8)]
+    losses = [
+        1.0 - arrival(0.375, vc.Midpoint(), 1.0 / cuts, cuts)[0][-1] ** 2 for cuts in (1, 2, 4, 8)
+    ]
     defects = []
     for cuts in (1, 2):
-        h, _ = figures.simulated(figures.bar(figures.PeriodicBar(), 20), figures.Careless(), 0.025 / cuts, 1.5)
+        h, _ = figures.simulated(
+            figures.bar(figures.PeriodicBar(), 20), figures.Careless(), 0.025 / cuts, 1.5
+        )
         defects.append(100.0 * np.abs(h["energy_defect"]).max() / h["energy_strain"][0])
         assert h["t"][np.abs(h["energy_defect"]).argmax()] == pytest.approx(np.sqrt(2.0), abs=0.03)
     return [
@@ -231,7 +262,9 @@ def solved_friction(figures: ModuleType) -> list[str]:
         assert gap >= 0.0 and r[0] >= 0.0 and r[0] * gap == 0.0
         assert abs(r[1]) <= mu * r[0] and (r[1] == -mu * r[0] * np.sign(back) or back == 0.0)
     for method in (solvers.FrictionNewton(), solvers.FixedPoint()):
-        found = method.prepare(G, np.zeros(1, dtype=bool)).solve(q[None], np.zeros(1), np.array([mu]))
+        found = method.prepare(G, np.zeros(1, dtype=bool)).solve(
+            q[None], np.zeros(1), np.array([mu])
+        )
         assert not found.active.any() and not found.r.any()
     K = np.zeros((5, 5))
     K[:3, :3] = 1000.0 * np.array([[2.0, -1.0, -1.0], [-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])
@@ -247,14 +280,17 @@ def solved_friction(figures: ModuleType) -> list[str]:
             load=[force, 0.0, 0.0, -1.0, -3.0],
         )
         problem = vc.ContactProblem(
-            system, vc.contact_points(system, [1, 2], [0.0, -1.0], gap0=0.0), friction=vc.Coulomb(0.5)
+            system,
+            vc.contact_points(system, [1, 2], [0.0, -1.0], gap0=0.0),
+            friction=vc.Coulomb(0.5),
         )
         ((_, report),) = vc.march(problem, scheme=vc.ZienkiewiczWoodTaylor(1.0), dt=1e3, steps=1)
         u = report.new.u
         states.append((report.new.r_t[:, 0], 1e3 * u))
     (sheared, there), (left, after) = states
     return [
-        ", ".join(f"$({a:.0f}, {b:.0f})$" for a, b in answers[:2]) + " and $({:.0f}, {:.0f})$".format(*answers[2]),
+        ", ".join(f"$({a:.0f}, {b:.0f})$" for a, b in answers[:2])
+        + " and $({:.0f}, {:.0f})$".format(*answers[2]),
         f"$r_t = ({sheared[0]:.1f}, {sheared[1]:.1f})$ N, and the first point has slipped by {there[1]:.1f} mm",
         f"$r_t = ({left[0]:.1f}, {left[1]:.1f})$ N, and the top stays displaced by {after[0]:.1f} mm",
     ]
@@ -282,7 +318,9 @@ def test_solutions_state_what_the_program_finds(
 def test_each_exercise_has_its_solution(figures: ModuleType) -> None:
     """Pages and solutions link to each other and count the same exercises, of every page that has a figure."""
     text = (THEORY / "solutions.md").read_text(encoding="utf-8")
-    parts = re.split(r"^## .*\n\n\[Exercises\]\((\w+)\.md#exercise\)\n", text, flags=re.MULTILINE)[1:]
+    parts = re.split(r"^## .*\n\n\[Exercises\]\((\w+)\.md#exercise\)\n", text, flags=re.MULTILINE)[
+        1:
+    ]
     solved = dict(zip(parts[::2], parts[1::2], strict=True))
     assert list(solved) == list(figures.PAGES) == list(SOLVED)
     for name, solution in solved.items():

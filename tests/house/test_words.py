@@ -69,7 +69,9 @@ def without_verb(name: str, text: str) -> list[Told]:
     for node in public(tree):
         told = ast.get_docstring(node)
         first, *more = (told or "Say").split()
-        if first.rstrip(".,:") not in VERBS.split() or more[:1] == ["of"]:  # "Number of steps" is a noun
+        if first.rstrip(".,:") not in VERBS.split() or more[:1] == [
+            "of"
+        ]:  # "Number of steps" is a noun
             wrong.append((f"{name}:{node.lineno}", (told or "")[:60]))
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
@@ -82,7 +84,9 @@ def without_verb(name: str, text: str) -> list[Told]:
 def ciphers(name: str, text: str) -> list[Told]:
     """Names of papers, notes and checks that only those who wrote them can follow."""
     return [
-        (f"{name}:{k}", found[0]) for k, line in enumerate(text.splitlines(), 1) for found in CIPHERS.finditer(line)
+        (f"{name}:{k}", found[0])
+        for k, line in enumerate(text.splitlines(), 1)
+        for found in CIPHERS.finditer(line)
     ]
 
 
@@ -97,11 +101,28 @@ def test_words_of_a_room(room):
 
 def test_bad_words_are_found():
     """The rule has teeth: each of these fails, and the plain sentence below does not."""
-    for cited in ("seed 003", "seed000", "V4.1", "P12", "B13", "design idea 3", "solver notes", "seismic.md 1.5"):
+    for cited in (
+        "seed 003",
+        "seed000",
+        "V4.1",
+        "P12",
+        "B13",
+        "design idea 3",
+        "solver notes",
+        "seismic.md 1.5",
+    ):
         assert ciphers("one.py", f"# as in {cited}")
-    assert not ciphers("one.py", "# P1 elements, seed 11 of the generator, # noqa: B018, P_2, COSMOS V2")
-    for told in ("Of lines: pressure.", "The pressure.", "(m,) values.", "Values at nodes.",
-                 "Number of steps.", "InputError if x < 0."):
+    assert not ciphers(
+        "one.py", "# P1 elements, seed 11 of the generator, # noqa: B018, P_2, COSMOS V2"
+    )
+    for told in (
+        "Of lines: pressure.",
+        "The pressure.",
+        "(m,) values.",
+        "Values at nodes.",
+        "Number of steps.",
+        "InputError if x < 0.",
+    ):
         assert without_verb("one.py", f'def f():\n    """{told}"""\n')
     assert without_verb("one.py", 'def _f():\n    """Those of one run."""\n')
     assert not without_verb("one.py", 'def f():\n    """Draw pressure along contact lines."""\n')

@@ -31,7 +31,20 @@ class Odd:
     """An object of a class that nothing asks for."""
 
 
-WRONG: list[Any] = [None, "abc", 3, float("nan"), [], Odd(), "a\0b", -1.0, {}, np.array([1.0, np.nan]), object, b"x"]
+WRONG: list[Any] = [
+    None,
+    "abc",
+    3,
+    float("nan"),
+    [],
+    Odd(),
+    "a\0b",
+    -1.0,
+    {},
+    np.array([1.0, np.nan]),
+    object,
+    b"x",
+]
 EXEMPT = {  # name -> why
     "StepProblem": "made by schemes in every step; solvers check what they are given by its protocol",
     "energy_balance": "called in every step with what a scheme has made",
@@ -45,14 +58,50 @@ def right() -> dict[str, Any]:
     problem = chain_problem(3, gap=1e-3)
     record = ground_motion.Record(np.sin(np.arange(200.0)), 0.01)
     return {
-        "record": record, "motion": record, "problem": problem, "system": problem.system, "surface": problem.surface,
-        "state": initial_state(problem), "scheme": vc.ZienkiewiczWoodTaylor(), "dt": 0.01, "steps": 2,
-        "periods": [0.1, 1.0], "path": "x.png", "folder": "nowhere", "E": 1e7, "nu": 0.3, "rho": 2000.0, "mu": 0.3,
-        "e": 0.5, "duration": 2.0, "frequency": 2.0, "amplitude": 1.0, "values": [1.0, 2.0], "t": 0.5,
-        "points": [[0.0]], "direction": (1.0,), "seed": 1, "acceleration": [0.0, 1.0, 0.0], "height": 2.0,
-        "damping": 0.05, "units": "g", "history": {"t": np.arange(3.0)}, "columns": {}, "nodes": [1],
-        "weights": [1.0], "text": "pga", "factor": 2.0, "every": 1, "name": "u", "start": 0.05, "end": 0.95,
-        "spectrum": ground_motion.KanaiTajimi(s0=0.01), "ground": "B", "title": "a title", "rise": 0.5, "decay": 1.0,
+        "record": record,
+        "motion": record,
+        "problem": problem,
+        "system": problem.system,
+        "surface": problem.surface,
+        "state": initial_state(problem),
+        "scheme": vc.ZienkiewiczWoodTaylor(),
+        "dt": 0.01,
+        "steps": 2,
+        "periods": [0.1, 1.0],
+        "path": "x.png",
+        "folder": "nowhere",
+        "E": 1e7,
+        "nu": 0.3,
+        "rho": 2000.0,
+        "mu": 0.3,
+        "e": 0.5,
+        "duration": 2.0,
+        "frequency": 2.0,
+        "amplitude": 1.0,
+        "values": [1.0, 2.0],
+        "t": 0.5,
+        "points": [[0.0]],
+        "direction": (1.0,),
+        "seed": 1,
+        "acceleration": [0.0, 1.0, 0.0],
+        "height": 2.0,
+        "damping": 0.05,
+        "units": "g",
+        "history": {"t": np.arange(3.0)},
+        "columns": {},
+        "nodes": [1],
+        "weights": [1.0],
+        "text": "pga",
+        "factor": 2.0,
+        "every": 1,
+        "name": "u",
+        "start": 0.05,
+        "end": 0.95,
+        "spectrum": ground_motion.KanaiTajimi(s0=0.01),
+        "ground": "B",
+        "title": "a title",
+        "rise": 0.5,
+        "decay": 1.0,
     }
 
 
@@ -75,21 +124,29 @@ def callables() -> Iterator[tuple[str, Callable[..., Any]]]:
                     yield f"{room}.{name}.{inner}", getattr(found, inner)
 
 
-def calls(found: Callable[..., Any], values: dict[str, Any]) -> Iterator[tuple[str, Any, list[Any], dict[str, Any]]]:
+def calls(
+    found: Callable[..., Any], values: dict[str, Any]
+) -> Iterator[tuple[str, Any, list[Any], dict[str, Any]]]:
     """(argument, wrong value, positional and named arguments of a call)."""
     kinds = inspect.Parameter
     try:
         parameters = inspect.signature(found).parameters.values()
     except ValueError:  # a dictionary by another name (Tags), which takes what dictionaries take
         return
-    every = [one for one in parameters
-             if one.kind not in (kinds.VAR_POSITIONAL, kinds.VAR_KEYWORD)]
+    every = [one for one in parameters if one.kind not in (kinds.VAR_POSITIONAL, kinds.VAR_KEYWORD)]
     for one in every:
         for wrong in WRONG:
-            given = {other.name: values.get(other.name, 1.0) for other in every if other.default is other.empty}
+            given = {
+                other.name: values.get(other.name, 1.0)
+                for other in every
+                if other.default is other.empty
+            }
             given[one.name] = wrong
-            first = [given.pop(other.name) for other in every
-                     if other.kind is kinds.POSITIONAL_ONLY and other.name in given]
+            first = [
+                given.pop(other.name)
+                for other in every
+                if other.kind is kinds.POSITIONAL_ONLY and other.name in given
+            ]
             yield one.name, wrong, first, given
 
 
@@ -99,7 +156,11 @@ def defect(found: Callable[..., Any], first: list[Any], given: dict[str, Any]) -
         found(*first, **given)
     except InputError as error:
         text = str(error)
-        return "" if "\n" not in text and len(text.split()) > 3 and len(text) < LONGEST else f"no sentence: {text!r}"
+        return (
+            ""
+            if "\n" not in text and len(text.split()) > 3 and len(text) < LONGEST
+            else f"no sentence: {text!r}"
+        )
     except Exception as error:  # what the interface must never raise here
         place = traceback.extract_tb(error.__traceback__)[-1]
         return f"{type(error).__name__}: {str(error)[:100]} ({Path(place.filename).name}, line {place.lineno})"
@@ -128,17 +189,29 @@ def test_a_wrong_type_is_one_sentence(tmp_path: Path, monkeypatch: pytest.Monkey
 def test_a_raw_exception_is_found() -> None:
     """The test can fail: a function that does not look at its argument."""
     values = right()
-    naive = [defect(lambda record: record.dt, *rest) for _, _, *rest in calls(lambda record: record, values)]
+    naive = [
+        defect(lambda record: record.dt, *rest)
+        for _, _, *rest in calls(lambda record: record, values)
+    ]
     assert sum(map(bool, naive)) == len(WRONG) and all("AttributeError" in said for said in naive)
 
 
 RAW: dict[str, tuple[Callable[[], Any], str]] = {
-    "periods": (lambda: ground_motion.response_spectrum(right()["record"], "abc"), "periods is 'abc'; give real n"),
-    "seed": (lambda: ground_motion.synthetic(ground_motion.KanaiTajimi(s0=0.01), 2.0, 0.01, seed="a"), "seed is 'a'"),
+    "periods": (
+        lambda: ground_motion.response_spectrum(right()["record"], "abc"),
+        "periods is 'abc'; give real n",
+    ),
+    "seed": (
+        lambda: ground_motion.synthetic(ground_motion.KanaiTajimi(s0=0.01), 2.0, 0.01, seed="a"),
+        "seed is 'a'",
+    ),
     "no record": (lambda: ground_motion.read_record(None), "path is None; give a path"),
     "a number for a record": (lambda: ground_motion.read_record(3), "path is 3; give a path"),
     "a number for a run": (lambda: run.read_run(3), "folder is 3; give a path"),
-    "NUL in out": (lambda: vc.simulate(right()["problem"], dt=0.01, steps=1, out="a\0b"), r"out is 'a\\x00b'"),
+    "NUL in out": (
+        lambda: vc.simulate(right()["problem"], dt=0.01, steps=1, out="a\0b"),
+        r"out is 'a\\x00b'",
+    ),
     "height": (lambda: meshes.WallMesh(height="9"), "height is '9'; give a real number"),
     "folder of a case": (lambda: studies.read_case(3), "path is 3; give a path"),
     "a class": (lambda: ground_motion.pga(ground_motion.Record), "record is the class Record"),
@@ -157,14 +230,35 @@ def test_types_as_annotations_have_them() -> None:
     from collections.abc import Mapping, Sequence
 
     for value, kind, fit in [
-        (1, float, True), (np.float64(1.0), float, True), (np.array(2.0), float, True), (True, float, False),
-        ("1", float, False), (float("nan"), float, True), (3.0, int, True), (3.5, int, False), (None, int, False),
-        ([1, 2], Sequence[float], True), ("ab", Sequence[str], False), (["a"], Sequence[float], False),
-        (np.arange(3), Sequence[float], True), ((1, 2), tuple[int, int], True), ((1,), tuple[int, int], False),
-        ((1, 2, 3), tuple[float, ...], True), ({"a": 1}, Mapping[str, float], True), ({1: 1}, Mapping[str, int], False),
-        ("x", str | Path, True), ("x\0", str | Path, False), ("", str | Path, False), (None, float | None, True),
-        (print, Callable[[], Any], True), (3, Callable[[], Any], False), (Odd, Odd, False), (Odd(), Odd, True),
-        (np.array([1.0]), np.ndarray, True), ("abc", np.ndarray, False), ([[1], [1, 2]], np.ndarray, False),
+        (1, float, True),
+        (np.float64(1.0), float, True),
+        (np.array(2.0), float, True),
+        (True, float, False),
+        ("1", float, False),
+        (float("nan"), float, True),
+        (3.0, int, True),
+        (3.5, int, False),
+        (None, int, False),
+        ([1, 2], Sequence[float], True),
+        ("ab", Sequence[str], False),
+        (["a"], Sequence[float], False),
+        (np.arange(3), Sequence[float], True),
+        ((1, 2), tuple[int, int], True),
+        ((1,), tuple[int, int], False),
+        ((1, 2, 3), tuple[float, ...], True),
+        ({"a": 1}, Mapping[str, float], True),
+        ({1: 1}, Mapping[str, int], False),
+        ("x", str | Path, True),
+        ("x\0", str | Path, False),
+        ("", str | Path, False),
+        (None, float | None, True),
+        (print, Callable[[], Any], True),
+        (3, Callable[[], Any], False),
+        (Odd, Odd, False),
+        (Odd(), Odd, True),
+        (np.array([1.0]), np.ndarray, True),
+        ("abc", np.ndarray, False),
+        ([[1], [1, 2]], np.ndarray, False),
     ]:
         assert fits(value, kind) == fit, (value, kind)
         if not fit:
@@ -175,6 +269,7 @@ def test_types_as_annotations_have_them() -> None:
 
 def test_what_is_checked_keeps_its_face() -> None:
     """Name, text and signature, which pages of names and case files read; arguments that are wrong by name stay."""
+
     @checked
     def one(x: float, *, name: str = "a") -> float:
         """Return x."""
@@ -185,4 +280,7 @@ def test_what_is_checked_keeps_its_face() -> None:
     assert one(2.0) == 2.0
     with pytest.raises(TypeError):
         one(2.0, nothing=1)  # type: ignore[call-arg]
-    assert re.match("EC8", ground_motion.EC8Spectrum.__name__) and check_fields(meshes.WallMesh()) is None
+    assert (
+        re.match("EC8", ground_motion.EC8Spectrum.__name__)
+        and check_fields(meshes.WallMesh()) is None
+    )

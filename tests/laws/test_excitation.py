@@ -59,7 +59,9 @@ def test_ricker_peak_zeros_and_default_delay():
     zero = 1.0 / (math.pi * 4.0 * math.sqrt(2.0))
     assert abs(excitation.acceleration(0.375 + zero)) < 1e-14
     trough = math.sqrt(1.5) / (math.pi * 4.0)
-    assert math.isclose(excitation.acceleration(0.375 - trough), -4.0 * math.exp(-1.5), rel_tol=1e-13)
+    assert math.isclose(
+        excitation.acceleration(0.375 - trough), -4.0 * math.exp(-1.5), rel_tol=1e-13
+    )
     assert abs(excitation.acceleration(0.0)) < 1e-8 * 2.0
     assert abs(integral(excitation)) < 1e-8
     assert Ricker(2.0, 4.0, delay=1.0).acceleration(1.0) == 2.0
@@ -82,8 +84,18 @@ def test_rectangular_pulse_value_at_its_start_is_the_plateau():
 
 
 def test_tabulated_is_piecewise_linear_and_zero_outside():
-    excitation = Tabulated(times=[1.0, 2.0, 4.0], values=np.array([1.0, 3.0, -1.0]), direction=[0.0, 2.0])
-    for t, a in [(0.999, 0.0), (1.0, 1.0), (1.5, 2.0), (2.0, 3.0), (3.0, 1.0), (4.0, -1.0), (4.001, 0.0)]:
+    excitation = Tabulated(
+        times=[1.0, 2.0, 4.0], values=np.array([1.0, 3.0, -1.0]), direction=[0.0, 2.0]
+    )
+    for t, a in [
+        (0.999, 0.0),
+        (1.0, 1.0),
+        (1.5, 2.0),
+        (2.0, 3.0),
+        (3.0, 1.0),
+        (4.0, -1.0),
+        (4.001, 0.0),
+    ]:
         assert excitation.acceleration(t) == a
     assert excitation.duration == 4.0
     assert np.array_equal(excitation(1.5), [0.0, 4.0])
@@ -92,7 +104,10 @@ def test_tabulated_is_piecewise_linear_and_zero_outside():
 
 def test_ground_motion_is_piecewise_linear_between_samples_at_k_dt():
     excitation = GroundMotion(RECORD, direction=(0.0, 0.0, 1.0), scale=2.0)
-    times, values = (-1e-9, 0.0, 0.01, 0.02, 0.03, 0.05, 0.06, 0.0601), (0.0, 2.0, 4.0, 6.0, 2.0, 1.0, 4.0, 0.0)
+    times, values = (
+        (-1e-9, 0.0, 0.01, 0.02, 0.03, 0.05, 0.06, 0.0601),
+        (0.0, 2.0, 4.0, 6.0, 2.0, 1.0, 4.0, 0.0),
+    )
     for t, a in zip(times, values, strict=True):
         assert abs(excitation.acceleration(t) - a) < 1e-13
     assert excitation.duration == 3 * 0.02
@@ -104,25 +119,37 @@ def test_ground_motion_and_tabulated_agree():
     record = Record(acceleration=rng.normal(size=300), dt=0.005)
     table, motion = Tabulated(record.times, record.acceleration), GroundMotion(record)
     for t in rng.uniform(0.0, record.duration, 200):
-        assert math.isclose(table.acceleration(t), motion.acceleration(t), rel_tol=1e-9, abs_tol=1e-12)
+        assert math.isclose(
+            table.acceleration(t), motion.acceleration(t), rel_tol=1e-9, abs_tol=1e-12
+        )
 
 
-@pytest.mark.parametrize("build, word", [
-    (lambda: Harmonic(math.nan, 2.0), "amplitude"), (lambda: Harmonic(1.0, 0.0), "frequency"),
-    (lambda: Harmonic(1.0, -2.0), "frequency"), (lambda: Harmonic(1.0, 2.0, phase=math.inf), "phase"),
-    (lambda: Harmonic(1.0, 2.0, direction=(0.0, 0.0)), "direction"),
-    (lambda: Harmonic(1.0, 2.0, direction=()), "direction"),
-    (lambda: Harmonic(1.0, 2.0, direction=(math.nan, 0.0)), r"direction\[0\]"),
-    (lambda: Harmonic(1.0, 2.0, direction="x"), "direction"), (lambda: Harmonic("3", 2.0), "amplitude"),
-    (lambda: Ricker(1.0, 0.0), "frequency"), (lambda: Ricker(1.0, 2.0, delay=-1.0), "delay"),
-    (lambda: Ricker(1.0, 2.0, delay=math.nan), "delay"), (lambda: Rectangular(1.0, 0.0), "duration"),
-    (lambda: HalfSine(math.inf, 1.0), "amplitude"), (lambda: FullSine(1.0, math.nan), "duration"),
-    (lambda: Tabulated((0.0, 1.0), (1.0, math.nan)), r"values\[1\]"),
-    (lambda: Tabulated((0.0, 1.0), (1.0,)), "one value"),
-    (lambda: Tabulated((0.0,), (1.0,)), "at least two"),
-    (lambda: Tabulated((0.0, 1.0, 1.0), (1.0, 2.0, 3.0)), "increasing"),
-    (lambda: GroundMotion(RECORD, scale=math.nan), "scale"), (lambda: GroundMotion("elcentro.at2"), "read_record"),
-])
+@pytest.mark.parametrize(
+    "build, word",
+    [
+        (lambda: Harmonic(math.nan, 2.0), "amplitude"),
+        (lambda: Harmonic(1.0, 0.0), "frequency"),
+        (lambda: Harmonic(1.0, -2.0), "frequency"),
+        (lambda: Harmonic(1.0, 2.0, phase=math.inf), "phase"),
+        (lambda: Harmonic(1.0, 2.0, direction=(0.0, 0.0)), "direction"),
+        (lambda: Harmonic(1.0, 2.0, direction=()), "direction"),
+        (lambda: Harmonic(1.0, 2.0, direction=(math.nan, 0.0)), r"direction\[0\]"),
+        (lambda: Harmonic(1.0, 2.0, direction="x"), "direction"),
+        (lambda: Harmonic("3", 2.0), "amplitude"),
+        (lambda: Ricker(1.0, 0.0), "frequency"),
+        (lambda: Ricker(1.0, 2.0, delay=-1.0), "delay"),
+        (lambda: Ricker(1.0, 2.0, delay=math.nan), "delay"),
+        (lambda: Rectangular(1.0, 0.0), "duration"),
+        (lambda: HalfSine(math.inf, 1.0), "amplitude"),
+        (lambda: FullSine(1.0, math.nan), "duration"),
+        (lambda: Tabulated((0.0, 1.0), (1.0, math.nan)), r"values\[1\]"),
+        (lambda: Tabulated((0.0, 1.0), (1.0,)), "one value"),
+        (lambda: Tabulated((0.0,), (1.0,)), "at least two"),
+        (lambda: Tabulated((0.0, 1.0, 1.0), (1.0, 2.0, 3.0)), "increasing"),
+        (lambda: GroundMotion(RECORD, scale=math.nan), "scale"),
+        (lambda: GroundMotion("elcentro.at2"), "read_record"),
+    ],
+)
 def test_bad_input_is_named(build, word):
     with pytest.raises(InputError, match=word):
         build()

@@ -7,7 +7,14 @@ import pytest
 
 from vi_contact.core.errors import InputError
 from vi_contact.core.protocols import Frictionless
-from vi_contact.laws.friction import Coulomb, ExponentialDecay, SlipRateCoulomb, StaticKinetic, Tresca, project
+from vi_contact.laws.friction import (
+    Coulomb,
+    ExponentialDecay,
+    SlipRateCoulomb,
+    StaticKinetic,
+    Tresca,
+    project,
+)
 
 pytestmark = pytest.mark.serial
 
@@ -42,7 +49,9 @@ def test_a_field_has_one_value_per_point():
     assert law == Coulomb([0.0, 0.5, 0.5, 1.0]) and law.mu == (0.0, 0.5, 0.5, 1.0)
     assert np.array_equal(law.limit(R_N, WEIGHTS, 1.0), [0.0, 1.0, 0.0, 5.0])
     assert np.array_equal(law.slope(WEIGHTS), [0.0, 0.5, 0.5, 1.0])
-    assert np.array_equal(Tresca((4.0, 3.0, 2.0, 1.0)).limit(R_N, WEIGHTS, 2.0), [4.0, 6.0, 4.0, 1.0])
+    assert np.array_equal(
+        Tresca((4.0, 3.0, 2.0, 1.0)).limit(R_N, WEIGHTS, 2.0), [4.0, 6.0, 4.0, 1.0]
+    )
     for wrong in (Coulomb((0.3, 0.3)), Tresca((0.3, 0.3))):
         with pytest.raises(InputError, match="has 2 values but there are 4 contact points"):
             wrong.limit(R_N, WEIGHTS, 1.0)
@@ -76,24 +85,41 @@ def test_coefficients_of_slip_rates():
     np.testing.assert_array_equal(StaticKinetic(0.6, 0.4)(v), [0.6, 0.4, 0.4])
     np.testing.assert_array_equal(StaticKinetic((0.6, 0.7, 0.8), 0.4)(v), [0.6, 0.4, 0.4])
     law = SlipRateCoulomb(decay)
-    assert law.at(v) == Coulomb(decay(v)) and law == SlipRateCoulomb(ExponentialDecay(0.6, 0.4, 0.1))
+    assert law.at(v) == Coulomb(decay(v)) and law == SlipRateCoulomb(
+        ExponentialDecay(0.6, 0.4, 0.1)
+    )
     assert np.array_equal(law.slope(WEIGHTS), np.full(4, 0.6))
     assert np.array_equal(law.limit(R_N, WEIGHTS, 1.0), 0.6 * np.maximum(R_N, 0.0))
     assert SlipRateCoulomb(lambda v: 0.3).at(v) == Coulomb((0.3, 0.3, 0.3))
 
 
-@pytest.mark.parametrize("wrong, message", [
-    (lambda: SlipRateCoulomb(0.3), "mu is 0.3; give a function"),
-    (lambda: SlipRateCoulomb(lambda v: 0.3 - v).at(np.array([0.1, 0.5])), r"mu\(0.5 m/s\) is -0.2; let it return zero"),
-    (lambda: SlipRateCoulomb(lambda v: v / 0.0 * 0.0).slope(WEIGHTS), r"mu\(0 m/s\) is nan"),
-    (lambda: SlipRateCoulomb(lambda v: np.zeros(3)).slope(WEIGHTS), r"shape \(3,\) for 4 slip rates"),
-    (lambda: ExponentialDecay(-0.1, 0.3, 0.1), "static coefficient mu_s is -0.1; give zero or a positive"),
-    (lambda: ExponentialDecay(0.6, math.nan, 0.1), "kinetic coefficient mu_k is nan"),
-    (lambda: ExponentialDecay(0.6, 0.3, 0.0), "v_c .* is 0.0; give a positive speed"),
-    (lambda: StaticKinetic(0.3, 0.6), "give mu_s >= mu_k"),
-    (lambda: StaticKinetic((0.3, 0.6), (0.1, 0.1, 0.1)), "2 mu_s and 3 mu_k; give as many"),
-    (lambda: ExponentialDecay((0.6, 0.5), 0.3, 0.1)(np.zeros(4)), "has 2 values but there are 4 contact points"),
-])
+@pytest.mark.parametrize(
+    "wrong, message",
+    [
+        (lambda: SlipRateCoulomb(0.3), "mu is 0.3; give a function"),
+        (
+            lambda: SlipRateCoulomb(lambda v: 0.3 - v).at(np.array([0.1, 0.5])),
+            r"mu\(0.5 m/s\) is -0.2; let it return zero",
+        ),
+        (lambda: SlipRateCoulomb(lambda v: v / 0.0 * 0.0).slope(WEIGHTS), r"mu\(0 m/s\) is nan"),
+        (
+            lambda: SlipRateCoulomb(lambda v: np.zeros(3)).slope(WEIGHTS),
+            r"shape \(3,\) for 4 slip rates",
+        ),
+        (
+            lambda: ExponentialDecay(-0.1, 0.3, 0.1),
+            "static coefficient mu_s is -0.1; give zero or a positive",
+        ),
+        (lambda: ExponentialDecay(0.6, math.nan, 0.1), "kinetic coefficient mu_k is nan"),
+        (lambda: ExponentialDecay(0.6, 0.3, 0.0), "v_c .* is 0.0; give a positive speed"),
+        (lambda: StaticKinetic(0.3, 0.6), "give mu_s >= mu_k"),
+        (lambda: StaticKinetic((0.3, 0.6), (0.1, 0.1, 0.1)), "2 mu_s and 3 mu_k; give as many"),
+        (
+            lambda: ExponentialDecay((0.6, 0.5), 0.3, 0.1)(np.zeros(4)),
+            "has 2 values but there are 4 contact points",
+        ),
+    ],
+)
 @pytest.mark.filterwarnings("ignore:invalid value")
 def test_bad_laws_of_rates_are_refused(wrong, message):
     with pytest.raises(InputError, match=message):
@@ -106,7 +132,10 @@ def test_projection_in_two_dimensions_is_clipping():
 
 
 def test_projection_in_three_dimensions_keeps_the_direction():
-    r_t, limit = np.array([[3.0, 4.0], [3.0, -4.0], [0.3, 0.4], [1.0, 1.0]]), np.array([10.0, 2.5, 0.0, math.inf])
+    r_t, limit = (
+        np.array([[3.0, 4.0], [3.0, -4.0], [0.3, 0.4], [1.0, 1.0]]),
+        np.array([10.0, 2.5, 0.0, math.inf]),
+    )
     assert np.array_equal(project(r_t, limit), [[3.0, 4.0], [1.5, -2.0], [0.0, 0.0], [1.0, 1.0]])
 
 
@@ -126,8 +155,14 @@ def test_projection_leaves_its_argument_alone():
     assert r_t[0, 0] == 3.0
 
 
-@pytest.mark.parametrize("r_t, limit", [(np.zeros(3), np.zeros(3)), (np.zeros((3, 1)), np.zeros(2)),
-                                        (np.zeros((3, 1)), np.zeros((3, 1)))])
+@pytest.mark.parametrize(
+    "r_t, limit",
+    [
+        (np.zeros(3), np.zeros(3)),
+        (np.zeros((3, 1)), np.zeros(2)),
+        (np.zeros((3, 1)), np.zeros((3, 1))),
+    ],
+)
 def test_shapes_that_do_not_match_are_refused(r_t, limit):
     with pytest.raises(InputError, match="one limit per node"):
         project(r_t, limit)

@@ -58,14 +58,22 @@ def test_readings_give_the_target_velocities(target):
         if isinstance(reading, ImpulseUpdate):
             free = np.ones(6, dtype=bool)
             free[surface.owned[chosen]] = False
-            np.testing.assert_allclose(impulse[free], 0.0, atol=1e-14)  # nothing but the wall pushes
+            np.testing.assert_allclose(
+                impulse[free], 0.0, atol=1e-14
+            )  # nothing but the wall pushes
         else:
-            np.testing.assert_array_equal(np.delete(after, surface.owned[chosen]), np.delete(v, surface.owned[chosen]))
+            np.testing.assert_array_equal(
+                np.delete(after, surface.owned[chosen]), np.delete(v, surface.owned[chosen])
+            )
 
 
 def test_V96_mass_projection_takes_the_energy_of_the_jump():
     """V9.6: for e = 0, ½v⁻ᵀMv⁻ - ½v⁺ᵀMv⁺ = ½(v⁻-v⁺)ᵀM(v⁻-v⁺) >= 0, any mass."""
-    system, surface, v = chain_system(6, consistent=True), chain_surface(6, left_gap=0.0), velocities()
+    system, surface, v = (
+        chain_system(6, consistent=True),
+        chain_surface(6, left_gap=0.0),
+        velocities(),
+    )
     after = ImpulseUpdate()(system, surface, v, np.zeros(2))
     loss = system.kinetic_energy(v) - system.kinetic_energy(after)
     assert loss > 0.1 * system.kinetic_energy(v)
@@ -75,12 +83,18 @@ def test_V96_mass_projection_takes_the_energy_of_the_jump():
 @pytest.mark.parametrize("e", [0.25, 1.0])
 def test_V96_mass_projection_never_gains_when_it_reverses(e):
     """Target -e B v⁻: the loss is (1 - e²) times that of the inelastic collision."""
-    system, surface, v = chain_system(6, consistent=True), chain_surface(6, left_gap=0.0), velocities()
+    system, surface, v = (
+        chain_system(6, consistent=True),
+        chain_surface(6, left_gap=0.0),
+        velocities(),
+    )
     project = ImpulseUpdate()
     stopped = project(system, surface, v, np.zeros(2))
     reversed_ = project(system, surface, v, -e * surface.normal_values(v))
     loss = system.kinetic_energy(v) - system.kinetic_energy(reversed_)
-    assert loss == pytest.approx((1.0 - e**2) * system.kinetic_energy(v - stopped), rel=1e-12, abs=1e-13)
+    assert loss == pytest.approx(
+        (1.0 - e**2) * system.kinetic_energy(v - stopped), rel=1e-12, abs=1e-13
+    )
 
 
 def test_V96_component_reset_of_a_consistent_mass_has_either_sign():
@@ -99,7 +113,9 @@ def test_V96_component_reset_of_a_consistent_mass_has_either_sign():
 def test_V96_both_readings_are_the_same_for_a_lumped_mass():
     system, surface, v = chain_system(6), chain_surface(6, left_gap=0.0), velocities()
     target = np.array([0.3, np.nan])
-    reset, projected = (reading(system, surface, v, target) for reading in (ComponentReset(), ImpulseUpdate()))
+    reset, projected = (
+        reading(system, surface, v, target) for reading in (ComponentReset(), ImpulseUpdate())
+    )
     np.testing.assert_allclose(projected, reset, rtol=1e-15)
 
 
@@ -124,7 +140,9 @@ def test_single_mass_rebounds_with_e_times_its_speed(scheme, gap, e):
 @pytest.mark.parametrize("scheme", SCHEMES, ids=lambda s: type(s).__name__)
 def test_inelastic_mass_stays_where_it_was_stopped(scheme):
     """Pressed on by a constant force it rests, and the wall carries that force: 7 N in every step afterwards."""
-    problem = chain_problem(1, gap=0.05, stiffness=1e-9, mass=3.0, v0=[1.0], constant=7.0, impact=Inelastic())
+    problem = chain_problem(
+        1, gap=0.05, stiffness=1e-9, mass=3.0, v0=[1.0], constant=7.0, impact=Inelastic()
+    )
     reports = list(run(problem, scheme, dt=0.1, steps=6))
     assert reports[0].new.v[0] == 0.0
     for report in reports[1:]:
@@ -174,7 +192,10 @@ def test_what_a_law_is_told():
     assert len(told) == len(reports)
     assert 3 < sum(impact.closing[0] for impact in told) < len(told) - 3
     for impact, report in zip(told, reports, strict=True):
-        assert impact.before[0] == report.old.v[-1] and impact.v_n[0] == report.v_minus[-1] == report.new.v[-1]
+        assert (
+            impact.before[0] == report.old.v[-1]
+            and impact.v_n[0] == report.v_minus[-1] == report.new.v[-1]
+        )
         assert impact.active[0] and impact.closing[0] == (not report.old.active[0])
 
 

@@ -33,7 +33,10 @@ from vi_contact.solvers.condensed import Condensed
 def test_mass_centre_and_inertia_are_kept(name: str, friction: Any) -> None:
     """Total mass, centre of mass and every moment of inertia to round-off, in 1D, 2D, 3D, straight and turned."""
     more = {} if friction is None else {"friction": friction}
-    before, after = inertia(problem(name, **more)), inertia(problem(name, mass=Redistributed(), **more))
+    before, after = (
+        inertia(problem(name, **more)),
+        inertia(problem(name, mass=Redistributed(), **more)),
+    )
     assert np.abs(after - before).max() <= 1e-12 * np.abs(before).max()
     moved = replace(problem(name, **more), mass=Redistributed(lumping=1.0))
     assert np.abs(inertia(moved) - before).max() <= 1e-12 * np.abs(before).max()
@@ -54,9 +57,13 @@ def test_only_the_contact_nodes_lose_their_mass(name: str, friction: Any) -> Non
     if friction is not None:
         wanted[given.surface.tangents.ravel()] = True
     assert np.array_equal(system.massless, wanted)
-    massless = spread(MPI.COMM_WORLD, ids, wanted.astype(float))[np.sort(np.concatenate(MPI.COMM_WORLD.allgather(ids)))]
+    massless = spread(MPI.COMM_WORLD, ids, wanted.astype(float))[
+        np.sort(np.concatenate(MPI.COMM_WORLD.allgather(ids)))
+    ]
     none = massless.astype(bool)
-    assert none.sum() == given.surface.total * (1 if friction is None else given.system.influence.shape[1])
+    assert none.sum() == given.surface.total * (
+        1 if friction is None else given.system.influence.shape[1]
+    )
     assert not M[none].any() and not M[:, none].any()
     assert np.allclose(M, M.T, rtol=0.0, atol=1e-14 * np.abs(M).max())
     assert np.linalg.eigvalsh(M[np.ix_(~none, ~none)])[0] > 0.0
@@ -69,12 +76,17 @@ def test_the_axes_do_not_matter(simplices: bool, friction: Any) -> None:
     """A body and its velocities turned by 0.4 rad have the same kinetic energy, for velocities that deform it too."""
     more, found = {} if friction is None else {"friction": friction}, []
     for angle in (0.0, 0.4):
-        mesh, tags = block(MPI.COMM_WORLD, lengths=(2.0, 1.5), divisions=(7, 6), simplices=simplices, angle=angle)
+        mesh, tags = block(
+            MPI.COMM_WORLD, lengths=(2.0, 1.5), divisions=(7, 6), simplices=simplices, angle=angle
+        )
         system = assemble(mesh, CONCRETE)
         surface = contact_surface(system, tags["left"], obstacle=Touching())
         given = ContactProblem(system, surface, mass=Redistributed(), **more)
         x = turned(system.space.points, -angle)
-        fields = [np.column_stack([np.sin(3.0 * x[:, 0] + x[:, 1]), x[:, 0] * x[:, 1]]), np.cos(4.0 * x)]
+        fields = [
+            np.column_stack([np.sin(3.0 * x[:, 0] + x[:, 1]), x[:, 0] * x[:, 1]]),
+            np.cos(4.0 * x),
+        ]
         energies = []
         for field in fields:
             v = system.space.restrict(turned(field, angle))
@@ -90,7 +102,9 @@ def test_rigid_motions_are_not_damped(name: str) -> None:
     """Stiffness-proportional damping on redistributed mass leaves every rigid motion alone, as on consistent mass."""
     mesh, tags = block(MPI.COMM_WORLD, **FINER[name])
     system = assemble(mesh, CONCRETE, damping=Rayleigh(alpha=0.0, beta=1e-3))
-    given = ContactProblem(system, contact_surface(system, tags["left"], obstacle=Touching()), mass=Redistributed())
+    given = ContactProblem(
+        system, contact_surface(system, tags["left"], obstacle=Touching()), mass=Redistributed()
+    )
     C, x = given.equations.C, given.equations.space.coordinates
     assert C is not None
     influence = given.system.influence
@@ -111,12 +125,16 @@ def test_the_matrix_is_the_same_on_all_ranks() -> None:
 
 def test_two_sides_that_meet_in_a_corner() -> None:
     """A triangle whose nodes all touch has no neighbour behind: its mass goes on through the next contact node."""
-    mesh, tags = block(MPI.COMM_WORLD, lengths=(2.0, 1.5), divisions=(5, 4), simplices=True, angle=0.4)
+    mesh, tags = block(
+        MPI.COMM_WORLD, lengths=(2.0, 1.5), divisions=(5, 4), simplices=True, angle=0.4
+    )
     system = assemble(mesh, CONCRETE)
     both = replace(tags["left"], indices=np.union1d(tags["left"].indices, tags["top"].indices))
     plain = ContactProblem(system, contact_surface(system, both, obstacle=Touching()))
     moved = replace(plain, mass=Redistributed())
-    assert total(moved.equations.algebra.comm, moved.equations.massless.sum()) == plain.surface.total
+    assert (
+        total(moved.equations.algebra.comm, moved.equations.massless.sum()) == plain.surface.total
+    )
     assert np.abs(inertia(moved) - inertia(plain)).max() <= 1e-12 * np.abs(inertia(plain)).max()
 
 
@@ -147,7 +165,9 @@ def test_refusals() -> None:
     with pytest.raises(InputError, match="lumping is 1.5: give a share"):
         Redistributed(1.5)
     with pytest.raises(InputError, match="cannot be moved.*ConsistentMass"):
-        _ = replace(chain_problem(4), mass=Redistributed()).equations  # lumped masses know no neighbours
+        _ = replace(
+            chain_problem(4), mass=Redistributed()
+        ).equations  # lumped masses know no neighbours
     with pytest.raises(InputError, match="too coarse for redistributed mass.*refine"):
         _ = bar(2, mass=Redistributed()).equations
     given = thrown(10, mass=Redistributed(), impact=Inelastic())

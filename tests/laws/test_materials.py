@@ -44,7 +44,9 @@ def test_concrete_on_steel_from_its_wave_speeds():
     """
     concrete = LinearElastic.from_wave_speeds(3253.0, 1992.0, 2400.0)
     assert abs(concrete.nu - 0.2000) < 5e-5 and abs(concrete.E - 22.857e9) < 1e6
-    assert close(concrete.E, 2400.0 * 1992.0**2 * (3 * 3253.0**2 - 4 * 1992.0**2) / (3253.0**2 - 1992.0**2))
+    assert close(
+        concrete.E, 2400.0 * 1992.0**2 * (3 * 3253.0**2 - 4 * 1992.0**2) / (3253.0**2 - 1992.0**2)
+    )
     assert close(concrete.c_p, 3253.0) and close(concrete.c_s, 1992.0)
 
 
@@ -53,18 +55,29 @@ def test_pressed_square_has_nu_one_third():
     assert close(material.nu, 1.0 / 3.0) and close(material.shear_modulus, 0.25)
 
 
-@pytest.mark.parametrize("E, nu, rho, word", [
-    (0.0, 0.2, 1.0, "E [Pa]"), (-1.0, 0.2, 1.0, "E [Pa]"), (math.nan, 0.2, 1.0, "E [Pa]"),
-    (math.inf, 0.2, 1.0, "E [Pa]"),
-    ("2e10", 0.2, 1.0, "E [Pa]"), (1.0, 0.5, 1.0, "between -1 and 0.5"), (1.0, -1.0, 1.0, "between -1 and 0.5"),
-    (1.0, math.nan, 1.0, "nu is nan"), (1.0, 0.2, 0.0, "density"), (1.0, 0.2, math.nan, "density"),
-])
+@pytest.mark.parametrize(
+    "E, nu, rho, word",
+    [
+        (0.0, 0.2, 1.0, "E [Pa]"),
+        (-1.0, 0.2, 1.0, "E [Pa]"),
+        (math.nan, 0.2, 1.0, "E [Pa]"),
+        (math.inf, 0.2, 1.0, "E [Pa]"),
+        ("2e10", 0.2, 1.0, "E [Pa]"),
+        (1.0, 0.5, 1.0, "between -1 and 0.5"),
+        (1.0, -1.0, 1.0, "between -1 and 0.5"),
+        (1.0, math.nan, 1.0, "nu is nan"),
+        (1.0, 0.2, 0.0, "density"),
+        (1.0, 0.2, math.nan, "density"),
+    ],
+)
 def test_material_out_of_range_is_named(E, nu, rho, word):
     with pytest.raises(InputError, match=word.replace("[", r"\[").replace("]", r"\]")):
         LinearElastic(E=E, nu=nu, rho=rho)
 
 
-@pytest.mark.parametrize("c_p, c_s", [(1.0, 1.0), (math.sqrt(4.0 / 3.0) * 0.999, 1.0), (0.0, 1.0), (2.0, math.nan)])
+@pytest.mark.parametrize(
+    "c_p, c_s", [(1.0, 1.0), (math.sqrt(4.0 / 3.0) * 0.999, 1.0), (0.0, 1.0), (2.0, math.nan)]
+)
 def test_impossible_wave_speeds_are_refused(c_p, c_s):
     with pytest.raises(InputError, match="c_[ps]"):
         LinearElastic.from_wave_speeds(c_p, c_s, 1.0)
@@ -86,7 +99,11 @@ def test_uniaxial_plane_stress_returns_youngs_modulus():
 def test_plane_strain_and_solid_use_the_lame_constants():
     lame = (STEEL.lame_lambda, STEEL.shear_modulus)
     assert PlaneStrain().elastic_constants(STEEL) == lame == Solid().elastic_constants(STEEL)
-    assert (PlaneStrain().thickness, PlaneStress(0.2).thickness, Solid().thickness) == (1.0, 0.2, 1.0)
+    assert (PlaneStrain().thickness, PlaneStress(0.2).thickness, Solid().thickness) == (
+        1.0,
+        0.2,
+        1.0,
+    )
 
 
 @pytest.mark.parametrize("section", [PlaneStress, PlaneStrain])
@@ -112,7 +129,9 @@ def test_rayleigh_five_percent_at_one_and_ten_hertz():
     assert close(damping.ratio(f_min), math.sqrt(damping.alpha * damping.beta))
 
 
-@pytest.mark.parametrize("f1, f2, xi1, xi2", [(1.0, 10.0, 0.05, 0.05), (2.0, 7.0, 0.02, 0.06), (7.0, 2.0, 0.06, 0.02)])
+@pytest.mark.parametrize(
+    "f1, f2, xi1, xi2", [(1.0, 10.0, 0.05, 0.05), (2.0, 7.0, 0.02, 0.06), (7.0, 2.0, 0.06, 0.02)]
+)
 def test_rayleigh_has_the_two_ratios_asked_for(f1, f2, xi1, xi2):
     damping = Rayleigh.from_frequencies(f1, f2, xi1=xi1, xi2=xi2)
     assert close(damping.ratio(f1), xi1) and close(damping.ratio(f2), xi2)
@@ -127,21 +146,33 @@ def test_rayleigh_at_the_ends_of_the_possible_range():
         assert mass.beta <= 1e-12 and close(mass.alpha, 0.04 * math.pi)
 
 
-@pytest.mark.parametrize("f1, f2, xi1, xi2, word", [
-    (1.0, 10.0, 0.05, 0.6, "negative coefficient"), (1.0, 10.0, 0.6, 0.05, "negative coefficient"),
-    (2.0, 2.0, 0.05, 0.05, "two frequencies"), (0.0, 2.0, 0.05, 0.05, "f1"), (1.0, math.nan, 0.05, 0.05, "f2"),
-    (1.0, 2.0, -0.05, 0.05, "xi1"),
-])
+@pytest.mark.parametrize(
+    "f1, f2, xi1, xi2, word",
+    [
+        (1.0, 10.0, 0.05, 0.6, "negative coefficient"),
+        (1.0, 10.0, 0.6, 0.05, "negative coefficient"),
+        (2.0, 2.0, 0.05, 0.05, "two frequencies"),
+        (0.0, 2.0, 0.05, 0.05, "f1"),
+        (1.0, math.nan, 0.05, 0.05, "f2"),
+        (1.0, 2.0, -0.05, 0.05, "xi1"),
+    ],
+)
 def test_rayleigh_without_solution_is_refused(f1, f2, xi1, xi2, word):
     with pytest.raises(InputError, match=word):
         Rayleigh.from_frequencies(f1, f2, xi1=xi1, xi2=xi2)
 
 
-@pytest.mark.parametrize("build", [
-    lambda: MassProportional(c=-1.0), lambda: MassProportional(c=math.nan), lambda: Rayleigh(alpha=-1.0, beta=0.0),
-    lambda: Rayleigh(alpha=0.0, beta=-1e-3), lambda: Rayleigh(alpha=math.inf, beta=0.0),
-    lambda: Rayleigh(alpha=1.0, beta=0.0).ratio(0.0),
-])
+@pytest.mark.parametrize(
+    "build",
+    [
+        lambda: MassProportional(c=-1.0),
+        lambda: MassProportional(c=math.nan),
+        lambda: Rayleigh(alpha=-1.0, beta=0.0),
+        lambda: Rayleigh(alpha=0.0, beta=-1e-3),
+        lambda: Rayleigh(alpha=math.inf, beta=0.0),
+        lambda: Rayleigh(alpha=1.0, beta=0.0).ratio(0.0),
+    ],
+)
 def test_bad_damping_is_refused(build):
     with pytest.raises(InputError, match="MassProportional|Rayleigh"):
         build()
@@ -150,7 +181,9 @@ def test_bad_damping_is_refused(build):
 def test_numbers_of_no_material_are_refused():
     """Their squares would be no numbers any more."""
     for wrong in ({"rho": 1e300}, {"E": 1e101}, {"rho": 1e-200}):
-        with pytest.raises(InputError, match="no material has E .*; give numbers between 1e-100 and 1e\\+100"):
+        with pytest.raises(
+            InputError, match="no material has E .*; give numbers between 1e-100 and 1e\\+100"
+        ):
             LinearElastic(**({"E": 1.0, "nu": 0.0, "rho": 1.0} | wrong))
 
 

@@ -9,17 +9,35 @@ import numpy as np
 import pytest
 
 from vi_contact.core.errors import InputError
-from vi_contact.laws import KelvinVoigt, LinearElastic, Orthotropic, PlaneStrain, PlaneStress, Rayleigh, Solid
+from vi_contact.laws import (
+    KelvinVoigt,
+    LinearElastic,
+    Orthotropic,
+    PlaneStrain,
+    PlaneStress,
+    Rayleigh,
+    Solid,
+)
 
 pytestmark = pytest.mark.serial
 SPRUCE = {  # [Pa]: along the grain, radial, tangential
-    "E1": 11.6e9, "E2": 0.90e9, "E3": 0.50e9, "nu12": 0.37, "nu13": 0.42, "nu23": 0.47,
-    "G12": 0.75e9, "G13": 0.72e9, "G23": 0.039e9, "rho": 390.0,
+    "E1": 11.6e9,
+    "E2": 0.90e9,
+    "E3": 0.50e9,
+    "nu12": 0.37,
+    "nu13": 0.42,
+    "nu23": 0.47,
+    "G12": 0.75e9,
+    "G13": 0.72e9,
+    "G23": 0.039e9,
+    "rho": 390.0,
 }
 STEEL = LinearElastic(E=2.1e11, nu=0.3, rho=7850.0)
 ISOTROPIC = {
-    **{f"E{i}": STEEL.E for i in "123"}, **{f"nu{ij}": STEEL.nu for ij in ("12", "13", "23")},
-    **{f"G{ij}": STEEL.shear_modulus for ij in ("12", "13", "23")}, "rho": STEEL.rho,
+    **{f"E{i}": STEEL.E for i in "123"},
+    **{f"nu{ij}": STEEL.nu for ij in ("12", "13", "23")},
+    **{f"G{ij}": STEEL.shear_modulus for ij in ("12", "13", "23")},
+    "rho": STEEL.rho,
 }
 
 
@@ -42,12 +60,16 @@ def test_a_lamina_at_an_angle_has_the_moduli_of_textbooks() -> None:
     assert np.abs(C[3]).max() < 1e-14 * np.abs(C).max()
     strain = np.linalg.solve(C[:3], [1.0, 0.0, 0.0])
     E1, E2, G, nu = (SPRUCE[name] for name in ("E1", "E2", "G12", "nu12"))
-    assert strain[0] == pytest.approx(c**4 / E1 + s**4 / E2 + c**2 * s**2 * (1 / G - 2 * nu / E1), rel=1e-12)
+    assert strain[0] == pytest.approx(
+        c**4 / E1 + s**4 / E2 + c**2 * s**2 * (1 / G - 2 * nu / E1), rel=1e-12
+    )
     coupling = (2 / E1 + 2 * nu / E1 - 1 / G) * s * c**3 - (2 / E2 + 2 * nu / E1 - 1 / G) * s**3 * c
     assert strain[2] == pytest.approx(coupling, rel=1e-12)
 
 
-@pytest.mark.parametrize("section, dimension", [(PlaneStress(), 2), (PlaneStrain(), 2), (Solid(), 3)])
+@pytest.mark.parametrize(
+    "section, dimension", [(PlaneStress(), 2), (PlaneStrain(), 2), (Solid(), 3)]
+)
 def test_equal_moduli_are_isotropic_in_any_axes(section: Any, dimension: int) -> None:
     C = Orthotropic(**ISOTROPIC, axes=0.7).matrix(section, dimension)
     lame, shear = section.elastic_constants(STEEL)
@@ -63,19 +85,26 @@ def test_equal_moduli_are_isotropic_in_any_axes(section: Any, dimension: int) ->
 def test_a_matrix_of_axes_is_the_angle() -> None:
     c, s = cos(0.3), sin(0.3)
     by_matrix = Orthotropic(**SPRUCE, axes=((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0))).stiffness
-    assert by_matrix == pytest.approx(Orthotropic(**SPRUCE, axes=0.3).stiffness, rel=1e-14, abs=1e-5)
-    upright = Orthotropic(**SPRUCE, axes=((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))  # axis 1 along y
+    assert by_matrix == pytest.approx(
+        Orthotropic(**SPRUCE, axes=0.3).stiffness, rel=1e-14, abs=1e-5
+    )
+    upright = Orthotropic(
+        **SPRUCE, axes=((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    )  # axis 1 along y
     assert upright.stiffness[1, 1, 1, 1] == Orthotropic(**SPRUCE).stiffness[0, 0, 0, 0]
 
 
-@pytest.mark.parametrize("wrong, words", [
-    ({"E2": 0.0}, "Orthotropic: E2 is 0.0; give a finite number above zero"),
-    ({"nu12": 4.0}, "some strain has no positive energy"),
-    ({"nu23": float("nan")}, "nu23 is nan"),
-    ({"axes": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0))}, "axes is not a rotation"),
-    ({"axes": ((1.0, 0.1, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))}, "axes is not a rotation"),
-    ({"axes": "grain"}, "the angle"),
-])
+@pytest.mark.parametrize(
+    "wrong, words",
+    [
+        ({"E2": 0.0}, "Orthotropic: E2 is 0.0; give a finite number above zero"),
+        ({"nu12": 4.0}, "some strain has no positive energy"),
+        ({"nu23": float("nan")}, "nu23 is nan"),
+        ({"axes": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0))}, "axes is not a rotation"),
+        ({"axes": ((1.0, 0.1, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))}, "axes is not a rotation"),
+        ({"axes": "grain"}, "the angle"),
+    ],
+)
 def test_what_is_no_material_is_refused(wrong: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         Orthotropic(**{**SPRUCE, **wrong})
@@ -103,8 +132,12 @@ def test_one_retardation_time_is_stiffness_proportional() -> None:
     tau, G = 1e-3, STEEL.shear_modulus
     damping = KelvinVoigt(tau * G, tau * (STEEL.lame_lambda + 2.0 / 3.0 * G))
     lame, shear = damping.viscosities
-    assert (lame, shear) == pytest.approx((tau * STEEL.lame_lambda, tau * STEEL.shear_modulus), rel=1e-14)
-    assert damping.coefficients(STEEL) == (0.0, 0.0) and Rayleigh(0.0, tau).ratio(1.0 / pi) == pytest.approx(tau)
+    assert (lame, shear) == pytest.approx(
+        (tau * STEEL.lame_lambda, tau * STEEL.shear_modulus), rel=1e-14
+    )
+    assert damping.coefficients(STEEL) == (0.0, 0.0) and Rayleigh(0.0, tau).ratio(
+        1.0 / pi
+    ) == pytest.approx(tau)
 
 
 @pytest.mark.parametrize("wrong", [{"shear": -1.0}, {"shear": 1.0, "bulk": float("inf")}])

@@ -53,11 +53,15 @@ def test_foot_is_the_fine_part_of_the_surface():
     mesh = arrays_from_script(BallMesh(**SMALL, growth=0.2))
     foot, surface = mesh.facet_groups["foot"], mesh.facet_groups["surface"]
     centres = np.linalg.norm(mesh.points[foot].mean(axis=1), axis=1)
-    assert centres.max() < SMALL["foot"] and {tuple(row) for row in foot} <= {tuple(row) for row in surface}
+    assert centres.max() < SMALL["foot"] and {tuple(row) for row in foot} <= {
+        tuple(row) for row in surface
+    }
     assert area(mesh, "foot") == pytest.approx(pi / 4.0 * SMALL["foot"] ** 2, rel=0.1)
     corners = mesh.points[mesh.cells]
     edges = np.concatenate([corners[:, j] - corners[:, i] for i in range(4) for j in range(i)])
-    middles = np.concatenate([0.5 * (corners[:, j] + corners[:, i]) for i in range(4) for j in range(i)])
+    middles = np.concatenate(
+        [0.5 * (corners[:, j] + corners[:, i]) for i in range(4) for j in range(i)]
+    )
     length, distance = np.linalg.norm(edges, axis=1), np.linalg.norm(middles, axis=1)
     near, far = distance < 0.8 * SMALL["foot"], distance > 0.5 * RADIUS
     assert np.median(length[near]) == pytest.approx(1.2 * SMALL["size"], rel=0.15)

@@ -102,7 +102,9 @@ def test_all_cells_are_divided(tmp_path: Path, cell: str) -> None:
     boxes = cell in ("quadrilateral", "hexahedron")
     text = SQUARE.replace("EXTRA", "Recombine Surface {1};" if boxes else "")
     if d := 3 if cell in ("tetrahedron", "hexahedron") else 0:
-        text = text[: text.index("Physical")] + SOLID.replace("EXTRA", "Recombine;" if boxes else "")
+        text = text[: text.index("Physical")] + SOLID.replace(
+            "EXTRA", "Recombine;" if boxes else ""
+        )
     path = written(tmp_path, text)
     coarse, fine = (arrays_of(GeoFile(path=path, refine=n)) for n in (0, 2))
     d = d or 2
@@ -111,8 +113,12 @@ def test_all_cells_are_divided(tmp_path: Path, cell: str) -> None:
     assert len(fine.facet_groups["base"]) == 4 ** (d - 1) * len(coarse.facet_groups["base"])
     foot = fine.points[np.unique(fine.facet_groups["base"])]
     assert np.array_equal(foot[:, d - 1], np.zeros(len(foot))) and np.ptp(foot[:, 0]) == 2.0
-    corners = {"triangle": (0, 1, 2), "quadrilateral": (0, 1, 3), "tetrahedron": (0, 1, 2, 3),
-               "hexahedron": (0, 1, 3, 4)}[cell]
+    corners = {
+        "triangle": (0, 1, 2),
+        "quadrilateral": (0, 1, 3),
+        "tetrahedron": (0, 1, 2, 3),
+        "hexahedron": (0, 1, 3, 4),
+    }[cell]
     x = fine.points[fine.cells[:, list(corners)]]
     part = {"triangle": 2.0, "tetrahedron": 6.0}.get(cell, 1.0)
     measure = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])).sum() / part
@@ -131,8 +137,11 @@ FORBIDDEN = {
     "a call": ("Call m;", "Call"),
     "a file of a field": ('Field[1] = Structured; Field[1].FileName = "x";', "Structured"),
     "the name of a file of a field": ('Field[1] = Distance; Field[1].FileName = "x";', "FileName"),
-    "a process of a field": ('Field[1] = ExternalProcess;', "ExternalProcess"),
-    "a command in a field": ('Field[1] = MathEval; Field[1].F = "`touch broken`";', '"`touch broken`"'),
+    "a process of a field": ("Field[1] = ExternalProcess;", "ExternalProcess"),
+    "a command in a field": (
+        'Field[1] = MathEval; Field[1].F = "`touch broken`";',
+        '"`touch broken`"',
+    ),
     "other options of meshes": ("Mesh.PartitionCreateTopology = 1;", "PartitionCreateTopology"),
     "an attribute": ("H.F = 1;", "."),
     "a text": ('s = "touch broken";', '"touch broken"'),
@@ -156,7 +165,9 @@ def test_all_else_is_refused(tmp_path: Path, what: str) -> None:
     """By its line and word, before Gmsh sees it."""
     text, word = FORBIDDEN[what]
     path = written(tmp_path, f"H = 1;\n{text}\n")
-    with pytest.raises(InputError, match=r"wall.geo: line 2 has .*only words of geometry") as caught:
+    with pytest.raises(
+        InputError, match=r"wall.geo: line 2 has .*only words of geometry"
+    ) as caught:
         GeoFile(path=path).build(None)
     assert repr(word)[1:-1].split("'")[0][:8] in str(caught.value)
     assert sorted(one.name for one in tmp_path.iterdir()) == ["wall.geo"]
@@ -222,24 +233,37 @@ def test_a_surface_that_cannot_be_transfinite_is_meshed_freely(
 ) -> None:
     """As Gmsh's own command does, with a warning that names the surface. Area of the trapezium: (6 + 1)/2 10 m²."""
     text = PLAIN.replace("{L, 1, 0, 1}", "{1, 10, 0, 1}").replace("{0, 1, 0, 1}", "{0, 10, 0, 1}")
-    text = text.replace("L = 2", "L = 6").replace("Transfinite Surface {1}", 'Transfinite Surface "*"')
+    text = text.replace("L = 2", "L = 6").replace(
+        "Transfinite Surface {1}", 'Transfinite Surface "*"'
+    )
     arrays = arrays_of(GeoFile(path=written(tmp_path, text)))
     assert area(arrays) == pytest.approx(35.0, rel=1e-12)
     said = [one.getMessage() for one in caplog.records]
     assert any("Surface 1 is meshed freely, not transfinite: " in one for one in said)
 
 
-@pytest.mark.parametrize("text", [
-    "Mesh.ScalingFactor = 0.001;", "Geometry.Tolerance = 1;", "RefineMesh;", "SetOrder 2;",
-    'Merge "a"; Printf("b");', 'Printf("never closed"', "Color Red { Surface{1}; ", 'x = Printf("a");',
-])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Mesh.ScalingFactor = 0.001;",
+        "Geometry.Tolerance = 1;",
+        "RefineMesh;",
+        "SetOrder 2;",
+        'Merge "a"; Printf("b");',
+        'Printf("never closed"',
+        "Color Red { Surface{1}; ",
+        'x = Printf("a");',
+    ],
+)
 def test_what_may_change_a_mesh_is_no_habit(tmp_path: Path, text: str) -> None:
     with pytest.raises(InputError, match=r"wall.geo: line 2 has .*only words of geometry"):
         allowed(written(tmp_path, f"H = 1;\n{text}\n"))
 
 
 def test_all_that_is_refused_is_told_at_once(tmp_path: Path) -> None:
-    path = written(tmp_path, 'H = 1;\nMerge "a";\nPoint(1) = {0, 0, 0, H};\nPlugin(Cut).Run; Exit;\n')
+    path = written(
+        tmp_path, 'H = 1;\nMerge "a";\nPoint(1) = {0, 0, 0, H};\nPlugin(Cut).Run; Exit;\n'
+    )
     with pytest.raises(InputError) as caught:
         allowed(path)
     said = str(caught.value)
@@ -249,34 +273,50 @@ def test_all_that_is_refused_is_told_at_once(tmp_path: Path) -> None:
 
 def test_parameters_of_a_window_are_left_out(tmp_path: Path) -> None:
     """DefineConstant with a name, bounds and choices gives the mesh of its value."""
-    constant = 'DefineConstant[ L = {2, Name "Sizes/L = 3", Min 0,\nMax {4}}, n = 3, w[] = {1, 2} ];'
+    constant = (
+        'DefineConstant[ L = {2, Name "Sizes/L = 3", Min 0,\nMax {4}}, n = 3, w[] = {1, 2} ];'
+    )
     script = allowed(written(tmp_path, constant + PLAIN[6:]))
     head = script.text.split("Point")[0]
-    assert " ".join(head.split()) == "DefineConstant [ own_L = 2 , own_n = 3 , own_w [ ] = { 1 , 2 } ] ;"
+    assert (
+        " ".join(head.split())
+        == "DefineConstant [ own_L = 2 , own_n = 3 , own_w [ ] = { 1 , 2 } ] ;"
+    )
     assert script.text.count("\n") == (constant + PLAIN[6:]).count("\n") + 1
 
 
 def test_numbers_are_given_to_what_a_script_does_not_set(tmp_path: Path) -> None:
     """As -setnumber of Gmsh: for a name that is not set, and in the place of a DefineConstant. Lengths to 1e-12."""
     free = written(tmp_path, PLAIN.removeprefix("L = 2;"), "free.geo")
-    default = written(tmp_path, "DefineConstant[ L = {2, Min 0} ];" + free.read_text(), "default.geo")
+    default = written(
+        tmp_path, "DefineConstant[ L = {2, Min 0} ];" + free.read_text(), "default.geo"
+    )
     for path in (free, default):
         points = arrays_of(GeoFile(path=path, numbers={"L": 5})).points
         assert np.ptp(points[:, 0]) == pytest.approx(5.0, rel=1e-12)
     assert np.ptp(arrays_of(GeoFile(path=default)).points[:, 0]) == pytest.approx(2.0, rel=1e-12)
-    with pytest.raises(InputError, match=r"line 2 uses 'L', which the script does not set: set it there, or give "
-                                         r"numbers = \{L = …\}"):
+    with pytest.raises(
+        InputError,
+        match=r"line 2 uses 'L', which the script does not set: set it there, or give "
+        r"numbers = \{L = …\}",
+    ):
         allowed(free)
 
 
-@pytest.mark.parametrize(("numbers", "said"), [
-    ({"L": 5.0}, r"numbers gives 'L', but line 1 sets it in any case: write DefineConstant\[ L = … \] there"),
-    ({"M": 5.0}, "numbers gives 'M', which the script does not use: leave it out"),
-    ({"L": float("nan")}, "numbers of 'L' is nan; give a finite number"),
-    ({"L": "5"}, "numbers of 'L' is '5'; give a finite number"),
-    ({"SystemCall x": 5.0}, "numbers has the name 'SystemCall x'; give a name of the script"),
-    ([1.0], r"numbers is \[1.0\]; give names and their values"),
-])
+@pytest.mark.parametrize(
+    ("numbers", "said"),
+    [
+        (
+            {"L": 5.0},
+            r"numbers gives 'L', but line 1 sets it in any case: write DefineConstant\[ L = … \] there",
+        ),
+        ({"M": 5.0}, "numbers gives 'M', which the script does not use: leave it out"),
+        ({"L": float("nan")}, "numbers of 'L' is nan; give a finite number"),
+        ({"L": "5"}, "numbers of 'L' is '5'; give a finite number"),
+        ({"SystemCall x": 5.0}, "numbers has the name 'SystemCall x'; give a name of the script"),
+        ([1.0], r"numbers is \[1.0\]; give names and their values"),
+    ],
+)
 def test_numbers_without_effect_are_refused(tmp_path: Path, numbers: Any, said: str) -> None:
     with pytest.raises(InputError, match=said):
         GeoFile(path=written(tmp_path, PLAIN), numbers=numbers).build(None)
@@ -292,7 +332,9 @@ def test_gmsh_gets_no_word_but_those_of_the_lists(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_what_does_not_end_is_ended(tmp_path: Path) -> None:
     """A loop without end, and a list that no memory holds, whichever ends first."""
-    path = written(tmp_path, "For i In {1:1000000000}\nFor j In {1:1000000000}\nx = j;\nEndFor\nEndFor\n")
+    path = written(
+        tmp_path, "For i In {1:1000000000}\nFor j In {1:1000000000}\nx = j;\nEndFor\nEndFor\n"
+    )
     with pytest.raises(InputError, match="did not end within 0.5 s"):
         arrays_of(GeoFile(path=path, time_limit=0.5))
     path = written(tmp_path, "x[] = {1:1000000000000};\n")
@@ -315,11 +357,18 @@ def test_other_mistakes_are_told(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"wall.geo: Gmsh cannot mesh it: .*line 4"):
         arrays_of(GeoFile(path=broken))
     stopped = "it stopped at a formula or size: check Field"
-    for wrong, said in (('Field[1] = MathEval; Field[1].F = "nofun(x)"; Background Field = 1;', f"{stopped}|invalid"),
-                        ("Mesh.MeshSizeMax = -1;", f"{stopped}|Wrong mesh element size")):  # newer versions name it
+    for wrong, said in (
+        (
+            'Field[1] = MathEval; Field[1].F = "nofun(x)"; Background Field = 1;',
+            f"{stopped}|invalid",
+        ),
+        ("Mesh.MeshSizeMax = -1;", f"{stopped}|Wrong mesh element size"),
+    ):  # newer versions name it
         with pytest.raises(InputError, match=f"Gmsh cannot mesh it: .*({said})"):
             arrays_of(GeoFile(path=written(tmp_path, SQUARE.replace("EXTRA", wrong))))
-    with pytest.raises(InputError, match="no cells in a group: name the body by a Physical Surface"):
+    with pytest.raises(
+        InputError, match="no cells in a group: name the body by a Physical Surface"
+    ):
         arrays_of(GeoFile(path=written(tmp_path, SQUARE[: SQUARE.index("EXTRA")])))
     with pytest.raises(InputError, match="no cells"):
         arrays_of(GeoFile(path=written(tmp_path, "Point(1) = {0, 0, 0};")))
@@ -331,7 +380,10 @@ def curved_area(arrays: Any) -> float:
     for i, j, k in ((0, 1, 3), (1, 2, 4), (2, 0, 5)):
         a, b, m = (arrays.points[arrays.cells[:, one]] for one in (i, j, k))
         slopes = 4 * m - 3 * a - b, 4 * (b - a), a - 4 * m + 3 * b
-        total += sum(float(x[:, 0] @ slope[:, 1]) for x, slope in zip((a, m, b), slopes, strict=True)) / 6.0
+        total += (
+            sum(float(x[:, 0] @ slope[:, 1]) for x, slope in zip((a, m, b), slopes, strict=True))
+            / 6.0
+        )
     return total
 
 
@@ -341,7 +393,9 @@ def test_divided_cells_of_second_order_stay_curved(tmp_path: Path) -> None:
     Mesh.ElementOrder = 2; Physical Surface("disk") = {1};"""
     path = written(tmp_path, disk)
     coarse, fine = (arrays_of(GeoFile(path=path, refine=n)) for n in (0, 1))
-    assert coarse.cells.shape[1] == fine.cells.shape[1] == 6 and len(fine.cells) == 4 * len(coarse.cells)
+    assert coarse.cells.shape[1] == fine.cells.shape[1] == 6 and len(fine.cells) == 4 * len(
+        coarse.cells
+    )
     wrong = [abs(curved_area(one) - np.pi) for one in (coarse, fine)]
     assert wrong[1] < wrong[0] / 8.0 < 1e-2
 
@@ -359,10 +413,14 @@ def test_what_is_no_script_is_refused_at_once(tmp_path: Path) -> None:
 
 
 def test_gmsh_ends_with_the_process_that_began_it(tmp_path: Path) -> None:
-    path = written(tmp_path, "For i In {1:1000000000}\nFor j In {1:1000000000}\nx = j;\nEndFor\nEndFor\n")
+    path = written(
+        tmp_path, "For i In {1:1000000000}\nFor j In {1:1000000000}\nx = j;\nEndFor\nEndFor\n"
+    )
     script = f"GeoFile(path={str(path)!r}, time_limit={3.0 * PATIENCE})"
     code = f"from vi_contact.meshes import GeoFile; {script}.build(None)"
-    parent = subprocess.Popen([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": ":".join(sys.path)})
+    parent = subprocess.Popen(
+        [sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": ":".join(sys.path)}
+    )
     try:
         children = Path(f"/proc/{parent.pid}/task/{parent.pid}/children")
         waited(lambda: bool(children.read_text().split()))
@@ -416,15 +474,24 @@ def test_loops_go_round_however_lines_end(tmp_path: Path, text: str) -> None:
         assert len(gmsh.model.getEntities(0)) == LOOPS[text]
 
 
-@pytest.mark.parametrize(("groups", "said"), [
-    ('Physical Curve("base") = {1, 88};', "Unknown .* 88 in the group base"),
-    ('Physical Curve("50 % (left)") =\n {-1, 7:9};', "Unknown .* 7 in the group 50"),
-    ('n[] = {2}; Physical Curve("base") = {1};\nPhysical Curve("base") += {n[], 5};', "Unknown .* 5 in the group base"),
-    ('n[] = {}; Physical Curve("none") = n[];', "it is empty, the group none"),
-], ids=range(4))
+@pytest.mark.parametrize(
+    ("groups", "said"),
+    [
+        ('Physical Curve("base") = {1, 88};', "Unknown .* 88 in the group base"),
+        ('Physical Curve("50 % (left)") =\n {-1, 7:9};', "Unknown .* 7 in the group 50"),
+        (
+            'n[] = {2}; Physical Curve("base") = {1};\nPhysical Curve("base") += {n[], 5};',
+            "Unknown .* 5 in the group base",
+        ),
+        ('n[] = {}; Physical Curve("none") = n[];', "it is empty, the group none"),
+    ],
+    ids=range(4),
+)
 def test_groups_that_gmsh_would_cut_are_refused(tmp_path: Path, groups: str, said: str) -> None:
     """It leaves out what is not there, and whole groups."""
-    path = written(tmp_path, SQUARE.replace("EXTRA", "").replace('Physical Curve("base") = {1};', groups))
+    path = written(
+        tmp_path, SQUARE.replace("EXTRA", "").replace('Physical Curve("base") = {1};', groups)
+    )
     with pytest.raises(InputError, match=said):
         arrays_of(GeoFile(path=path))
 
@@ -435,9 +502,19 @@ def test_groups_are_what_their_lists_say(tmp_path: Path) -> None:
     Physical Curve("turned") = {-1, 2}; If (0) Physical Curve("no") = {99}; EndIf
     Physical Curve("two") = {1}; For i In {2:2} Physical Curve("two") += {i}; EndFor Physical Curve("low", 70) =
     1; Physical Curve(9) = {3};"""
-    path = written(tmp_path, SQUARE.replace("EXTRA", "").replace('Physical Curve("base") = {1};', groups))
+    path = written(
+        tmp_path, SQUARE.replace("EXTRA", "").replace('Physical Curve("base") = {1};', groups)
+    )
     found = arrays_of(GeoFile(path=path)).facet_groups
     n = {1: 2, 2: 1, 3: 2, 4: 1}  # facets of the curves
-    counts = {"all": (1, 2, 3, 4), "around": (1, 2, 3, 4), "turned": (1, 2), "two": (1, 2), "low": (1,), "9": (3,)}
+    counts = {
+        "all": (1, 2, 3, 4),
+        "around": (1, 2, 3, 4),
+        "turned": (1, 2),
+        "two": (1, 2),
+        "low": (1,),
+        "9": (3,),
+    }
     assert {name: len(rows) for name, rows in found.items()} == {
-        name: sum(n[curve] for curve in curves) for name, curves in counts.items()}
+        name: sum(n[curve] for curve in curves) for name, curves in counts.items()
+    }

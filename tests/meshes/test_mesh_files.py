@@ -31,7 +31,9 @@ def meshes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     return {path.stem: path.read_bytes() for path in sorted(folder.glob("*.msh"))}
 
 
-def test_every_variant_of_the_format_is_read_under_any_name(meshes: dict[str, bytes], tmp_path: Path) -> None:
+def test_every_variant_of_the_format_is_read_under_any_name(
+    meshes: dict[str, bytes], tmp_path: Path
+) -> None:
     assert len(meshes) == 5
     for name in ("mesh.msh", "mesh.geo", "mesh", "mesh.gz", "a$(touch PWNED) ;'\".msh"):
         for data in meshes.values() if name == "mesh.msh" else [meshes["4.1 text"]]:
@@ -44,7 +46,9 @@ def test_every_variant_of_the_format_is_read_under_any_name(meshes: dict[str, by
 SCRIPT = 'SystemCall "touch {mark}";\nPrintf("x") > "{mark}";\nPoint(1) = {{0, 0, 0, 1}};\n'
 
 
-@pytest.mark.parametrize("name", ["mesh.msh", "mesh.geo", "mesh.pos", "mesh", "mesh.vtk", "mesh.opt"])
+@pytest.mark.parametrize(
+    "name", ["mesh.msh", "mesh.geo", "mesh.pos", "mesh", "mesh.vtk", "mesh.opt"]
+)
 def test_scripts_are_not_run(name: str, meshes: dict[str, bytes], tmp_path: Path) -> None:
     """Neither as the file itself, nor after a mesh, nor as the options beside one."""
     mark = tmp_path / "PWNED"
@@ -52,7 +56,11 @@ def test_scripts_are_not_run(name: str, meshes: dict[str, bytes], tmp_path: Path
     (tmp_path / name).write_bytes(script)
     with pytest.raises(InputError, match="MeshFormat, .* may be a script"):
         arrays_from_file(tmp_path / name)
-    for data in (meshes["4.1 text"] + script, meshes["2.2 text"] + b'$View\n' + script, meshes["4.1 text"]):
+    for data in (
+        meshes["4.1 text"] + script,
+        meshes["2.2 text"] + b"$View\n" + script,
+        meshes["4.1 text"],
+    ):
         (tmp_path / name).write_bytes(data)
         (tmp_path / f"{name}.opt").write_bytes(script)
         try:
@@ -68,32 +76,45 @@ def test_a_geo_file_is_refused_with_the_remedy(tmp_path: Path) -> None:
         arrays_from_file(tmp_path / "dam.geo")
 
 
-def test_counts_are_bounded_by_the_file_and_sections_are_whole(meshes: dict[str, bytes], tmp_path: Path) -> None:
+def test_counts_are_bounded_by_the_file_and_sections_are_whole(
+    meshes: dict[str, bytes], tmp_path: Path
+) -> None:
     """A count of 10^12 nodes takes no memory; a file cut anywhere before its last section ends is refused."""
     path = tmp_path / "wrong.msh"
     for name, data in meshes.items():
         path.write_bytes(data[: data.index(b"$EndElements")])
         with pytest.raises(InputError, match="cut short or damaged near Elements"):
             arrays_from_file(path)
-        path.write_bytes(data[: data.index(b"$Elements")] + data[data.index(b"$EndElements"):])
+        path.write_bytes(data[: data.index(b"$Elements")] + data[data.index(b"$EndElements") :])
         with pytest.raises(InputError, match="cut short or damaged"):
             arrays_from_file(path)
         for section in (b"Nodes", b"Elements"):
             at = data.index(b"$" + section + b"\n") + len(section) + 2
             end = data.index(b"\n", at)
             if name == "4.1 binary":
-                path.write_bytes(data[:at] + np.array([1, 10**12], dtype=np.uint64).tobytes() + data[at + 16:])
+                path.write_bytes(
+                    data[:at] + np.array([1, 10**12], dtype=np.uint64).tobytes() + data[at + 16 :]
+                )
             else:
-                path.write_bytes(data[:at] + b"1 " * name.startswith("4") + b"1000000000000" + data[end:])
-            with pytest.raises(InputError, match=f"announces more {section.decode().lower()} than it can hold"):
+                path.write_bytes(
+                    data[:at] + b"1 " * name.startswith("4") + b"1000000000000" + data[end:]
+                )
+            with pytest.raises(
+                InputError, match=f"announces more {section.decode().lower()} than it can hold"
+            ):
                 arrays_from_file(path)
 
 
 def test_cells_are_counted_before_they_are_made() -> None:
-    for mesh in (lambda: BlockMesh(divisions=(10**6, 10**6)), lambda: WallMesh(divisions=(10**9, 10**400)),
-                 lambda: WallMesh(size=1e-9), lambda: DiskMesh(radius=1.0, size=1e-7, foot=1.0),
-                 lambda: BallMesh(radius=1.0, size=1e-9, foot=0.5), lambda: ChannelMesh(size=1e-7),
-                 lambda: ChannelMesh(size=1e-8, far=1.0)):
+    for mesh in (
+        lambda: BlockMesh(divisions=(10**6, 10**6)),
+        lambda: WallMesh(divisions=(10**9, 10**400)),
+        lambda: WallMesh(size=1e-9),
+        lambda: DiskMesh(radius=1.0, size=1e-7, foot=1.0),
+        lambda: BallMesh(radius=1.0, size=1e-9, foot=0.5),
+        lambda: ChannelMesh(size=1e-7),
+        lambda: ChannelMesh(size=1e-8, far=1.0),
+    ):
         with pytest.raises(InputError, match="cells, and 2e\\+07 are the most; ask for fewer"):
             mesh()
     with pytest.raises(InputError, match="does not exist"):
@@ -101,5 +122,7 @@ def test_cells_are_counted_before_they_are_made() -> None:
 
 
 def test_a_name_that_is_too_long():
-    with pytest.raises(InputError, match="cannot be read .*: check the path|does not exist: check the path"):
+    with pytest.raises(
+        InputError, match="cannot be read .*: check the path|does not exist: check the path"
+    ):
         arrays_from_file("a" * 300 + ".msh")

@@ -68,7 +68,9 @@ def test_wall_of_triangles_halves_every_quadrilateral_with_the_same_nodes():
     quads, triangles = arrays_from_script(WallMesh()), arrays_from_script(WallMesh(triangles=True))
     assert triangles.cell == "triangle"
     assert np.array_equal(triangles.points, quads.points)
-    assert np.array_equal(polygon_areas(triangles.points, triangles.cells), np.full(192, 0.5 * 0.75**2))
+    assert np.array_equal(
+        polygon_areas(triangles.points, triangles.cells), np.full(192, 0.5 * 0.75**2)
+    )
 
 
 @pytest.mark.parametrize("triangles", [False, True])
@@ -139,7 +141,9 @@ def test_block_fills_its_box_with_equal_right_handed_cells_and_names_its_sides(d
 @pytest.mark.parametrize("simplices", [False, True])
 @pytest.mark.parametrize("d", [2, 3])
 def test_block_groups_are_the_whole_boundary(d, simplices):
-    block = arrays_from_script(BlockMesh(lengths=(1.0,) * d, divisions=(3, 2, 2)[:d], simplices=simplices))
+    block = arrays_from_script(
+        BlockMesh(lengths=(1.0,) * d, divisions=(3, 2, 2)[:d], simplices=simplices)
+    )
     sides, count = np.unique(cell_sides(block.cells, block.cell)[0], axis=0, return_counts=True)
     assert set(count) == {1, 2}
     named = np.sort(np.vstack(list(block.facet_groups.values())), axis=1)
@@ -153,7 +157,11 @@ def test_block_is_placed_bent_and_truly_turned():
         return np.stack([x[:, 0] * np.cos(x[:, 1]), x[:, 0] * np.sin(x[:, 1])], axis=1)
 
     block = BlockMesh(
-        lengths=(1.0, math.pi / 2), divisions=(2, 8), corner=(1.0, 0.0), deform=ring, angle=math.radians(30.0)
+        lengths=(1.0, math.pi / 2),
+        divisions=(2, 8),
+        corner=(1.0, 0.0),
+        deform=ring,
+        angle=math.radians(30.0),
     )
     arrays = arrays_from_script(block)
     for name, radius in {"left": 1.0, "right": 2.0}.items():
@@ -183,7 +191,9 @@ def test_a_block_that_cannot_be_is_refused_with_a_sentence(bad, words):
 def test_a_map_that_folds_the_block_over_itself_is_refused():
     with pytest.raises(InputError, match="8 cells of BlockMesh have a neighbour on the same side"):
         arrays_from_script(BlockMesh(divisions=(4, 4), deform=lambda x: (x - [0.4, 0.0]) ** [2, 1]))
-    with pytest.raises(InputError, match=r"returned shape \(25, 1\) for points \(25, 2\): return that"):
+    with pytest.raises(
+        InputError, match=r"returned shape \(25, 1\) for points \(25, 2\): return that"
+    ):
         arrays_from_script(BlockMesh(divisions=(4, 4), deform=lambda x: x[:, :1]))
 
 
@@ -192,7 +202,11 @@ def test_a_map_that_folds_the_block_over_itself_is_refused():
 
 @pytest.mark.parametrize(
     "mesh",
-    [WallMesh(), WallMesh(size=1.0), BlockMesh(lengths=(1.0,) * 3, divisions=(2, 2, 2), simplices=True, angle=0.5)],
+    [
+        WallMesh(),
+        WallMesh(size=1.0),
+        BlockMesh(lengths=(1.0,) * 3, divisions=(2, 2, 2), simplices=True, angle=0.5),
+    ],
     ids=["divisions", "size", "tetrahedra"],
 )
 def test_a_written_mesh_reads_back_the_same_and_is_written_the_same_every_time(mesh, tmp_path):
@@ -203,12 +217,17 @@ def test_a_written_mesh_reads_back_the_same_and_is_written_the_same_every_time(m
     assert np.allclose(memory.points, file.points, rtol=1e-15, atol=0.0)  # Gmsh writes 16 digits
     assert np.array_equal(memory.cells, file.cells)
     assert memory.facet_groups.keys() == file.facet_groups.keys()
-    assert all(np.array_equal(memory.facet_groups[name], file.facet_groups[name]) for name in file.facet_groups)
+    assert all(
+        np.array_equal(memory.facet_groups[name], file.facet_groups[name])
+        for name in file.facet_groups
+    )
 
 
 def run(*arguments, cwd):
     command = [sys.executable, *map(str, arguments)]  # env: see shell() in test_cli.py
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=600, env=dict(os.environ))
+    return subprocess.run(
+        command, cwd=cwd, capture_output=True, text=True, timeout=600, env=dict(os.environ)
+    )
 
 
 def test_the_folder_of_the_source_tree_writes_meshes_without_installation(tmp_path):
@@ -221,7 +240,21 @@ def test_the_folder_of_the_source_tree_writes_meshes_without_installation(tmp_pa
 
 
 def test_it_runs_as_a_module(tmp_path):
-    options = ["--lengths", 1, 2, 3, "--divisions", 1, 2, 3, "--simplices", "--angle", 0.1, "-o", tmp_path / "it.msh"]
+    options = [
+        "--lengths",
+        1,
+        2,
+        3,
+        "--divisions",
+        1,
+        2,
+        3,
+        "--simplices",
+        "--angle",
+        0.1,
+        "-o",
+        tmp_path / "it.msh",
+    ]
     done = run("-m", "meshes", "block", *options, cwd=SOURCE_TREE)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     assert len(arrays_from_file(tmp_path / "it.msh").cells) == 36
@@ -233,25 +266,37 @@ def test_every_number_of_a_shape_is_an_option(shape: str, capsys):
         parser().parse_args([shape, "--help"])
     said = capsys.readouterr().out
     for field in fields(getattr(meshes, f"{shape.capitalize()}Mesh")):
-        assert field.name in ("corner", "deform") or f"--{field.name.replace('_', '-')} " in said.replace("]", " ")
+        assert field.name in (
+            "corner",
+            "deform",
+        ) or f"--{field.name.replace('_', '-')} " in said.replace("]", " ")
 
 
 @pytest.mark.parametrize(
     "shape, words, kind",
-    [("wall", "--divisions 2 4", "quadrilateral"), ("disk", "--radius 1 --size 0.5 --foot 0.5", "triangle"),
-     ("ball", "--radius 1 --size 0.25 --foot 0.5", "tetrahedron")],
+    [
+        ("wall", "--divisions 2 4", "quadrilateral"),
+        ("disk", "--radius 1 --size 0.5 --foot 0.5", "triangle"),
+        ("ball", "--radius 1 --size 0.25 --foot 0.5", "tetrahedron"),
+    ],
 )
 def test_every_shape_is_a_command(shape: str, words: str, kind: str, tmp_path):
     """As python3 meshes SHAPE, and as the file of the shape."""
-    here = [SOURCE_TREE / "meshes", shape] if shape == "disk" else [SOURCE_TREE / "meshes" / f"{shape}.py"]
+    here = (
+        [SOURCE_TREE / "meshes", shape]
+        if shape == "disk"
+        else [SOURCE_TREE / "meshes" / f"{shape}.py"]
+    )
     done = run(*here, *words.split(), "-o", "it.msh", cwd=tmp_path)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     assert arrays_from_file(tmp_path / "it.msh").cell == kind
 
 
 def test_meshes_explain_bad_input_in_one_line(tmp_path):
-    for words, said in ((("wall", "--size", -1), "cell size is -1.0 m: give one above 0 and up to the wall's"),
-                        (("block", "-o", "nowhere/block.msh"), "nowhere does not exist")):
+    for words, said in (
+        (("wall", "--size", -1), "cell size is -1.0 m: give one above 0 and up to the wall's"),
+        (("block", "-o", "nowhere/block.msh"), "nowhere does not exist"),
+    ):
         done = run(SOURCE_TREE / "meshes", *words, cwd=tmp_path)
         assert done.returncode == 1
         assert done.stderr.count("\n") == 1 and said in done.stderr

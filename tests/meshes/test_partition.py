@@ -37,7 +37,14 @@ def test_there_may_be_more_ranks_than_points():
 
 def test_a_cell_goes_to_its_owner_first_and_as_a_ghost_to_the_owners_of_its_neighbours():
     ranks, offsets = destinations(*strip(6), "quadrilateral", 3)
-    assert [list(part) for part in np.split(ranks, offsets[1:-1])] == [[0], [0, 1], [1, 0], [1, 2], [2, 1], [2]]
+    assert [list(part) for part in np.split(ranks, offsets[1:-1])] == [
+        [0],
+        [0, 1],
+        [1, 0],
+        [1, 2],
+        [2, 1],
+        [2],
+    ]
     assert ranks.dtype == offsets.dtype == np.int32
 
 
@@ -53,7 +60,9 @@ def test_one_rank_has_no_ghosts():
 
 def test_rows_are_alike_whatever_the_order_of_their_members():
     one, other, none = number_alike(
-        np.array([[1, 2, 3], [4, 5, 6], [-1, -1, 7]]), np.array([[6, 4, 5], [3, 1, 4]]), np.empty((0, 3), dtype=int)
+        np.array([[1, 2, 3], [4, 5, 6], [-1, -1, 7]]),
+        np.array([[6, 4, 5], [3, 1, 4]]),
+        np.empty((0, 3), dtype=int),
     )
     assert one[1] == other[0]
     assert len({*one, *other}) == 4

@@ -1,6 +1,5 @@
 """Meshes of two bodies: blocks side by side, joints and cracks cut open, sides welded together."""
 
-
 from dataclasses import replace
 
 import numpy as np
@@ -30,7 +29,9 @@ def bodies(arrays):
     from scipy.sparse.csgraph import connected_components
 
     first = np.repeat(arrays.cells[:, :1], arrays.cells.shape[1], axis=1).ravel()
-    graph = sp.coo_matrix((np.ones(len(first)), (first, arrays.cells.ravel())), shape=(len(arrays.points),) * 2)
+    graph = sp.coo_matrix(
+        (np.ones(len(first)), (first, arrays.cells.ravel())), shape=(len(arrays.points),) * 2
+    )
     count, part = connected_components(graph, directed=False)
     return [np.flatnonzero(part == i) for i in range(count)]
 
@@ -44,7 +45,9 @@ def outside(arrays):
 
 def places(arrays, rows):
     """Facets by the places of their vertices, in any order."""
-    return sorted(tuple(sorted(map(tuple, points))) for points in np.round(arrays.points[rows], 9).tolist())
+    return sorted(
+        tuple(sorted(map(tuple, points))) for points in np.round(arrays.points[rows], 9).tolist()
+    )
 
 
 @shapes
@@ -61,9 +64,13 @@ def test_two_blocks_touch_without_a_common_node(d, simplices):
     up = 0 if d == 1 else 1
     moved = arrays_from_script(stacked(d, simplices, gap=0.25, offset=(0.5, 0.125)))
     shift = moved.points[upper] - arrays.points[upper]
-    assert np.array_equal(shift, np.tile({1: [0.25], 2: [0.5, 0.25], 3: [0.5, 0.25, 0.125]}[d], (len(upper), 1)))
+    assert np.array_equal(
+        shift, np.tile({1: [0.25], 2: [0.5, 0.25], 3: [0.5, 0.25, 0.125]}[d], (len(upper), 1))
+    )
     assert np.array_equal(moved.points[lower], arrays.points[lower])
-    assert np.all(arrays.points[arrays.facet_groups[mesh.interface[1]]][..., up] == mesh.lower.lengths[up])
+    assert np.all(
+        arrays.points[arrays.facet_groups[mesh.interface[1]]][..., up] == mesh.lower.lengths[up]
+    )
 
 
 def test_blocks_turn_together_and_have_to_be_alike():
@@ -87,18 +94,25 @@ def test_welded_blocks_are_one_block_and_cut_open_two_again(d, simplices):
     tall = list(mesh.lower.lengths), list(mesh.lower.divisions)
     for values in tall:
         values[up] *= 2
-    whole = arrays_from_script(BlockMesh(lengths=tuple(tall[0]), divisions=tuple(tall[1]), simplices=simplices))
+    whole = arrays_from_script(
+        BlockMesh(lengths=tuple(tall[0]), divisions=tuple(tall[1]), simplices=simplices)
+    )
     assert places(joined, joined.cells) == places(whole, whole.cells)
     assert len(joined.points) == len(whole.points) and len(bodies(joined)) == 1
     assert places(joined, outside(joined)) == places(whole, outside(whole))
-    for again in (cut_open(joined, one, inside="upper"), cut_open(joined, one, towards=-np.eye(d)[up])):
+    for again in (
+        cut_open(joined, one, inside="upper"),
+        cut_open(joined, one, towards=-np.eye(d)[up]),
+    ):
         assert len(bodies(again)) == 2 and len(again.points) == len(apart.points)
         assert places(again, outside(again)) == places(apart, outside(apart))
         upper = np.unique(again.cells[again.cell_groups["upper"]])
         assert np.isin(again.facet_groups[f"{one}_1"], upper).all()
         assert not np.isin(again.facet_groups[f"{one}_2"], upper).any()
         for name in set(apart.facet_groups) - {one, two}:
-            assert places(again, again.facet_groups[name]) == places(apart, apart.facet_groups[name])
+            assert places(again, again.facet_groups[name]) == places(
+                apart, apart.facet_groups[name]
+            )
         assert not {one} & set(again.facet_groups)
 
 
@@ -108,8 +122,14 @@ def test_scripts_and_files_give_the_same(tmp_path):
     write(mesh, tmp_path / "apart.msh")
     write(Welded(tmp_path / "apart.msh", "lower_top", "upper_bottom"), tmp_path / "joined.msh")
     cut = arrays_from_script(CutOpen(tmp_path / "joined.msh", "upper_bottom", inside="upper"))
-    direct = cut_open(welded(arrays_from_script(mesh), "lower_top", "upper_bottom"), "upper_bottom", inside="upper")
-    assert cut.points == pytest.approx(direct.points, abs=1e-15) and set(cut.facet_groups) == set(direct.facet_groups)
+    direct = cut_open(
+        welded(arrays_from_script(mesh), "lower_top", "upper_bottom"),
+        "upper_bottom",
+        inside="upper",
+    )
+    assert cut.points == pytest.approx(direct.points, abs=1e-15) and set(cut.facet_groups) == set(
+        direct.facet_groups
+    )
     assert places(cut, cut.cells) == places(direct, direct.cells)
     assert {"lower_top", "upper_bottom_2"} <= set(cut.facet_groups)  # one boundary, two names
     for name, rows in direct.facet_groups.items():
@@ -132,7 +152,9 @@ def strip_with(lines):
     """Nine squares, and inner boundary groups as pairs of points."""
     arrays = arrays_from_script(BlockMesh(lengths=(3.0, 3.0), divisions=(3, 3)))
     number = {tuple(point): i for i, point in enumerate(arrays.points.tolist())}
-    rows = {name: np.array([[number[a], number[b]] for a, b in pairs]) for name, pairs in lines.items()}
+    rows = {
+        name: np.array([[number[a], number[b]] for a, b in pairs]) for name, pairs in lines.items()
+    }
     arrays.facet_groups.update(rows)
     return arrays
 
@@ -169,13 +191,34 @@ def test_refusals():
     arrays = strip_with({"line": [((0.0, 1.0), (1.0, 1.0))]})
     arrays.cell_groups["half"] = arrays.points[arrays.cells][..., 0].max(axis=1) <= 1.0
     for act, sentence in (
-        (lambda: cut_open(arrays, "seam", towards=(0, 1)), "mesh has no boundary group 'seam'; it has left, right"),
-        (lambda: cut_open(arrays, "line"), "give its first side, either by inside=a cell group or by towards"),
-        (lambda: cut_open(arrays, "left", towards=(1, 0)), "'left' has facets without cells on both sides"),
-        (lambda: cut_open(arrays, "line", inside="half"), "cell group 'half' is not on one side of 'line' only"),
-        (lambda: cut_open(arrays, "line", inside="rock"), "mesh has no cell group 'rock'; it has block, half"),
-        (lambda: cut_open(arrays, "line", towards=(1, 0)), r"towards=\(1.0, 0.0\) runs along 'line' somewhere"),
-        (lambda: welded(arrays, "left", "right"), r"group 'right' has a node at \(3, 0\), 3 m away from every node of"),
+        (
+            lambda: cut_open(arrays, "seam", towards=(0, 1)),
+            "mesh has no boundary group 'seam'; it has left, right",
+        ),
+        (
+            lambda: cut_open(arrays, "line"),
+            "give its first side, either by inside=a cell group or by towards",
+        ),
+        (
+            lambda: cut_open(arrays, "left", towards=(1, 0)),
+            "'left' has facets without cells on both sides",
+        ),
+        (
+            lambda: cut_open(arrays, "line", inside="half"),
+            "cell group 'half' is not on one side of 'line' only",
+        ),
+        (
+            lambda: cut_open(arrays, "line", inside="rock"),
+            "mesh has no cell group 'rock'; it has block, half",
+        ),
+        (
+            lambda: cut_open(arrays, "line", towards=(1, 0)),
+            r"towards=\(1.0, 0.0\) runs along 'line' somewhere",
+        ),
+        (
+            lambda: welded(arrays, "left", "right"),
+            r"group 'right' has a node at \(3, 0\), 3 m away from every node of",
+        ),
     ):
         with pytest.raises(InputError, match=sentence):
             act()
@@ -208,7 +251,9 @@ def test_bodies_of_gmsh_geometry():
     assert len(bodies(joint)) == 1
     cut = arrays_from_script(CutOpen(Dam(True), "joint0", inside="dam"))
     assert len(bodies(cut)) == 2 and {"joint0_1", "joint0_2"} == set(cut.facet_groups)
-    assert np.ptp(cut.points[np.unique(cut.facet_groups["joint0_1"])], axis=0) == pytest.approx([1.0, 0.0], abs=1e-12)
+    assert np.ptp(cut.points[np.unique(cut.facet_groups["joint0_1"])], axis=0) == pytest.approx(
+        [1.0, 0.0], abs=1e-12
+    )
 
 
 @shapes
@@ -238,31 +283,57 @@ def test_what_cannot_be_cut_between_cell_groups():
         ({"between": ("upper", "sea")}, "mesh has no cell group 'sea'; it has lower, upper"),
         ({"between": ("upper", "upper")}, "between is .*; give the names of two groups of cells"),
         ({"between": "upper"}, "between is 'upper'; give the names of two groups of cells"),
-        ({"between": ("upper", "lower"), "inside": "upper"},
-         "has its first side in 'upper': leave out inside and towards"),
-        ({"between": ("upper", "lower"), "group": "upper_bottom"}, "give group=, .*, or between=, two groups of cells"),
+        (
+            {"between": ("upper", "lower"), "inside": "upper"},
+            "has its first side in 'upper': leave out inside and towards",
+        ),
+        (
+            {"between": ("upper", "lower"), "group": "upper_bottom"},
+            "give group=, .*, or between=, two groups of cells",
+        ),
         ({}, "give group=, the name of an inner boundary, or between=, two groups of cells"),
     ):
         with pytest.raises(InputError, match=sentence):
             cut_open(joined, **arguments)
-    with pytest.raises(InputError, match="'upper' and 'lower' have no common facet, so that there is nothing to cut"):
+    with pytest.raises(
+        InputError,
+        match="'upper' and 'lower' have no common facet, so that there is nothing to cut",
+    ):
         cut_open(apart, between=("upper", "lower"))
     again = cut_open(joined, "upper_bottom", inside="upper")
-    taken = {name.replace("upper_bottom_1", "upper_top_1"): rows for name, rows in again.facet_groups.items()}
-    with pytest.raises(InputError, match="has a group 'upper_bottom_2' already, the name of a side of the cut"):
-        cut_open(replace(joined, facet_groups=joined.facet_groups | {"upper_bottom_2": taken["upper_bottom_2"]}),
-                 "upper_bottom", inside="upper")
+    taken = {
+        name.replace("upper_bottom_1", "upper_top_1"): rows
+        for name, rows in again.facet_groups.items()
+    }
+    with pytest.raises(
+        InputError, match="has a group 'upper_bottom_2' already, the name of a side of the cut"
+    ):
+        cut_open(
+            replace(
+                joined,
+                facet_groups=joined.facet_groups | {"upper_bottom_2": taken["upper_bottom_2"]},
+            ),
+            "upper_bottom",
+            inside="upper",
+        )
 
 
 def test_welds_to_several_nodes_at_one_place_are_refused():
     """A stone is welded to two stones, which have a node each at the joint; the stone's side first is no riddle."""
     block = BlockMesh(lengths=(1.0, 1.0), divisions=(2, 2))
-    stones = Blocks({"a": block, "b": replace(block, corner=(1.0, 0.0)),
-                     "up": BlockMesh(lengths=(2.0, 1.0), divisions=(4, 2), corner=(0.0, 1.0))})
+    stones = Blocks(
+        {
+            "a": block,
+            "b": replace(block, corner=(1.0, 0.0)),
+            "up": BlockMesh(lengths=(2.0, 1.0), divisions=(4, 2), corner=(0.0, 1.0)),
+        }
+    )
     arrays = arrays_from_script(stones)
     tops = np.concatenate([arrays.facet_groups["a_top"], arrays.facet_groups["b_top"]])
     arrays = replace(arrays, facet_groups=arrays.facet_groups | {"tops": tops})
-    with pytest.raises(InputError, match=r"group 'tops' has several nodes at \(1, 1\), of bodies that meet there"):
+    with pytest.raises(
+        InputError, match=r"group 'tops' has several nodes at \(1, 1\), of bodies that meet there"
+    ):
         welded(arrays, "tops", "up_bottom")
     assert len(bodies(welded(arrays, "up_bottom", "tops"))) == 1
 
@@ -311,4 +382,6 @@ def test_a_case_file_cuts_between_two_cell_groups(tmp_path):
     (tmp_path / "dam.geo").write_text(DAM)
     (tmp_path / "dam.toml").write_text(CASE)
     problem = read_case(tmp_path / "dam.toml").problem(MPI.COMM_SELF)
-    assert vc.static_equilibrium(problem).r_n.sum() == pytest.approx(2.0 * 2400.0 * 9.80665, rel=1e-9)
+    assert vc.static_equilibrium(problem).r_n.sum() == pytest.approx(
+        2.0 * 2400.0 * 9.80665, rel=1e-9
+    )

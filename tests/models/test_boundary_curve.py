@@ -24,9 +24,16 @@ def test_sides_of_a_block():
         chosen = curve.labels == label
         assert chosen.sum() == (5, 4)[label % 2] and np.allclose(curve.normals[chosen], normal)
     first = COMM.bcast((curve.points, curve.labels, numbers))
-    assert all(np.array_equal(a, b) for a, b in zip(first, (curve.points, curve.labels, numbers), strict=True))
+    assert all(
+        np.array_equal(a, b)
+        for a, b in zip(first, (curve.points, curve.labels, numbers), strict=True)
+    )
     here = dict(zip(node_numbers(mesh).tolist(), mesh.geometry.x[:, :2], strict=True))
-    assert all(np.array_equal(here[n], point) for n, point in zip(numbers, curve.points, strict=True) if n in here)
+    assert all(
+        np.array_equal(here[n], point)
+        for n, point in zip(numbers, curve.points, strict=True)
+        if n in here
+    )
 
 
 def test_what_is_refused():

@@ -41,10 +41,14 @@ def test_rigid_limit_is_housners_block_in_other_units():
     block = rocking.RockingBlock()
     b, h, R = 0.2, 1.0, np.hypot(0.2, 1.0)
     assert block.p**2 == pytest.approx(0.75 * 9.81 / R * h / R, rel=1e-12)
-    assert block.overturning_angle == pytest.approx(b / h, rel=1e-15) and block.mass == pytest.approx(1920.0)
+    assert block.overturning_angle == pytest.approx(
+        b / h, rel=1e-15
+    ) and block.mass == pytest.approx(1920.0)
     t0 = float(block.impact_times(0.1, 1)[0])
     assert t0 == pytest.approx(np.arccosh(1.0 / (1.0 - 0.5)) / block.p, rel=1e-12)
-    assert block.amplitudes(0.1, 1)[1] == pytest.approx(0.2 * (1.0 - np.sqrt(1.0 - 0.88794379 * 0.75)), rel=1e-8)
+    assert block.amplitudes(0.1, 1)[1] == pytest.approx(
+        0.2 * (1.0 - np.sqrt(1.0 - 0.88794379 * 0.75)), rel=1e-8
+    )
     t = np.linspace(0.0, 0.9 * t0, 5)
     assert block.motion(0.1, t) == pytest.approx(0.2 - 0.1 * np.cosh(block.p * t), rel=1e-12)
 
@@ -69,7 +73,9 @@ def test_tilted_states(model):
     """A tilt is a rigid turn about the left corner: angle, spin and kinetic energy ½ (4/3) m R² rate² (the held base
     has no inertia sideways, which a turn about a base corner does not ask for)."""
     state = model.tilted(0.07, rate=-0.3)
-    assert model.angle(state) == pytest.approx(0.07, rel=1e-12) and model.spin(state) == pytest.approx(-0.3, rel=1e-12)
+    assert model.angle(state) == pytest.approx(0.07, rel=1e-12) and model.spin(
+        state
+    ) == pytest.approx(-0.3, rel=1e-12)
     system = model.problem.equations
     kinetic = 0.5 * system.algebra.dot(state.v, system.M @ state.v)
     assert kinetic == pytest.approx(0.5 * 4.0 / 3.0 * 1920.0 * 1.04 * 0.09, rel=1e-12)
@@ -96,7 +102,10 @@ def test_weight_has_the_arm_of_the_tilted_block(model):
 @pytest.mark.serial
 def test_impacts_of_a_history():
     """Zero crossings between rows by straight lines; chatter near zero is one impact."""
-    history = {"t": np.arange(9.0), "theta": np.array([0.4, 0.2, -1e-5, 1e-5, -0.2, -0.3, -0.1, 0.1, 0.2])}
+    history = {
+        "t": np.arange(9.0),
+        "theta": np.array([0.4, 0.2, -1e-5, 1e-5, -0.2, -0.3, -0.1, 0.1, 0.2]),
+    }
     times, peaks = rocking.impacts(history)
     assert times == pytest.approx([1.0 + 0.2 / 0.20001, 6.5]) and peaks == pytest.approx([0.4, 0.3])
 
@@ -108,14 +117,21 @@ def test_demo(shared_tmp, comm):
     numbers = demo("rocking_block").main(quick=True, out=shared_tmp, progress=False)
     comm.Barrier()  # rank 0 draws
     assert 0.0 < numbers["certificate"] <= 1e-9
-    assert numbers["worst_time_error"] < 0.02 and numbers["first_impact"] == pytest.approx(0.490304, rel=0.01)
+    assert numbers["worst_time_error"] < 0.02 and numbers["first_impact"] == pytest.approx(
+        0.490304, rel=0.01
+    )
     assert numbers["restitution"] == pytest.approx(0.94230769, rel=0.05)
     assert numbers["gap_0.99"] == 0.0 and numbers["gap_1.01"] > 1e-4
     assert numbers["last_angle_0.98"] < 0.8 and numbers["last_angle_1.02"] > 1.0
     for name in ("free", "onset_0.99", "onset_1.01", "overturning_0.98", "overturning_1.02"):
         summary = json.loads((shared_tmp / name / "summary.json").read_text(encoding="utf-8"))
         assert summary["status"] == "finished" and summary["ranks"] == comm.size
-        header = (shared_tmp / name / "history.csv").read_text(encoding="utf-8").split("\n", 1)[0].split(",")
+        header = (
+            (shared_tmp / name / "history.csv")
+            .read_text(encoding="utf-8")
+            .split("\n", 1)[0]
+            .split(",")
+        )
         assert {"theta", "theta_rate", "r_left", "r_right", "u_x_top"} <= set(header)
         assert (shared_tmp / name / "fields.xdmf").stat().st_size > 0
     for figure in ("free_rocking.png", "pulses.png", "energy.png", "certificate.png"):

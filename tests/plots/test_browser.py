@@ -29,10 +29,21 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def opened(page: Path) -> str:
     """The document after its scripts have run."""
     done = subprocess.run(
-        [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
-         "--virtual-time-budget=20000", f"--user-data-dir={page.parent / 'profile'}",
-         "--dump-dom", page.as_uri()],
-        capture_output=True, encoding="utf-8", timeout=600, check=False,
+        [
+            CHROMIUM,
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--disable-dev-shm-usage",
+            "--virtual-time-budget=20000",
+            f"--user-data-dir={page.parent / 'profile'}",
+            "--dump-dom",
+            page.as_uri(),
+        ],
+        capture_output=True,
+        encoding="utf-8",
+        timeout=600,
+        check=False,
     )
     assert done.returncode == 0, done.stderr[-2000:]
     return done.stdout
@@ -41,14 +52,23 @@ def opened(page: Path) -> str:
 def test_curves_are_drawn_and_no_text_of_a_file_runs(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     injected = page.with_name("injected.html")
-    injected.write_text(text.replace("</body>", "<script>document.documentElement.dataset.evil = 3</script></body>"))
+    injected.write_text(
+        text.replace("</body>", "<script>document.documentElement.dataset.evil = 3</script></body>")
+    )
     document = opened(injected)
     (root,) = re.findall(r"<html[^>]*>", document)
     assert "data-evil" not in root
     drawn = int(re.findall(r'data-drawn="(\d+)"', root)[0])
-    assert drawn == text.count('class="chart"') == len(re.findall(r'class="chart js-plotly-plot"', document)) > 4
+    assert (
+        drawn
+        == text.count('class="chart"')
+        == len(re.findall(r'class="chart js-plotly-plot"', document))
+        > 4
+    )
     assert document.count('class="trace scatter') >= drawn
-    assert "&lt;script&gt;document.documentElement" in document  # seen in the legend as it is written
+    assert (
+        "&lt;script&gt;document.documentElement" in document
+    )  # seen in the legend as it is written
 
 
 def test_tables_are_sorted(page: Path) -> None:
@@ -67,5 +87,7 @@ document.body.dataset.sorted = JSON.stringify(found);
     (told,) = re.findall(r'<body[^>]* data-sorted="([^"]*)"', opened(clicked))
     *numbers, falls, rises = json.loads(unescape(told))
     falling, rising = ([float(one) for one in column] for column in numbers)
-    assert len(falling) > 4 and falling == sorted(falling, reverse=True) and rising == sorted(rising)
+    assert (
+        len(falling) > 4 and falling == sorted(falling, reverse=True) and rising == sorted(rising)
+    )
     assert falls == rises[::-1] and sorted(rises) == sorted(falls) and rises != falls

@@ -50,19 +50,34 @@ def rubbed(folder: Path, simplices: bool) -> RunFolder:
         return np.tile(min(t / 0.01, 1.0) * np.array([2.2e3, -4.0e3, 1.1e3]), (len(x), 1))
 
     system, tags = two_blocks(
-        MPI.COMM_SELF, TwoBlocks(lower=lower, upper=upper, offset=(0.5, 0.5)), SOFT,
-        clamped=lambda tags: tags["lower_bottom"], loads=lambda tags: [fem.Traction(tags["upper_top"], push)],
+        MPI.COMM_SELF,
+        TwoBlocks(lower=lower, upper=upper, offset=(0.5, 0.5)),
+        SOFT,
+        clamped=lambda tags: tags["lower_bottom"],
+        loads=lambda tags: [fem.Traction(tags["upper_top"], push)],
     )
-    surface = fem.contact_pair(system, tags["upper_bottom"], tags["lower_top"], matching=fem.DualMortar())
+    surface = fem.contact_pair(
+        system, tags["upper_bottom"], tags["lower_top"], matching=fem.DualMortar()
+    )
     problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3))
-    vc.simulate(problem, dt=DT, steps=STEPS, out=folder, record=[vc.Contact()], fields=fem.XDMF(every=3),
-                progress=False)
+    vc.simulate(
+        problem,
+        dt=DT,
+        steps=STEPS,
+        out=folder,
+        record=[vc.Contact()],
+        fields=fem.XDMF(every=3),
+        progress=False,
+    )
     return read_run(folder)
 
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, RunFolder]:
-    found = {kind: rubbed(tmp_path_factory.mktemp(kind), kind == "tetrahedra") for kind in ("hexahedra", "tetrahedra")}
+    found = {
+        kind: rubbed(tmp_path_factory.mktemp(kind), kind == "tetrahedra")
+        for kind in ("hexahedra", "tetrahedra")
+    }
     for run in found.values():
         states = contact_states(run.history)
         assert all(np.any(states == state) for state in (OPEN, STICK, SLIP))
@@ -111,9 +126,15 @@ def test_faces(runs: Any, figures: list[Any], tmp_path: Path) -> None:
     for column, row in enumerate((0, 15, STEPS)):
         over, under = axes[column], axes[3 + column]
         assert over.get_title() == f"face towards -y, t = {row * DT:.4g} s"
-        assert (over.get_xlabel(), over.get_ylabel()) == ("x [m]", "z [m]") == (under.get_xlabel(), under.get_ylabel())
+        assert (
+            (over.get_xlabel(), over.get_ylabel())
+            == ("x [m]", "z [m]")
+            == (under.get_xlabel(), under.get_ylabel())
+        )
         pressure = over.collections[0]
-        assert np.asarray(pressure.get_array()) == pytest.approx(1e-3 * history["pressure"][row, conditions])
+        assert np.asarray(pressure.get_array()) == pytest.approx(
+            1e-3 * history["pressure"][row, conditions]
+        )
         shown = pressure.to_rgba(pressure.get_array())
         open_points = history["active"][row, conditions] == 0
         assert np.array_equal(np.all(shown[:, :3] == 1.0, axis=1), open_points)
@@ -125,42 +146,67 @@ def test_faces(runs: Any, figures: list[Any], tmp_path: Path) -> None:
         if len(drawn):
             places = run.contact.points[rubs][:, [0, 2]]
             assert np.array_equal(np.column_stack([arrows[0].X, arrows[0].Y]), places)
-            assert drawn / np.abs(drawn).max() == pytest.approx(slip[row][rubs] / np.abs(slip[row][rubs]).max())
+            assert drawn / np.abs(drawn).max() == pytest.approx(
+                slip[row][rubs] / np.abs(slip[row][rubs]).max()
+            )
     assert "contact pressure [kPa]" in figures[0].axes[6].get_ylabel()
     texts = [text.get_text() for text in figures[0].legends[0].get_texts()]
-    longest = max(float(np.linalg.norm(slip[row][states[row] != OPEN], axis=1).max(initial=0.0)) for row in (15, STEPS))
+    longest = max(
+        float(np.linalg.norm(slip[row][states[row] != OPEN], axis=1).max(initial=0.0))
+        for row in (15, STEPS)
+    )
     assert texts[:3] == ["open", "stick", "slip"] and texts[3].endswith(f" {1e6 * longest:.3g} µm")
 
 
 def test_curved_faces_and_corners(tmp_path: Path, figures: list[Any]) -> None:
     """A bent base is one face, in projection, and a side of the same body another; the edge between them has conditions
     on both. Nothing rubs: closed points are said to be closed."""
+
     def bend(x: Any) -> Any:
         return np.column_stack([x[:, :2], x[:, 2] + 0.4 * (1.0 - x[:, 2]) * x[:, 1] ** 2])
 
-    mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0,) * 3, divisions=(3, 3, 3), deform=bend), MPI.COMM_SELF)
+    mesh, tags = fem.build_mesh(
+        BlockMesh(lengths=(1.0,) * 3, divisions=(3, 3, 3), deform=bend), MPI.COMM_SELF
+    )
 
     def push(x: Any, t: float) -> Any:
         return np.tile([3.0e3, 0.0, -4.0e3], (len(x), 1))
 
     system = fem.assemble(mesh, SOFT, loads=[fem.Traction(tags["front"], push)])
-    surface = fem.joined_surfaces(*(fem.contact_surface(system, tags[side]) for side in ("back", "right")))
+    surface = fem.joined_surfaces(
+        *(fem.contact_surface(system, tags[side]) for side in ("back", "right"))
+    )
     problem = vc.ContactProblem(system, surface, mass=vc.ConsistentMass())
-    vc.simulate(problem, scheme=vc.Newmark(), dt=DT, steps=2, out=tmp_path, record=[vc.Contact()],
-                fields=fem.XDMF(every=1), progress=False)
+    vc.simulate(
+        problem,
+        scheme=vc.Newmark(),
+        dt=DT,
+        steps=2,
+        out=tmp_path,
+        record=[vc.Contact()],
+        fields=fem.XDMF(every=1),
+        progress=False,
+    )
     run = read_run(tmp_path)
     curved, flat = faces_of(run.contact, read_frames(run).facing(run.contact)[0])
     assert (curved.name, flat.name) == ("curved face", "face towards x")
-    assert len(curved.owners) == len(flat.owners) == 36 and not np.intersect1d(curved.owners, flat.owners).size
+    assert (
+        len(curved.owners) == len(flat.owners) == 36
+        and not np.intersect1d(curved.owners, flat.owners).size
+    )
     assert np.sort([*curved.conditions, *flat.conditions]).tolist() == list(range(32))
     plot_faces(run, tmp_path / "faces.png", times=[2.0 * DT])
     in_space, states = figures[0].axes[:2]
     shown = in_space.collections[0]
-    assert np.asarray(shown.get_array()) == pytest.approx(1e-3 * run.history["pressure"][2, curved.owners])
+    assert np.asarray(shown.get_array()) == pytest.approx(
+        1e-3 * run.history["pressure"][2, curved.owners]
+    )
     corners = shown._vec[:3].T.reshape(-1, 4, 3)
     assert np.array_equal(corners, curved.parts)
     assert [axis.name for axis in figures[0].axes[:4]] == ["3d", "3d", "rectilinear", "rectilinear"]
-    assert np.array_equal(states.collections[0].get_array(), contact_states(run.history)[2, curved.owners])
+    assert np.array_equal(
+        states.collections[0].get_array(), contact_states(run.history)[2, curved.owners]
+    )
     assert [text.get_text() for text in figures[0].legends[0].get_texts()] == ["open", "closed"]
 
 
@@ -196,7 +242,10 @@ def test_deformed_bodies(runs: Any, figures: list[Any], tmp_path: Path) -> None:
     from matplotlib import colormaps
 
     colours = drawn._facecolor3d[:, :3] / colormaps["YlGnBu"](stress[cells] / most)[:, :3]
-    assert np.ptp(colours, axis=1) == pytest.approx(0.0, abs=1e-12) and 0.59 < colours.min() < colours.max() < 1.01
+    assert (
+        np.ptp(colours, axis=1) == pytest.approx(0.0, abs=1e-12)
+        and 0.59 < colours.min() < colours.max() < 1.01
+    )
     assert len(np.unique(drawn._edgecolor3d, axis=0)) == 2  # bodies
     low, high = np.array([getattr(axis, f"get_{letter}lim")() for letter in "xyz"]).T
     assert axis._box_aspect / axis._box_aspect[0] == pytest.approx((high - low) / (high - low)[0])
@@ -204,19 +253,32 @@ def test_deformed_bodies(runs: Any, figures: list[Any], tmp_path: Path) -> None:
 
 def test_points_that_pull() -> None:
     """Held points may pull: then zero is in the middle of the colours, else at their end, where it alone is white."""
-    pulling, pushing = (Painter.of_pressure(1.0e3 * np.array(values)) for values in ((-2.0, 1.0), (0.0, 1.0)))
+    pulling, pushing = (
+        Painter.of_pressure(1.0e3 * np.array(values)) for values in ((-2.0, 1.0), (0.0, 1.0))
+    )
     assert pulling.label == "contact pressure [kPa], negative: pull"
     assert np.asarray(pulling.norm([-2.0, 0.0, 2.0])) == pytest.approx([0.0, 0.5, 1.0])
     assert np.asarray(pushing.norm([0.0, 0.25, 1.0])) == pytest.approx([0.0, 0.5, 1.0])
-    assert np.all(pushing.colours(np.array([0.0, 0.1, 1.0e3])) == 1.0, axis=1).tolist() == [True, False, False]
+    assert np.all(pushing.colours(np.array([0.0, 0.1, 1.0e3])) == 1.0, axis=1).tolist() == [
+        True,
+        False,
+        False,
+    ]
 
 
 def test_moments() -> None:
     """When most happens: the largest uplift, or pressure where all was open at the start, or displacement."""
     t = np.arange(4.0)
-    uplift, pressure, u = np.array([[0.0, 0.1, 0.5, 0.2], [np.nan, 3.0, 1.0, 2.0], [0.0, 1.0, 2.0, -3.0]])
+    uplift, pressure, u = np.array(
+        [[0.0, 0.1, 0.5, 0.2], [np.nan, 3.0, 1.0, 2.0], [0.0, 1.0, 2.0, -3.0]]
+    )
     for less, column, when in (((), "contact_uplift", 2.0), ((1.0,), "contact_max_pressure", 1.0)):
-        history = {"t": t, "contact_uplift": np.append(less, uplift)[:4], "contact_max_pressure": pressure, "u_x_a": u}
+        history = {
+            "t": t,
+            "contact_uplift": np.append(less, uplift)[:4],
+            "contact_max_pressure": pressure,
+            "u_x_a": u,
+        }
         assert leading(history) == (column, when) and moments(history) == [0.0, when, 3.0]
     assert moments({"t": t, "u_x_top": u}) == [0.0, 3.0, 3.0]
     assert moments({"t": t, "iterations": np.zeros(4)}) == [0.0, 0.0, 3.0]
@@ -246,11 +308,16 @@ def test_all_pictures_of_a_run(
     assert min(np.mean(np.abs(one - two)) for one, two in zip(shots, shots[1:], strict=False)) > 0.2
 
 
-def test_films_and_what_is_no_film(runs: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_films_and_what_is_no_film(
+    runs: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A film of bodies whose contact was not recorded; other files, columns and damaged folders in one sentence."""
     run = runs["tetrahedra"]
     with plain_pictures():
-        assert film(replace(run, contact=None), tmp_path / "film.gif", times=[0.03]).stat().st_size > 5000
+        assert (
+            film(replace(run, contact=None), tmp_path / "film.gif", times=[0.03]).stat().st_size
+            > 5000
+        )
     with pytest.raises(InputError, match=r"'film\.avi' is not a .gif or .mp4"):
         film(run, tmp_path / "film.avi")
     monkeypatch.setattr("matplotlib.animation.FFMpegWriter.isAvailable", lambda: False)
@@ -277,7 +344,9 @@ def test_films_and_what_is_no_film(runs: Any, tmp_path: Path, monkeypatch: pytes
 def test_a_film_of_ffmpeg(runs: Any, tmp_path: Path) -> None:
     if shutil.which("ffmpeg") is None:
         pytest.skip("no ffmpeg here: apt-get install ffmpeg brings it")
-    found = film(runs["hexahedra"], tmp_path / "film.mp4", times=[0.012, 0.03], title="A long title " * 9).read_bytes()
+    found = film(
+        runs["hexahedra"], tmp_path / "film.mp4", times=[0.012, 0.03], title="A long title " * 9
+    ).read_bytes()
     assert found[4:8] == b"ftyp" and len(found) > 3_000
 
 
@@ -288,7 +357,12 @@ def test_rendering(runs: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
 
     class PolyData:
         def __init__(self, points: Any, faces: Any) -> None:
-            self.points, self.faces, self.cell_data, self.point_data = points, faces.reshape(-1, 4), {}, {}
+            self.points, self.faces, self.cell_data, self.point_data = (
+                points,
+                faces.reshape(-1, 4),
+                {},
+                {},
+            )
 
     class Plotter:
         def __init__(self, off_screen: bool) -> None:
@@ -298,14 +372,19 @@ def test_rendering(runs: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
             return lambda *data, **look: calls.append((name, *data))
 
     monkeypatch.setitem(sys.modules, "pyvista", SimpleNamespace(PolyData=PolyData, Plotter=Plotter))
-    assert render_deformed(run, tmp_path / "bodies.png", t=0.0205, magnified=3.0) == tmp_path / "bodies.png"
+    assert (
+        render_deformed(run, tmp_path / "bodies.png", t=0.0205, magnified=3.0)
+        == tmp_path / "bodies.png"
+    )
     (_, skin), (_, face) = (call for call in calls if call[0] == "add_mesh")
     assert [call[0] for call in calls[-2:]] == ["screenshot", "close"]
     assert ("add_text", "t = 0.021 s, displacements x 3") in calls
     _, u, stress = frames.at(0.021)
     sides, cells = frames.boundary
     moved = frames.points + 3.0 * u
-    assert np.all(skin.faces[:, 0] == 3) and np.array_equal(skin.points[skin.faces[:, 1:]], moved[sides])
+    assert np.all(skin.faces[:, 0] == 3) and np.array_equal(
+        skin.points[skin.faces[:, 1:]], moved[sides]
+    )
     assert np.array_equal(skin.cell_data["von Mises stress [Pa]"], stress[cells])
     facing, nodes = frames.facing(run.contact)
     assert np.array_equal(face.points, moved[nodes]) and np.array_equal(face.faces[:, 1:], facing)
@@ -315,7 +394,9 @@ def test_rendering(runs: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
         render_deformed(run, tmp_path / "none.png", t=0.0)
 
 
-@pytest.mark.parametrize("high", [(0.5, 6.0), (0.1, 6.0), (2.0, 6.0), (4.0, 6.0), (6.0, 0.5), (1.3, 1.0)])
+@pytest.mark.parametrize(
+    "high", [(0.5, 6.0), (0.1, 6.0), (2.0, 6.0), (4.0, 6.0), (6.0, 0.5), (1.3, 1.0)]
+)
 def test_numbers_on_slender_panels_do_not_overlap(high: tuple[float, float]) -> None:
     """In panels of the size of plot_deformed, with the body displaced to negative x; some numbers are left."""
     figure, axes = faces.sheet([True], 1, (4.2, 3.8))
@@ -324,6 +405,9 @@ def test_numbers_on_slender_panels_do_not_overlap(high: tuple[float, float]) -> 
     figure.draw_without_rendering()
     for line, side in ((axis.xaxis, 0), (axis.yaxis, 1)):
         low, top = line.get_view_interval()
-        drawn = [label.get_window_extent() for tick, label in zip(line.get_majorticklocs(), line.get_ticklabels(),
-                                                                  strict=True) if low <= tick <= top]
+        drawn = [
+            label.get_window_extent()
+            for tick, label in zip(line.get_majorticklocs(), line.get_ticklabels(), strict=True)
+            if low <= tick <= top
+        ]
         assert drawn and all(one.max[side] < after.min[side] for one, after in pairwise(drawn))

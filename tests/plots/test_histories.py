@@ -26,7 +26,10 @@ def history(n: int = 401, m: int = 11) -> dict[str, Any]:
     pressure = np.maximum(push[:, None] - share[::-1] / 2.0, 0.0) * 3e5
     found = {"t": t, "a_g_x": wave, "a_g_y": np.zeros(n), "pressure": pressure}
     found["contact_uplift"] = np.mean(pressure == 0.0, axis=1)
-    found |= {f"u_x_{label}": -(i + 1) * 2e-5 * np.maximum(-wave, -0.1 * i) for i, label in enumerate(("4", "6", "12"))}
+    found |= {
+        f"u_x_{label}": -(i + 1) * 2e-5 * np.maximum(-wave, -0.1 * i)
+        for i, label in enumerate(("4", "6", "12"))
+    }
     found["work_input"] = 2e3 * np.cumsum(push) / n
     found["energy_kinetic"] = 400.0 * wave**2
     found["energy_strain"] = 400.0 * (1.0 - wave**2)
@@ -55,7 +58,13 @@ DRAW = {
     "certificate": plotting.plot_certificate,
     "contact": lambda h, path: plotting.plot_contact(h, path, position=np.linspace(0.75, 8.25, 11)),
 }
-PANELS = {"points": 3, "excitation": 1, "energy": 2, "certificate": 2, "contact": 3}  # the colour bar is an axis too
+PANELS = {
+    "points": 3,
+    "excitation": 1,
+    "energy": 2,
+    "certificate": 2,
+    "contact": 3,
+}  # the colour bar is an axis too
 
 
 @pytest.mark.parametrize("name", DRAW)
@@ -68,7 +77,9 @@ def test_every_picture_is_written_and_every_axis_labelled(name, tmp_path, figure
     axes = figures[0].axes
     assert len(axes) == PANELS[name]
     assert all(axis.get_ylabel() for axis in axes)
-    assert axes[len(axes) - 1 - (name == "contact")].get_xlabel() == "time [s]"  # shared by the panels above
+    assert (
+        axes[len(axes) - 1 - (name == "contact")].get_xlabel() == "time [s]"
+    )  # shared by the panels above
     assert all("[" in axis.get_ylabel() for axis in axes)  # with its unit
     assert figures[0]._suptitle if name == "points" else axes[0].get_title()
 
@@ -94,7 +105,13 @@ def test_energy_terms_share_one_unit(tmp_path, figures):
     plotting.plot_energy(h, tmp_path / "e.png")
     top, bottom = figures[0].axes
     assert "[J]" in top.get_ylabel()
-    assert set(lines(top)) == {"input work", "kinetic", "strain", "contact work", "impact loss"}  # the others are zero
+    assert set(lines(top)) == {
+        "input work",
+        "kinetic",
+        "strain",
+        "contact work",
+        "impact loss",
+    }  # the others are zero
     np.testing.assert_allclose(lines(top)["kinetic"], h["energy_kinetic"])
     assert bottom.get_yscale() == "log"
     for name in [name for name in h if name.startswith(("energy", "loss", "work"))]:
@@ -105,14 +122,25 @@ def test_energy_terms_share_one_unit(tmp_path, figures):
 
 
 def test_length_unit():
-    sizes = {2.0: "m", 1.0: "m", 0.5: "mm", 2e-3: "mm", 9e-5: "µm", 3e-8: "nm", 1e-12: "nm", 0.0: "m"}
+    sizes = {
+        2.0: "m",
+        1.0: "m",
+        0.5: "mm",
+        2e-3: "mm",
+        9e-5: "µm",
+        3e-8: "nm",
+        1e-12: "nm",
+        0.0: "m",
+    }
     assert {size: plotting.length_unit(size)[1] for size in sizes} == sizes
 
 
 def test_nothing_happened(tmp_path):
     """All zeros, and a single step: drawn without a warning; the many zeros without the care for how they look."""
     for n in (2, 401):
-        h = {name: np.zeros_like(values) for name, values in history(n).items()} | {"t": np.linspace(0.0, 1.0, n)}
+        h = {name: np.zeros_like(values) for name, values in history(n).items()} | {
+            "t": np.linspace(0.0, 1.0, n)
+        }
         with warnings.catch_warnings(), plain_pictures() if n > 2 else nullcontext():
             warnings.simplefilter("error")
             for name, draw in DRAW.items():

@@ -18,8 +18,15 @@ SHAKE = vc.Harmonic(-30.0, 3.0, direction=(1.0,))
 
 
 def run(*record: Any, steps: int = 40, **more: Any) -> vc.Solution:
-    return vc.simulate(chain_problem(5, gap=1e-3, excitation=SHAKE), dt=5e-3, steps=steps, record=record, **more,
-                       scheme=vc.ZienkiewiczWoodTaylor(), progress=False)
+    return vc.simulate(
+        chain_problem(5, gap=1e-3, excitation=SHAKE),
+        dt=5e-3,
+        steps=steps,
+        record=record,
+        **more,
+        scheme=vc.ZienkiewiczWoodTaylor(),
+        progress=False,
+    )
 
 
 def curves(axis: Any) -> dict[str, Any]:
@@ -33,8 +40,12 @@ def test_probes_force_ledger_and_certificates(tmp_path: Path) -> None:
         figure = one.plot() if one is solution else plot_overview(one)
         assert isinstance(figure, Figure)
         labels = [f"{axis.get_title(loc='left')} {axis.get_ylabel()}" for axis in figure.axes]
-        assert labels == ["displacement [mm]", "contact force [N]", "energy [J]",
-                          "certificate of every step worst residual [-]"]
+        assert labels == [
+            "displacement [mm]",
+            "contact force [N]",
+            "energy [J]",
+            "certificate of every step worst residual [-]",
+        ]
         assert figure.axes[-1].get_xlabel() == "time [s]"
         probe, force, energy, certificate = map(curves, figure.axes)
         assert probe["u_x_end"] == pytest.approx(1e3 * one.history["u_x_end"], rel=1e-12)

@@ -50,8 +50,15 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[ChannelModel, Any, Pa
     problem = model.problem(excitation=model.channel.harmonic(4.0))
     state = static_equilibrium(problem, solver=vc.Condensed())
     history = vc.simulate(
-        problem, scheme=vc.ZienkiewiczWoodTaylor(phi=0.5), dt=1.0 / 80.0, steps=STEPS, state=state,
-        record=model.recorders(), fields=fem.XDMF(every=4), out=folder, progress=False,
+        problem,
+        scheme=vc.ZienkiewiczWoodTaylor(phi=0.5),
+        dt=1.0 / 80.0,
+        steps=STEPS,
+        state=state,
+        record=model.recorders(),
+        fields=fem.XDMF(every=4),
+        out=folder,
+        progress=False,
     ).history
     assert min(float(history[f"opening_{side}"].max()) for side in ("left", "right")) > 1e-5
     return model, history, folder
@@ -73,7 +80,9 @@ def check(path: Path, figure: Any) -> None:
     for axis in figure.axes:
         assert axis.has_data() or axis.get_label() == "<colorbar>"
         own = [axis.get_ylabel(), axis.get_xlabel()]
-        shared = [text.get_text() for text in (figure._supxlabel, figure._supylabel) if text is not None]
+        shared = [
+            text.get_text() for text in (figure._supxlabel, figure._supylabel) if text is not None
+        ]
         assert any("[" in label for label in own + shared)
 
 
@@ -81,10 +90,19 @@ def test_the_outline_runs_down_along_and_up(run: Any) -> None:
     """Left wall 0 to 3 m, base to 7 m, right wall to 10 m; conditions at a corner in the order of their sides."""
     model, _, _ = run
     found = outline(model)
-    places = dict(zip(model.sides, (model.surface.points[mask].T for mask in model.sides.values()), strict=True))
+    places = dict(
+        zip(
+            model.sides,
+            (model.surface.points[mask].T for mask in model.sides.values()),
+            strict=True,
+        )
+    )
     x, y = SHAPE.x, SHAPE.y
-    for side, arc in (("left", y[3] - places["left"][1]), ("base", 3.0 + places["base"][0] - x[1]),
-                      ("right", 7.0 + places["right"][1] - y[1])):
+    for side, arc in (
+        ("left", y[3] - places["left"][1]),
+        ("base", 3.0 + places["base"][0] - x[1]),
+        ("right", 7.0 + places["right"][1] - y[1]),
+    ):
         np.testing.assert_allclose(found.arc[model.sides[side]], arc, atol=1e-12)
     for name, side in (("left wall", "left"), ("base", "base"), ("right wall", "right")):
         assert np.array_equal(found.sides[name], model.sides[side])
@@ -101,7 +119,9 @@ def test_openings_are_the_gaps_of_the_contact(run: Any, tmp_path: Path, figures:
     """V4.2, Fig. 7: at every point and normal the gap that Contact() records; drawn in millimetres."""
     model, history, _ = run
     gaps, compared = np.reshape(history["gap"], (STEPS + 1, -1)), 0
-    for label, normal in [(label, normal) for row in SHOWN.values() for label, normal in row.items()]:
+    for label, normal in [
+        (label, normal) for row in SHOWN.values() for label, normal in row.items()
+    ]:
         at = np.linalg.norm(model.surface.points - model.channel.point(int(label)), axis=1)
         facing = model.surface.normals @ normal > 0.5
         here = int(np.argmin(np.where(facing, at, np.inf)))
@@ -127,7 +147,10 @@ def test_rocking_and_runs_beside_each_other(run: Any, tmp_path: Path, figures: l
     (left, right, static, rocking, common) = curves
     np.testing.assert_allclose(rocking + common + static[0], right, atol=1e-9)
     np.testing.assert_allclose(common + static[0] - rocking, left, atol=1e-9)
-    check(plot_beside({"a": history, "b": history}, "b", tmp_path / "beside.png", title="Two runs"), figures[1])
+    check(
+        plot_beside({"a": history, "b": history}, "b", tmp_path / "beside.png", title="Two runs"),
+        figures[1],
+    )
     assert len(figures[1].axes) == 4
     assert [line.get_label() for line in figures[1].axes[0].lines] == ["b", "a"]
 
@@ -139,13 +162,20 @@ def test_maps_and_envelopes(run: Any, tmp_path: Path, figures: list[Any]) -> Non
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check(plot_interface(runs, outline(model), tmp_path / "map.png", title="Map"), figures[0])
-        check(plot_envelope(runs, outline(model), tmp_path / "envelope.png", title="Envelope"), figures[1])
-    gap, pressure = (np.ma.filled(image.get_array(), np.nan) for image in figures[0].axes[0].collections[:2])
+        check(
+            plot_envelope(runs, outline(model), tmp_path / "envelope.png", title="Envelope"),
+            figures[1],
+        )
+    gap, pressure = (
+        np.ma.filled(image.get_array(), np.nan) for image in figures[0].axes[0].collections[:2]
+    )
     assert gap.size == model.surface.count * (STEPS + 1)
     assert np.all(np.isfinite(gap) != np.isfinite(pressure)) and np.isfinite(gap).any()
     assert np.nanmax(gap) == pytest.approx(1e3 * np.max(history["gap"]))
     drawn = [line.get_ydata() for line in figures[1].axes[0].lines if line.get_marker() == "."]
-    assert max(float(values.max()) for values in drawn) == pytest.approx(1e-3 * np.max(history["pressure"]))
+    assert max(float(values.max()) for values in drawn) == pytest.approx(
+        1e-3 * np.max(history["pressure"])
+    )
 
 
 def test_layout_and_moments(run: Any, tmp_path: Path, figures: list[Any]) -> None:
@@ -156,12 +186,24 @@ def test_layout_and_moments(run: Any, tmp_path: Path, figures: list[Any]) -> Non
     assert np.sum(np.prod(sizes, axis=1)) == pytest.approx(4.0 * 3.0 - 3.0 * 2.5)  # m² of concrete
     np.testing.assert_allclose(bodies.frames.points[bodies.nodes], model.surface.points, atol=1e-12)
     points = {str(number): model.channel.point(number) for number in range(1, 20)}
-    path = plot_layout(folder, points, tmp_path / "layout.png", title="Layout", soil="soil", concrete="c",
-                       ends="ends")
+    path = plot_layout(
+        folder,
+        points,
+        tmp_path / "layout.png",
+        title="Layout",
+        soil="soil",
+        concrete="c",
+        ends="ends",
+    )
     check(path, figures[0])
     assert {text.get_text() for text in figures[0].axes[0].texts} >= set(points)
-    path = plot_moments({"one": folder, "two": folder}, (0.1, 0.21), tmp_path / "moments.png", title="Moments",
-                        magnified=300.0)
+    path = plot_moments(
+        {"one": folder, "two": folder},
+        (0.1, 0.21),
+        tmp_path / "moments.png",
+        title="Moments",
+        magnified=300.0,
+    )
     check(path, figures[1])
     assert figures[1].axes[1].get_title() == "one, t = 0.2 s"
 
@@ -172,7 +214,10 @@ def test_the_film(run: Any, tmp_path: Path) -> None:
 
     _, history, folder = run
     arguments: dict[str, Any] = {
-        "title": "film", "magnified": 300.0, "history": history, "times": (0.05, 0.15, 0.2),
+        "title": "film",
+        "magnified": 300.0,
+        "history": history,
+        "times": (0.05, 0.15, 0.2),
         "openings": {"top": opening(history, "19", (-1.0, 0.0))},
     }
     path = animate(folder, tmp_path / "channel.gif", **arguments)
@@ -193,6 +238,15 @@ def test_pictures_of_a_plane_run_from_its_folder_alone(run: Any, tmp_path: Path)
     read = read_run(run[2])
     with plain_pictures():  # how they are arranged is seen above
         drawn = draw_run(read, tmp_path, title="Channel")
-        drawn += [film(read, tmp_path / "film.gif"), *draw_histories(read.history, read.contact, tmp_path, title="$")]
-    assert {path.name for path in drawn} >= {"deformed.png", "film.gif", "excitation.png", "energy.png", "contact.png"}
+        drawn += [
+            film(read, tmp_path / "film.gif"),
+            *draw_histories(read.history, read.contact, tmp_path, title="$"),
+        ]
+    assert {path.name for path in drawn} >= {
+        "deformed.png",
+        "film.gif",
+        "excitation.png",
+        "energy.png",
+        "contact.png",
+    }
     assert all(path.stat().st_size > 3_000 for path in drawn)

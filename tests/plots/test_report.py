@@ -39,18 +39,26 @@ def solved(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, vc.Solution]
     """A chain that bounces between walls for 300 steps, in a folder."""
     folder = tmp_path_factory.mktemp("run") / "chain"
     shake = vc.Ricker(3.0, 6.0, direction=(1.0,))
-    problem = chain_problem(3, gap=1e-3, left_gap=2e-3, excitation=shake, consistent=True, damping=1e-3)
+    problem = chain_problem(
+        3, gap=1e-3, left_gap=2e-3, excitation=shake, consistent=True, damping=1e-3
+    )
     right = engineering.Resultants("right", (0.0,), where=lambda x, n: n[:, 0] > 0.0)
     record = [vc.Energy(), vc.Contact(), vc.Probe({"end": (3.0,)}, acceleration=True), right]
     scheme = vc.ZienkiewiczWoodTaylor()
-    run = vc.simulate(problem, scheme=scheme, dt=5e-3, steps=300, record=record, out=folder, progress=False)
+    run = vc.simulate(
+        problem, scheme=scheme, dt=5e-3, steps=300, record=record, out=folder, progress=False
+    )
     return folder, run
 
 
 def channel(run: RunFolder, rows: int = 50) -> RunFolder:
     """The same facts with a U-shaped contact line that opens from the top."""
-    x = np.array([[0.0, 2.0], [0.0, 1.0], [0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 1.0], [2.0, 2.0]])
-    contact = ContactGeometry(x, np.tile([-1.0, 0.0], (7, 1)), np.ones(7), np.zeros(7), np.zeros(7, dtype=bool))
+    x = np.array(
+        [[0.0, 2.0], [0.0, 1.0], [0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 1.0], [2.0, 2.0]]
+    )
+    contact = ContactGeometry(
+        x, np.tile([-1.0, 0.0], (7, 1)), np.ones(7), np.zeros(7), np.zeros(7, dtype=bool)
+    )
     t = run.history["t"][:rows]
     wave = np.sin(20.0 * t)[:, None] * (1.0 + x[:, 1])
     arrays = {"pressure": 1e4 * np.maximum(wave, 0.0), "gap": 1e-4 * np.maximum(-wave, 0.0)}
@@ -65,7 +73,9 @@ def test_a_folder_holds_what_the_run_returned(solved: tuple[Path, vc.Solution]) 
     for name, values in run.history.items():
         assert np.array_equal(read.history[name], values, equal_nan=True), name
     assert read.facts["steps"] == 300 and read.contact is not None
-    again = engineering.contact_summary(read.history, read.contact, centre=(0.0,), where=lambda x, n: n[:, 0] > 0.0)
+    again = engineering.contact_summary(
+        read.history, read.contact, centre=(0.0,), where=lambda x, n: n[:, 0] > 0.0
+    )
     assert np.array_equal(again["N"], run.history["N_right"])
 
 
@@ -86,29 +96,43 @@ def test_killed_and_damaged_runs(solved: tuple[Path, vc.Solution], tmp_path: Pat
         read_run(tmp_path / "nothing")
 
 
-def pages(run: RunFolder, path: Path, monkeypatch: pytest.MonkeyPatch, sections: list[Section]) -> tuple[Any, Any]:
+def pages(
+    run: RunFolder, path: Path, monkeypatch: pytest.MonkeyPatch, sections: list[Section]
+) -> tuple[Any, Any]:
     """(axes, all words) of the pages."""
     from matplotlib.backends.backend_pdf import PdfPages
     from matplotlib.text import Text
 
     kept: list[Any] = []
     save = PdfPages.savefig
-    monkeypatch.setattr(PdfPages, "savefig", lambda self, figure: (kept.append(figure), save(self, figure)))
+    monkeypatch.setattr(
+        PdfPages, "savefig", lambda self, figure: (kept.append(figure), save(self, figure))
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         write_pages(path, "A channel $x", header_facts(run), sections, "vi_contact")
-    axes = [axis for figure in kept for axis in figure.axes if axis.axison and not hasattr(axis, "_colorbar")]
+    axes = [
+        axis
+        for figure in kept
+        for axis in figure.axes
+        if axis.axison and not hasattr(axis, "_colorbar")
+    ]
     return axes, [one.get_text() for figure in kept for one in figure.findobj(Text)]
 
 
-def test_pages_of_a_channel(solved: tuple[Path, vc.Solution], monkeypatch: Any, tmp_path: Path) -> None:
+def test_pages_of_a_channel(
+    solved: tuple[Path, vc.Solution], monkeypatch: Any, tmp_path: Path
+) -> None:
     """Every axis is labelled and holds something, maps go by arc length, texts stay on the page; no warnings."""
     run = channel(read_run(solved[0]))
     sections = sections_of(run, {})
     axes, words = pages(run, tmp_path / "page.pdf", monkeypatch, sections)
     assert [one.title for one in sections] == [
-        "Ground motion", "Base shear, thrust, uplift and sliding",
-        "Accelerations, low-passed and raw", "Histories", "Certificate and energies in words",
+        "Ground motion",
+        "Base shear, thrust, uplift and sliding",
+        "Accelerations, low-passed and raw",
+        "Histories",
+        "Certificate and energies in words",
         "Peak values of all columns",
     ]
     charts = sum(len(one.charts) + len(one.drawings) for one in sections)
@@ -117,12 +141,24 @@ def test_pages_of_a_channel(solved: tuple[Path, vc.Solution], monkeypatch: Any, 
         assert axis.get_xlabel() and axis.get_ylabel() and (axis.lines or axis.collections)
         box = axis.get_tightbbox()
         size = axis.figure.bbox
-        assert box.x0 > 0.0 and box.x1 < size.x1 and box.y0 > 0.0 and box.y1 < size.y1, axis.get_title(loc="left")
+        assert box.x0 > 0.0 and box.x1 < size.x1 and box.y0 > 0.0 and box.y1 < size.y1, (
+            axis.get_title(loc="left")
+        )
     assert sum(axis.get_ylabel() == "arc length [m]" for axis in axes) == 2
     said = " ".join(words).replace("\n", " ")
     worst = run.history["certificate"].max()
-    for word in ("A channel $x", f"{run.facts['energy_defect']:.4g}", f"{worst:.1e}", "0.005 s", "a_g_x",
-                 "ZienkiewiczWoodTaylor", "contact_resultant", "u_x_end", "not convergent", "1e-09 was"):
+    for word in (
+        "A channel $x",
+        f"{run.facts['energy_defect']:.4g}",
+        f"{worst:.1e}",
+        "0.005 s",
+        "a_g_x",
+        "ZienkiewiczWoodTaylor",
+        "contact_resultant",
+        "u_x_end",
+        "not convergent",
+        "1e-09 was",
+    ):
         assert word in said, word
     assert f"{run.history['u_x_end'].max():.4g}" in said
     assert (tmp_path / "page.pdf").read_bytes()[:5] == b"%PDF-"
@@ -132,16 +168,29 @@ def test_what_was_not_recorded_has_no_section(solved: tuple[Path, vc.Solution]) 
     """A run that recorded one probe and was not shaken: its history, the certificates, the peaks; chosen columns."""
     run = read_run(solved[0])
     names = ("t", "k", "iterations", "certificate", "escalated", "a_g_x", "u_x_end")
-    bare = replace(run, history={name: run.history[name] for name in names} | {"a_g_x": np.zeros(301)}, contact=None,
-                   columns={name: run.columns[name] for name in names})
+    bare = replace(
+        run,
+        history={name: run.history[name] for name in names} | {"a_g_x": np.zeros(301)},
+        contact=None,
+        columns={name: run.columns[name] for name in names},
+    )
     found = sections_of(bare, {})
-    assert [one.title for one in found] == ["Histories", "Certificate and energies in words",
-                                            "Peak values of all columns"]
-    assert [chart.title for one in found for chart in one.charts] == ["displacement", "certificate of every step"]
+    assert [one.title for one in found] == [
+        "Histories",
+        "Certificate and energies in words",
+        "Peak values of all columns",
+    ]
+    assert [chart.title for one in found for chart in one.charts] == [
+        "displacement",
+        "certificate of every step",
+    ]
     chosen = sections_of(run, {}, [["N_right", "contact_resultant"]])
     (histories,) = (one for one in chosen if one.title == "Histories")
     assert [chart.title for chart in histories.charts] == ["N_right, contact_resultant"]
-    for columns, text in (([["nonsense"]], "no column 'nonsense'"), ([["N_right", "u_x_end"]], "different units")):
+    for columns, text in (
+        ([["nonsense"]], "no column 'nonsense'"),
+        ([["N_right", "u_x_end"]], "different units"),
+    ):
         with pytest.raises(InputError, match=text):
             sections_of(run, {}, columns)
     with pytest.raises(InputError, match="is not an .html or .pdf file"):
@@ -165,24 +214,43 @@ def test_numbers_of_the_report(tmp_path: Path) -> None:
     jump = np.zeros(n)
     jump[700] = 300.0
     columns = {
-        "a_g_x": ("m/s2", "ground", 2.0 * np.sin(2.0 * np.pi * t)), "reaction_x_base": ("N", "shear", -3.0 * thrust),
-        "N_stem": ("N", "thrust", thrust), "T_stem": ("N", "shear", -0.2 * thrust),
-        "height_stem": ("m", "height", np.where(t < 0.02, np.nan, 1.0 + t)), "sliding_stem": ("m", "slip", 1e-3 * t),
-        "margin_stem": ("-", "margin", np.where(t < 0.02, np.nan, 0.6 + 0.2 * np.cos(np.pi * t / t[-1]))),
+        "a_g_x": ("m/s2", "ground", 2.0 * np.sin(2.0 * np.pi * t)),
+        "reaction_x_base": ("N", "shear", -3.0 * thrust),
+        "N_stem": ("N", "thrust", thrust),
+        "T_stem": ("N", "shear", -0.2 * thrust),
+        "height_stem": ("m", "height", np.where(t < 0.02, np.nan, 1.0 + t)),
+        "sliding_stem": ("m", "slip", 1e-3 * t),
+        "margin_stem": (
+            "-",
+            "margin",
+            np.where(t < 0.02, np.nan, 0.6 + 0.2 * np.cos(np.pi * t / t[-1])),
+        ),
         "a_x_top": ("m/s2", "acceleration", 4.0 * np.sin(4.0 * np.pi * t) + jump),
-        "energy_kinetic": ("J", "kinetic", np.full(n, 3.0)), "energy_strain": ("J", "strain", np.full(n, 5.0)),
-        "work_input": ("J", "work", 2.0 * t), "energy_defect": ("J", "defect", np.full(n, 8e-13)),
+        "energy_kinetic": ("J", "kinetic", np.full(n, 3.0)),
+        "energy_strain": ("J", "strain", np.full(n, 5.0)),
+        "work_input": ("J", "work", 2.0 * t),
+        "energy_defect": ("J", "defect", np.full(n, 8e-13)),
     }
     found = sections_of(read_run(write_run(tmp_path / "run", columns, dt=dt)), {})
     rows = table(found, "Base shear")
-    assert rows["reaction_x_base"]["largest in size"] == "-600" and rows["reaction_x_base"]["unit"] == "kN"
+    assert (
+        rows["reaction_x_base"]["largest in size"] == "-600"
+        and rows["reaction_x_base"]["unit"] == "kN"
+    )
     assert rows["N_stem"]["largest in size"] == "200" and rows["N_stem"]["at t [s]"] == "5"
-    assert rows["height_stem"]["largest in size"] == "6" and rows["sliding_stem"]["at the end"] == "10"
+    assert (
+        rows["height_stem"]["largest in size"] == "6" and rows["sliding_stem"]["at the end"] == "10"
+    )
     assert rows["sliding_stem"]["at the start"] == "0" and rows["sliding_stem"]["unit"] == "mm"
     safety = table(found, "Base shear", 1)["stem"]
-    assert safety["factor of safety against sliding, smallest"] == "1.667" == safety["at the end"]  # 1 / (1 - 0.4)
+    assert (
+        safety["factor of safety against sliding, smallest"] == "1.667" == safety["at the end"]
+    )  # 1 / (1 - 0.4)
     (row,) = table(found, "Accelerations").values()
-    low, raw = (float(row[name]) for name in ("peak below 25 Hz [m/s²]", "raw peak, not convergent at impacts [m/s²]"))
+    low, raw = (
+        float(row[name])
+        for name in ("peak below 25 Hz [m/s²]", "raw peak, not convergent at impacts [m/s²]")
+    )
     assert raw == pytest.approx(300.0)  # the sine is zero there
     fall = 2.0 * 25.0 * (np.pi / 8.0) / np.sin(np.pi / 8.0)  # ∫ df / (1 + (f / 25 Hz)⁸)
     assert low == pytest.approx(300.0 * dt * fall, rel=0.05)
@@ -190,7 +258,9 @@ def test_numbers_of_the_report(tmp_path: Path) -> None:
     (_, spectrum) = motion.charts
     full = spectrum.lines[1]
     assert full.x[0] == pytest.approx(0.02) and spectrum.lines[0].x[0] >= 10.0 * dt > full.x[0]
-    assert full.y[0] * G == pytest.approx(2.0, rel=0.02)  # stiff oscillators feel the ground's own peak
+    assert full.y[0] * G == pytest.approx(
+        2.0, rel=0.02
+    )  # stiff oscillators feel the ground's own peak
     assert table(found, "Certificate")["kinetic"]["over the largest energy"] == "0.375"
     (certificate,) = (one for one in found if one.title.startswith("Certificate"))
     assert "1.0e-13 of the largest energy (8 J)" in certificate.sentences[2]
@@ -203,7 +273,13 @@ def test_low_passed_peaks_converge_where_raw_ones_do_not() -> None:
     for dt in (4e-3, 2e-3, 1e-3):
         a = np.zeros(round(4.0 / dt) + 1)
         a[len(a) // 2] = 1.0 / dt
-        run = RunFolder(Path(), {"t": dt * np.arange(len(a)), "a_x_top": a}, {"a_x_top": ("m/s2", "a")}, {}, None)
+        run = RunFolder(
+            Path(),
+            {"t": dt * np.arange(len(a)), "a_x_top": a},
+            {"a_x_top": ("m/s2", "a")},
+            {},
+            None,
+        )
         raw, low, corner = smoothed(run, "a_x_top")
         assert raw.acceleration.max() == 1.0 / dt and corner == 25.0
         found.append(low.acceleration.max())
@@ -216,11 +292,28 @@ def test_the_model_as_it_was_described(tmp_path: Path) -> None:
     """Bodies, supports, contact, periods and sketch of model.json; odd and damaged ones are no tracebacks."""
     wave = np.sin(np.arange(40.0))
     model = {
-        "title": "$", "dimension": 2, "mass": 1.5e4, "periods": [0.5, 0.25, 0.125], "warnings": ["dt is long"],
-        "bodies": [{"name": "wall", "cells": 8, "mass": 1.5e4, "material": {"name": "C30", "E": 3e10}}],
+        "title": "$",
+        "dimension": 2,
+        "mass": 1.5e4,
+        "periods": [0.5, 0.25, 0.125],
+        "warnings": ["dt is long"],
+        "bodies": [
+            {"name": "wall", "cells": 8, "mass": 1.5e4, "material": {"name": "C30", "E": 3e10}}
+        ],
         "supports": [{"kind": "clamped", "groups": ["base", "toe"], "components": ["x", "y"]}],
-        "contact": [{"name": "stem", "points": 2, "size": 4.0, "friction": "0.5", "places": [[0.0, 1.0], [0.0, 2.0]]}],
-        "outline": [{"group": "base", "lines": [[0.0, 0.0, 3.0, 0.0]]}, {"group": "", "lines": [[0, 0, 0, 4.0]]}],
+        "contact": [
+            {
+                "name": "stem",
+                "points": 2,
+                "size": 4.0,
+                "friction": "0.5",
+                "places": [[0.0, 1.0], [0.0, 2.0]],
+            }
+        ],
+        "outline": [
+            {"group": "base", "lines": [[0.0, 0.0, 3.0, 0.0]]},
+            {"group": "", "lines": [[0, 0, 0, 4.0]]},
+        ],
     }
     folder = write_run(tmp_path / "run", {"u_x_top": ("m", "u", wave)}, dt=0.1, model=model)
     run = read_run(folder)
@@ -228,7 +321,9 @@ def test_the_model_as_it_was_described(tmp_path: Path) -> None:
     assert section.sentences[-2].endswith("at the start: 0.5, 0.25, 0.125 s.")
     assert section.sentences[-1] == "Warning: dt is long."
     assert [list(one.header) for one in section.tables] == [
-        ["name", "cells", "mass", "material"], ["kind", "groups", "components"], ["name", "points", "size", "friction"]
+        ["name", "cells", "mass", "material"],
+        ["kind", "groups", "components"],
+        ["name", "points", "size", "friction"],
     ]
     assert section.tables[0].rows[0][-1] == "name = C30, E = 3e+10"
     _, written = report(folder, out=tmp_path / "page.pdf")
@@ -245,7 +340,9 @@ def test_the_model_as_it_was_described(tmp_path: Path) -> None:
 
 
 def test_commands(
-    solved: tuple[Path, vc.Solution], capsys: pytest.CaptureFixture[str], tmp_path: Path,
+    solved: tuple[Path, vc.Solution],
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Every command writes what it says; mistakes are one sentence."""
@@ -259,19 +356,27 @@ def test_commands(
     assert main(["post", "peaks", str(folder), "u_x_end", "--out", str(tmp_path / "p.csv")]) == 0
     name, quantity, unit, high, *_ = (tmp_path / "p.csv").read_text().splitlines()[1].split(",")
     assert (name, unit, float(high)) == ("u_x_end", "m", run.history["u_x_end"].max())
-    assert main(["post", "spectrum", str(folder), "a_x_end", "a_g_x", "--periods", "0.05", "1", "20"]) == 0
+    assert (
+        main(["post", "spectrum", str(folder), "a_x_end", "a_g_x", "--periods", "0.05", "1", "20"])
+        == 0
+    )
     assert (folder / "spectrum.csv").read_text().count("\n") == 41
     assert main(["post", "transfer", str(folder), "a_x_end"]) == 0
     assert main(["post", "loop", str(folder), "u_x_end", "N_right"]) == 0
     for picture in ("spectrum.png", "transfer.png", "loop.png"):
         assert (folder / picture).stat().st_size > 10_000
     capsys.readouterr()
-    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)  # without the packages that web pages need
+    monkeypatch.setattr(
+        "importlib.util.find_spec", lambda _: None
+    )  # without the packages that web pages need
     before = sorted(tmp_path.iterdir())
     for wrong, text in (
         (["report", str(tmp_path)], "no history.csv"),
         (["report", str(folder), "--out", str(tmp_path / "no" / "page.pdf")], "folder that exists"),
-        (["report", str(folder), "--out", str(tmp_path / "page.svg")], "is not an .html or .pdf file"),
+        (
+            ["report", str(folder), "--out", str(tmp_path / "page.svg")],
+            "is not an .html or .pdf file",
+        ),
         (["report", str(folder), "--out", str(tmp_path / "page.html")], "needs jinja2 and plotly"),
         (["report", str(folder), "--refine"], "holds no case.toml"),
         (["plot", str(folder)], "no frames in"),
@@ -288,14 +393,20 @@ def test_commands(
 def test_example_of_the_documentation(tmp_path: Path) -> None:
     """It continues README's problem: records everything, reads it back, and the page shows it."""
     pytest.importorskip("dolfinx")
-    (code,) = re.findall(r"^```python\n(.*?)^```$", (ROOT / "README.md").read_text(), re.MULTILINE | re.DOTALL)
+    (code,) = re.findall(
+        r"^```python\n(.*?)^```$", (ROOT / "README.md").read_text(), re.MULTILINE | re.DOTALL
+    )
     document = (ROOT / "docs" / "guide" / "outputs.md").read_text(encoding="utf-8")
     blocks = re.findall(r"^```python\n(.*?)^```$", document, re.MULTILINE | re.DOTALL)
     ready = "import numpy as np\n" + code[: code.index("solution = ")]
     (tmp_path / "example.py").write_text(ready + "\n".join(blocks), encoding="utf-8")
     done = subprocess.run(
-        [sys.executable, "example.py"], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, timeout=600,
-        capture_output=True, encoding="utf-8",
+        [sys.executable, "example.py"],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        timeout=600,
+        capture_output=True,
+        encoding="utf-8",
     )
     assert done.returncode == 0, done.stderr
     assert re.fullmatch(r"50 periods, 101 points of the loop, \d+ columns\n", done.stdout)
@@ -303,7 +414,17 @@ def test_example_of_the_documentation(tmp_path: Path) -> None:
         assert (tmp_path / "results" / picture).stat().st_size > 30_000
     run = read_run(tmp_path / "results" / "engineering")
     described = json.loads((run.folder / "columns.json").read_text())
-    for name in ("uplift_face", "height_upper", "theta_face", "racking_wall", "reaction_M_base", "M_third", "a_x_top"):
+    for name in (
+        "uplift_face",
+        "height_upper",
+        "theta_face",
+        "racking_wall",
+        "reaction_M_base",
+        "M_third",
+        "a_x_top",
+    ):
         assert described[name]["unit"] and name in run.history
     with plain_pictures():
-        assert vc.studies.report(run.folder, out=tmp_path / "page.pdf")[1][0].stat().st_size > 30_000
+        assert (
+            vc.studies.report(run.folder, out=tmp_path / "page.pdf")[1][0].stat().st_size > 30_000
+        )

@@ -21,11 +21,13 @@ from vi_contact.studies.report import report
 pytestmark = pytest.mark.serial
 report_packages()
 EVIL = "<script>document.documentElement.dataset.evil = 1</script>"
-BREAK = "</script><img src=x onerror=\"document.documentElement.dataset.evil = 2\">'\"&amp;{{ 7 * 7 }} Ünï"
+BREAK = '</script><img src=x onerror="document.documentElement.dataset.evil = 2">\'"&amp;{{ 7 * 7 }} Ünï'
 
 
 def charts(page: str) -> list[dict[str, Any]]:
-    (found,) = re.findall(r'<script type="application/json" id="charts">(.*?)</script>', page, re.DOTALL)
+    (found,) = re.findall(
+        r'<script type="application/json" id="charts">(.*?)</script>', page, re.DOTALL
+    )
     return json.loads(found)
 
 
@@ -36,14 +38,26 @@ def without_scripts(page: str) -> str:
 def hostile(folder: Path) -> Path:
     """A run whose every text is an attack: title, names of columns, meanings, units, facts, groups, materials."""
     wave = np.sin(0.1 * np.arange(400.0))
-    columns = {f"u_x_{EVIL}": (f"m{BREAK}", BREAK, wave), f"u_x_{BREAK}": (f"m{BREAK}", EVIL, 2.0 * wave),
-               "a_x_top": ("m/s2", BREAK, wave), f"N_{EVIL}": ("N", EVIL, 1.0 + wave), "a_g_x": ("m/s2", EVIL, wave)}
-    model = {"title": EVIL, "dimension": 2, "warnings": [EVIL], "bodies": [{EVIL: BREAK, "material": {BREAK: EVIL}}],
-             "supports": [{"kind": EVIL, "groups": [EVIL, BREAK], "components": []}],
-             "contact": [{"name": BREAK, "places": [[0.0, 0.0]]}],
-             "outline": [{"group": EVIL, "lines": [[0.0, 0.0, 1.0, 1.0]]}]}
+    columns = {
+        f"u_x_{EVIL}": (f"m{BREAK}", BREAK, wave),
+        f"u_x_{BREAK}": (f"m{BREAK}", EVIL, 2.0 * wave),
+        "a_x_top": ("m/s2", BREAK, wave),
+        f"N_{EVIL}": ("N", EVIL, 1.0 + wave),
+        "a_g_x": ("m/s2", EVIL, wave),
+    }
+    model = {
+        "title": EVIL,
+        "dimension": 2,
+        "warnings": [EVIL],
+        "bodies": [{EVIL: BREAK, "material": {BREAK: EVIL}}],
+        "supports": [{"kind": EVIL, "groups": [EVIL, BREAK], "components": []}],
+        "contact": [{"name": BREAK, "places": [[0.0, 0.0]]}],
+        "outline": [{"group": EVIL, "lines": [[0.0, 0.0, 1.0, 1.0]]}],
+    }
     case = f"title = {json.dumps(EVIL + BREAK)}\n"
-    return write_run(folder, columns, dt=0.01, case=case, model=model, facts={"scheme": EVIL, "solver": BREAK})
+    return write_run(
+        folder, columns, dt=0.01, case=case, model=model, facts={"scheme": EVIL, "solver": BREAK}
+    )
 
 
 @pytest.fixture(scope="module")
@@ -54,13 +68,19 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_every_text_is_escaped_and_nothing_is_loaded(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
-    assert text.count("<script") - text.count("<script src") == 3 + re.sub(r"(?s)^.*id=\"charts\">", "", text).count(
-        "<script") - 2  # data, plotly's, the page's own: plotly's own text may speak of scripts
+    assert (
+        text.count("<script") - text.count("<script src")
+        == 3 + re.sub(r"(?s)^.*id=\"charts\">", "", text).count("<script") - 2
+    )  # data, plotly's, the page's own: plotly's own text may speak of scripts
     visible = without_scripts(text)
-    assert "<script" not in visible and "onerror=\"" not in visible
+    assert "<script" not in visible and 'onerror="' not in visible
     assert not re.search(r"<img src=(?!\"data:image/png)", visible)
-    assert EVIL in unescape(visible) and BREAK in unescape(visible) and "{{ 7 * 7 }}" in visible and "49" not in (
-        re.findall(r"<title>(.*)</title>", visible)[0])
+    assert (
+        EVIL in unescape(visible)
+        and BREAK in unescape(visible)
+        and "{{ 7 * 7 }}" in visible
+        and "49" not in (re.findall(r"<title>(.*)</title>", visible)[0])
+    )
     for name, value in re.findall(r" (src|href|action|data|poster|srcset)=\"([^\"]*)\"", visible):
         assert value.startswith(("data:image/png;base64,", "#s")), (name, value)
     assert not re.search(r"<(link|iframe|object|embed|form|base)\b|@import|url\(", visible)
@@ -74,16 +94,30 @@ def test_every_text_is_escaped_and_nothing_is_loaded(page: Path) -> None:
 def test_thirty_seconds_are_small_and_extremes_stay(tmp_path: Path) -> None:
     """30 s at 1 ms with 60 columns: below 10 MB, and every curve has the largest and smallest value of its column."""
     random, count = np.random.default_rng(1), 30_001
-    columns = {f"u_{axis}_p{k}": ("m", "displacement", random.standard_normal(count))
-               for axis in "xy" for k in range(20)}
-    columns |= {f"a_x_p{k}": ("m/s2", "acceleration", random.standard_normal(count)) for k in range(20)}
-    columns |= {"a_g_x": ("m/s2", "ground", random.standard_normal(count)), "t": ("s", "", 1e-3 * np.arange(count))}
-    history = {name: values for name, (*_, values) in columns.items()} | {"certificate": np.full(count, 1e-14)}
+    columns = {
+        f"u_{axis}_p{k}": ("m", "displacement", random.standard_normal(count))
+        for axis in "xy"
+        for k in range(20)
+    }
+    columns |= {
+        f"a_x_p{k}": ("m/s2", "acceleration", random.standard_normal(count)) for k in range(20)
+    }
+    columns |= {
+        "a_g_x": ("m/s2", "ground", random.standard_normal(count)),
+        "t": ("s", "", 1e-3 * np.arange(count)),
+    }
+    history = {name: values for name, (*_, values) in columns.items()} | {
+        "certificate": np.full(count, 1e-14)
+    }
     run = RunFolder(tmp_path, history, {name: one[:2] for name, one in columns.items()}, {}, None)
     path = write_web_page(tmp_path / "page.html", "Thirty seconds", [], sections_of(run, {}), "")
     assert 4e6 < path.stat().st_size < 10e6
-    shown = {line["name"]: line for chart in charts(path.read_text(encoding="utf-8")) for line in chart["lines"]
-             if chart["title"] in ("displacement", "absolute acceleration")}
+    shown = {
+        line["name"]: line
+        for chart in charts(path.read_text(encoding="utf-8"))
+        for line in chart["lines"]
+        if chart["title"] in ("displacement", "absolute acceleration")
+    }
     assert len(shown) == 60
     for name, line in shown.items():
         assert len(line["x"]) <= 12_000

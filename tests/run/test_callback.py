@@ -15,8 +15,16 @@ import vi_contact as vc
 
 RUN = {"scheme": vc.ZienkiewiczWoodTaylor(), "dt": WALL_DT, "progress": False}
 SCHEMES = [
-    vc.Trapezoidal(), vc.ZienkiewiczWoodTaylor(), vc.GeneralisedAlpha.spectral_radius(0.8), vc.HHT(), vc.Houbolt(),
-    vc.MoreauJean(), vc.ContactStabilisedNewmark(), vc.SS22(), vc.LinearMultistep.newmark(), vc.Midpoint(),
+    vc.Trapezoidal(),
+    vc.ZienkiewiczWoodTaylor(),
+    vc.GeneralisedAlpha.spectral_radius(0.8),
+    vc.HHT(),
+    vc.Houbolt(),
+    vc.MoreauJean(),
+    vc.ContactStabilisedNewmark(),
+    vc.SS22(),
+    vc.LinearMultistep.newmark(),
+    vc.Midpoint(),
     vc.Newmark(),
 ]
 
@@ -46,8 +54,15 @@ def test_it_sees_every_step_of_march_in_order(comm: Any, dt: Any) -> None:
     assert [one.k for one in seen] == [one.k for one in marched] == list(range(1, len(marched) + 1))
     assert len(marched) > 25 or dt == WALL_DT
     for ours, theirs in zip(seen, marched, strict=True):
-        assert ours.t == theirs.t and np.array_equal(ours.u, theirs.u) and np.array_equal(ours.active, theirs.active)
-    assert np.array_equal(solution.history["t"][1:], [one.t for one in seen]) and solution.facts["reason"] == ""
+        assert (
+            ours.t == theirs.t
+            and np.array_equal(ours.u, theirs.u)
+            and np.array_equal(ours.active, theirs.active)
+        )
+    assert (
+        np.array_equal(solution.history["t"][1:], [one.t for one in seen])
+        and solution.facts["reason"] == ""
+    )
 
 
 @pytest.mark.serial
@@ -77,7 +92,10 @@ def test_reports_are_read_only_and_the_problem_stays_as_it_was(comm: Any) -> Non
                 array[:] = 0
             met.append(array)
 
-    during, after = vc.simulate(problem, **RUN, steps=5, callback=write), vc.simulate(problem, **RUN, steps=5)
+    during, after = (
+        vc.simulate(problem, **RUN, steps=5, callback=write),
+        vc.simulate(problem, **RUN, steps=5),
+    )
     assert len(met) == 40 and np.array_equal(before.state.u, during.state.u)
     assert np.array_equal(before.state.u, after.state.u)
     assert problem.surface.gap0.flags.writeable == shaken_wall(comm).surface.gap0.flags.writeable
@@ -93,11 +111,18 @@ def test_true_ends_the_run_and_a_restart_goes_on(comm: Any, shared_tmp: Path) ->
     stopped = vc.simulate(problem, **(RUN | {"dt": dt}), steps=30, out=shared_tmp, callback=seen)
     assert first < stopped.state.k < whole.state.k and len(seen) == stopped.state.k
     assert stopped.facts["status"] == "stopped" and "run stopped: " in stopped.summary()
-    assert stopped.facts["reason"] == f"the callback ended the run after step {first}, t = {seen[first - 1].t:.6g} s"
+    assert (
+        stopped.facts["reason"]
+        == f"the callback ended the run after step {first}, t = {seen[first - 1].t:.6g} s"
+    )
     seen = Seen()
-    solution = vc.simulate(problem, **(RUN | {"dt": dt}), steps=30, out=shared_tmp, callback=seen, restart=True)
+    solution = vc.simulate(
+        problem, **(RUN | {"dt": dt}), steps=30, out=shared_tmp, callback=seen, restart=True
+    )
     assert [one.k for one in seen] == list(range(stopped.state.k + 1, whole.state.k + 1))
-    assert solution.facts["status"] == "finished" and len(solution.history["t"]) == len(whole.history["t"])
+    assert solution.facts["status"] == "finished" and len(solution.history["t"]) == len(
+        whole.history["t"]
+    )
     size = comm.allreduce(float(np.abs(whole.state.u).max(initial=0.0)), op=max)
     assert np.abs(solution.state.u - whole.state.u).max(initial=0.0) <= 1e-12 * size
 
@@ -111,7 +136,11 @@ def test_what_it_raises_ends_the_run_on_all_ranks(comm: Any, shared_tmp: Path) -
         vc.simulate(problem, **RUN, steps=30, out=shared_tmp, callback=seen)
     comm.Barrier()  # rank 0 writes the summary last
     run = vc.read_run(shared_tmp)
-    assert run.history["k"][-1] == 7 and run.facts["status"] == "failed" and "the callback" in run.facts["reason"]
+    assert (
+        run.history["k"][-1] == 7
+        and run.facts["status"] == "failed"
+        and "the callback" in run.facts["reason"]
+    )
     seen = Seen()
     vc.simulate(problem, **RUN, steps=9, out=shared_tmp, callback=seen, restart=True)
     assert [one.k for one in seen] == [8, 9]
@@ -120,9 +149,14 @@ def test_what_it_raises_ends_the_run_on_all_ranks(comm: Any, shared_tmp: Path) -
 def test_of_many_runs_each_has_its_own(comm: Any) -> None:
     """One fails, one stops, one goes on: in one group of rows on one rank, one by one on several."""
     base = shaken_wall(comm)
-    problems = [replace(base, excitation=replace(base.excitation, amplitude=a)) for a in (3.0, 2.0, 1.0)]
+    problems = [
+        replace(base, excitation=replace(base.excitation, amplitude=a)) for a in (3.0, 2.0, 1.0)
+    ]
     calls = [Seen(4, fail), Seen(6, lambda: True), Seen()]
-    runs = [{"problem": one, **RUN, "steps": 9, "callback": call} for one, call in zip(problems, calls, strict=True)]
+    runs = [
+        {"problem": one, **RUN, "steps": 9, "callback": call}
+        for one, call in zip(problems, calls, strict=True)
+    ]
     found = dict(vc.simulate_many(runs))
     assert [len(one) for one in calls] == [4, 6, 9]
     assert isinstance(found[0], vc.InputError) and "the callback after step 4" in str(found[0])

@@ -14,7 +14,17 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from marched_chain import NEWMARK, chain, difference, equal_files, round_off, rubbing_box, run, run_wall, wall
+from marched_chain import (
+    NEWMARK,
+    chain,
+    difference,
+    equal_files,
+    round_off,
+    rubbing_box,
+    run,
+    run_wall,
+    wall,
+)
 
 from vi_contact.core.errors import InputError, ViContactError
 from vi_contact.core.surfaces import ContactSurface
@@ -31,10 +41,16 @@ from vi_contact.solvers import Iterative
 
 @pytest.mark.slow
 @pytest.mark.serial
-@pytest.mark.parametrize(("scheme", "impact"), [
-    (ZienkiewiczWoodTaylor(0.5), Inelastic()), (SS22(), Inelastic(ImpulseUpdate())), (NEWMARK, Inelastic()),
-    (NEWMARK, Inelastic(ImpulseUpdate())),
-], ids=repr)
+@pytest.mark.parametrize(
+    ("scheme", "impact"),
+    [
+        (ZienkiewiczWoodTaylor(0.5), Inelastic()),
+        (SS22(), Inelastic(ImpulseUpdate())),
+        (NEWMARK, Inelastic()),
+        (NEWMARK, Inelastic(ImpulseUpdate())),
+    ],
+    ids=repr,
+)
 def test_restart_to_the_last_bit(tmp_path: Path, scheme: Any, impact: Any) -> None:
     """A run continued from its checkpoint has the state and the histories of the straight run, byte for byte."""
     problem = chain(impact=impact)
@@ -105,7 +121,9 @@ def test_what_cannot_be_continued_is_told(tmp_path: Path) -> None:
     for words, arguments in wrong:
         with pytest.raises(InputError, match=words):
             run(tmp_path, restart=True, **arguments)
-    with pytest.raises(InputError, match="there is no checkpoint '.*nowhere/checkpoint.npz' to restart from"):
+    with pytest.raises(
+        InputError, match="there is no checkpoint '.*nowhere/checkpoint.npz' to restart from"
+    ):
         run(tmp_path, restart=tmp_path / "nowhere")
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
 
@@ -120,8 +138,14 @@ def test_damaged_checkpoint_is_told(tmp_path: Path, damage: str) -> None:
     if damage == "flipped":
         place = data.find(run(tmp_path, 60, restart=True).state.u.tobytes())
         data[place] ^= 1
-    path.write_bytes({"cut": data[: len(data) // 2], "flipped": data, "empty": b"", "other": b"not a zip"}[damage])
-    with pytest.raises(InputError, match=r"the checkpoint '.*checkpoint.npz' is damaged \(.*\): start a new run"):
+    path.write_bytes(
+        {"cut": data[: len(data) // 2], "flipped": data, "empty": b"", "other": b"not a zip"}[
+            damage
+        ]
+    )
+    with pytest.raises(
+        InputError, match=r"the checkpoint '.*checkpoint.npz' is damaged \(.*\): start a new run"
+    ):
         run(tmp_path, restart=True)
 
 
@@ -168,9 +192,15 @@ def test_restart_on_the_same_ranks(comm: Any, shared_tmp: Path) -> None:
     for name, values in straight.history.items():
         if comm.size == 1:
             assert np.array_equal(parts.history[name], values, equal_nan=values.dtype != bool), name
-        elif name not in ("certificate", "energy_defect", "loss_algorithmic"):  # round-off themselves
+        elif name not in (
+            "certificate",
+            "energy_defect",
+            "loss_algorithmic",
+        ):  # round-off themselves
             size = np.nanmax(np.abs(values)) or 1.0
-            assert np.allclose(parts.history[name], values, rtol=0.0, atol=1e-12 * size, equal_nan=True), name
+            assert np.allclose(
+                parts.history[name], values, rtol=0.0, atol=1e-12 * size, equal_nan=True
+            ), name
     assert difference(parts.state, straight.state) <= round_off(comm)
 
 
@@ -179,14 +209,18 @@ FRICTIONAL = {"impulses": (MoreauJean(), ConsistentMass()), "massless": (Trapezo
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("scheme", "mass"), FRICTIONAL.values(), ids=FRICTIONAL.keys())
-def test_restart_with_friction_on_the_same_ranks(comm: Any, shared_tmp: Path, scheme: Any, mass: Any) -> None:
+def test_restart_with_friction_on_the_same_ranks(
+    comm: Any, shared_tmp: Path, scheme: Any, mass: Any
+) -> None:
     """A box that lands, rubs and begins to lift; reactions and slips too go on as in the straight run."""
     pytest.importorskip("dolfinx")
     problem = rubbing_box(comm, mass)
     settings: dict[str, Any] = {"scheme": scheme, "dt": 2e-3, "record": [Energy(), Contact()]}
     straight = simulate(problem, steps=32, out=shared_tmp / "straight", **settings)
     for until in (17, 30, 32):
-        parts = simulate(problem, steps=until, out=shared_tmp / "parts", restart=until > 17, **settings)
+        parts = simulate(
+            problem, steps=until, out=shared_tmp / "parts", restart=until > 17, **settings
+        )
     closed = straight.history["contact_active"]
     assert closed[0] == 0 < closed[17] and np.ptp(closed[17:]) > 0
     assert straight.state.r_t is not None and problem.surface.some(straight.state.r_t != 0.0)
@@ -215,9 +249,14 @@ def test_arrays_of_many_points_are_gathered_on_one_rank(
     for name in ("pressure", "gap", "active"):
         values = straight.history[name]
         for found in (kept.history, *([alone.history] if comm.rank == 0 else [])):
-            assert np.allclose(found[name], values, rtol=0.0, atol=1e-8 * np.abs(values).max()), name
+            assert np.allclose(found[name], values, rtol=0.0, atol=1e-8 * np.abs(values).max()), (
+                name
+            )
         if comm.rank:
-            with pytest.raises(ViContactError, match=f"'{name}' of more than 1 points is on rank 0 only: give the run"):
+            with pytest.raises(
+                ViContactError,
+                match=f"'{name}' of more than 1 points is on rank 0 only: give the run",
+            ):
                 alone.history[name]
 
 
@@ -230,7 +269,9 @@ def test_restart_with_another_mass_matrix_is_refused(comm: Any, shared_tmp: Path
     words = r"a run with mass = Redistributed\(lumping=0.4\) but this one has ConsistentMass\(\): restart the same"
     with pytest.raises(InputError, match=words):
         simulate(replace(box, mass=ConsistentMass()), steps=6, restart=True, **settings)
-    assert simulate(replace(box, mass=Redistributed()), steps=6, restart=True, **settings).state.k == 6
+    assert (
+        simulate(replace(box, mass=Redistributed()), steps=6, restart=True, **settings).state.k == 6
+    )
 
 
 def test_restart_on_another_number_of_ranks(comm: Any, shared_tmp: Path) -> None:
@@ -250,9 +291,14 @@ def test_restart_on_another_number_of_ranks(comm: Any, shared_tmp: Path) -> None
             continue  # round-off themselves
         size = np.nanmax(np.abs(values)) or 1.0
         for other in (spread, gathered):
-            assert np.allclose(other.history[name], values, rtol=0.0, atol=1e-10 * size, equal_nan=True), name
+            assert np.allclose(
+                other.history[name], values, rtol=0.0, atol=1e-10 * size, equal_nan=True
+            ), name
     if comm.rank == 0:  # points and their order are those of one rank
-        with h5py.File(shared_tmp / "alone" / "history.h5") as one, h5py.File(shared_tmp / "all" / "history.h5") as two:
+        with (
+            h5py.File(shared_tmp / "alone" / "history.h5") as one,
+            h5py.File(shared_tmp / "all" / "history.h5") as two,
+        ):
             assert len(one["contact/points"]) == len(one["pressure"][0]) > 1
             assert np.array_equal(one["contact/points"], two["contact/points"])
             assert np.allclose(one["contact/weights"], two["contact/weights"], rtol=1e-12, atol=0.0)

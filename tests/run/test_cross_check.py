@@ -31,14 +31,20 @@ METHODS = [Condensed(), Condensed(Hildreth()), Condensed(Hildreth(primal=False))
 
 
 def between_walls(**more: Any) -> Any:
-    return chain_problem(5, gap=0.02, left_gap=0.01, stiffness=2e4, excitation=SHAKE, impact=Inelastic(), **more)
+    return chain_problem(
+        5, gap=0.02, left_gap=0.01, stiffness=2e4, excitation=SHAKE, impact=Inelastic(), **more
+    )
 
 
-@pytest.mark.parametrize("scheme", [HALF, SS22(0.6, 0.7), LinearMultistep.newmark()], ids=lambda s: type(s).__name__)
+@pytest.mark.parametrize(
+    "scheme", [HALF, SS22(0.6, 0.7), LinearMultistep.newmark()], ids=lambda s: type(s).__name__
+)
 @pytest.mark.parametrize("floating", [False, True])
 def test_methods_agree_to_1e9(scheme, floating):
     """Active set, Hildreth primal and dual: u and r_n of every step to 1e-9."""
-    checked = cross_check(between_walls(floating=floating), scheme=scheme, solvers=METHODS, dt=5e-3, steps=200)
+    checked = cross_check(
+        between_walls(floating=floating), scheme=scheme, solvers=METHODS, dt=5e-3, steps=200
+    )
     assert 0.0 < checked.worst <= 1e-9
     assert all(one.steps == 200 and one.size["r_n"] > 1.0 for one in checked.found)
 
@@ -47,12 +53,24 @@ def test_report_names_every_method():
     checked = cross_check(shaken(), scheme=HALF, solvers=METHODS, dt=5e-3, steps=60)
     assert list(checked.report()) == ["condensed Hildreth #1", "condensed Hildreth #2"]
     for entry in checked.report().values():
-        assert entry["u"] <= 1e-9 and entry["r_n"] <= 1e-9 and 0.0 < entry["iterations_per_step"] < 10.0
+        assert (
+            entry["u"] <= 1e-9
+            and entry["r_n"] <= 1e-9
+            and 0.0 < entry["iterations_per_step"] < 10.0
+        )
 
 
 def test_it_returns_the_primary_answer():
     plain = list(run(shaken(), HALF, dt=5e-3, steps=60))
-    checked = list(run(shaken(), HALF, dt=5e-3, steps=60, solver=CrossChecked(Condensed(), [Condensed(Hildreth())])))
+    checked = list(
+        run(
+            shaken(),
+            HALF,
+            dt=5e-3,
+            steps=60,
+            solver=CrossChecked(Condensed(), [Condensed(Hildreth())]),
+        )
+    )
     np.testing.assert_array_equal(checked[-1].new.u, plain[-1].new.u)
 
 
@@ -72,15 +90,21 @@ class Off:
         class Prepared:
             def solve(self, step: Any) -> Any:
                 result = prepared.solve(step)
-                return replace(result, x=result.x * off.u, r_n=result.r_n * off.r, method="off", iterations=2)
+                return replace(
+                    result, x=result.x * off.u, r_n=result.r_n * off.r, method="off", iterations=2
+                )
 
         return Prepared()
 
 
 def test_differences_are_measured_at_their_size():
-    checked = cross_check(shaken(), scheme=HALF, solvers=[Condensed(), Off(1.001, 1.25)], dt=5e-3, steps=60)
+    checked = cross_check(
+        shaken(), scheme=HALF, solvers=[Condensed(), Off(1.001, 1.25)], dt=5e-3, steps=60
+    )
     entry = checked.report()["off"]
-    assert entry["u"] == pytest.approx(1e-3, rel=1e-9) and entry["r_n"] == pytest.approx(0.25, rel=1e-9)
+    assert entry["u"] == pytest.approx(1e-3, rel=1e-9) and entry["r_n"] == pytest.approx(
+        0.25, rel=1e-9
+    )
     assert entry["iterations_per_step"] == 2.0
     assert checked.worst == entry["r_n"]
 
@@ -92,13 +116,21 @@ class WrongWhenClosing(Off):
     shortest: Any
 
     def prepare(self, A: Any, surface: Any, scale: float) -> Any:
-        wrong, right, off = Off.prepare(self, A, surface, scale), Condensed().prepare(A, surface, scale), self
+        wrong, right, off = (
+            Off.prepare(self, A, surface, scale),
+            Condensed().prepare(A, surface, scale),
+            self,
+        )
 
         class Prepared:
             def solve(self, step: Any) -> Any:
                 result = right.solve(step)
                 final = np.array_equal(A @ step.guess, off.shortest @ step.guess)
-                return result if final or not np.any(result.active & ~step.active) else wrong.solve(step)
+                return (
+                    result
+                    if final or not np.any(result.active & ~step.active)
+                    else wrong.solve(step)
+                )
 
         return Prepared()
 
@@ -122,7 +154,9 @@ def test_schedules_of_steps():
     for dt in (plan, plan.dt):
         accepted = len(list(run(shaken(), HALF, dt=dt, steps=120)))
         checked = cross_check(shaken(), scheme=HALF, solvers=METHODS[:3], dt=dt, steps=120)
-        assert 0.0 < checked.worst <= 1e-9 and [one.steps for one in checked.found] == [accepted] * 2
+        assert (
+            0.0 < checked.worst <= 1e-9 and [one.steps for one in checked.found] == [accepted] * 2
+        )
     for _ in run(shaken(), HALF, dt=plan.dt, steps=120, solver=checked):
         pass
     assert checked.found[0].steps == 2 * accepted
@@ -137,7 +171,9 @@ def test_no_contact_and_no_steps():
 def test_every_solver_must_take_the_problem():
     problem = replace(shaken(), friction=Tresca(1.0))
     with pytest.raises(InputError, match="Tresca"):
-        cross_check(problem, scheme=HALF, solvers=[Off(1.0, 1.0), Condensed(ActiveSet())], dt=5e-3, steps=1)
+        cross_check(
+            problem, scheme=HALF, solvers=[Off(1.0, 1.0), Condensed(ActiveSet())], dt=5e-3, steps=1
+        )
 
 
 class HalfTheFriction(Off):
@@ -149,15 +185,24 @@ class HalfTheFriction(Off):
         class Prepared:
             def solve(self, step: Any) -> Any:
                 result = prepared.solve(step)
-                return replace(result, r_t=result.r_t * off.r if off.r else None, method=f"times {off.r}")
+                return replace(
+                    result, r_t=result.r_t * off.r if off.r else None, method=f"times {off.r}"
+                )
 
         return Prepared()
 
 
 def test_friction_is_compared():
     """r_t counts where there is friction, at its own size, and is in the report; missing is wrong by as much as all."""
-    solvers = [Condensed(), HalfTheFriction(1.0, 0.5), HalfTheFriction(1.0, 0.0), Condensed(friction_method=NSGS())]
-    checked = cross_check(rubbing_block(Coulomb(0.3)), scheme=HALF, solvers=solvers, dt=0.05, steps=60)
+    solvers = [
+        Condensed(),
+        HalfTheFriction(1.0, 0.5),
+        HalfTheFriction(1.0, 0.0),
+        Condensed(friction_method=NSGS()),
+    ]
+    checked = cross_check(
+        rubbing_block(Coulomb(0.3)), scheme=HALF, solvers=solvers, dt=0.05, steps=60
+    )
     half, missing, same = checked.report().values()
     assert half["r_t"] == pytest.approx(0.5, rel=1e-12) and half["u"] == half["r_n"] == 0.0
     assert missing["r_t"] == checked.worst == pytest.approx(1.0, rel=1e-12)

@@ -42,15 +42,24 @@ def notes(tmp_path: Path) -> Path:
 def with_fields(folder: Path, steps: int = 4, **more: Any) -> Any:
     """A run of a chain with frames, two in a file."""
     fields = XDMF(every=1, frames_per_file=2)
-    return simulate(chain(), scheme=ZienkiewiczWoodTaylor(), dt=5e-3, steps=steps, out=folder, fields=fields,
-                    progress=False, **more)
+    return simulate(
+        chain(),
+        scheme=ZienkiewiczWoodTaylor(),
+        dt=5e-3,
+        steps=steps,
+        out=folder,
+        fields=fields,
+        progress=False,
+        **more,
+    )
 
 
 @pytest.mark.parametrize("name", WRITTEN)
 @pytest.mark.parametrize("hard", [False, True])
 @pytest.mark.parametrize("earlier", [False, True])
-def test_links_in_the_folder_are_not_followed(tmp_path: Path, notes: Path, name: str, hard: bool,
-                                              earlier: bool) -> None:
+def test_links_in_the_folder_are_not_followed(
+    tmp_path: Path, notes: Path, name: str, hard: bool, earlier: bool
+) -> None:
     """A link at any name that a run writes: refused, or replaced by a file; a hard link likewise."""
     folder = tmp_path / "run"
     if earlier:
@@ -70,7 +79,9 @@ def test_links_in_the_folder_are_not_followed(tmp_path: Path, notes: Path, name:
     assert notes.read_text() == NOTES
 
 
-@pytest.mark.parametrize("name", ["history.csv", "history.journal", "history.h5", "run.log", "checkpoint.npz", LOCK])
+@pytest.mark.parametrize(
+    "name", ["history.csv", "history.journal", "history.h5", "run.log", "checkpoint.npz", LOCK]
+)
 def test_links_are_not_followed_by_a_restart(tmp_path: Path, notes: Path, name: str) -> None:
     """What a restart reads, and what it writes on, is a file of the folder."""
     folder = tmp_path / "run"
@@ -112,15 +123,28 @@ def test_a_link_to_a_folder_is_no_folder_of_fields(tmp_path: Path) -> None:
     for call in (lambda: run(tmp_path / "run", 5), lambda: with_fields(tmp_path / "run")):
         with pytest.raises(InputError, match="fields' is a link"):
             call()
-    assert {path.read_text() for path in others.iterdir()} == {NOTES} and len(list(others.iterdir())) == 3
+    assert {path.read_text() for path in others.iterdir()} == {NOTES} and len(
+        list(others.iterdir())
+    ) == 3
 
 
 def test_files_of_others_stay(tmp_path: Path) -> None:
     """Beside the run, among its frames, and with names that only look like ours; through a second and a shorter run."""
     folder = tmp_path / "run"
     (folder / FIELDS).mkdir(parents=True)
-    theirs = ["mydata.h5", "frames.h5", "frame_1.h5", "frame_00001x.h5", ".mine.h5.12.tmp", "frame_000001.h5.bak"]
-    files = [*(folder / FIELDS / name for name in theirs), folder / ".notes.12.tmp", folder / "summary.json.bak"]
+    theirs = [
+        "mydata.h5",
+        "frames.h5",
+        "frame_1.h5",
+        "frame_00001x.h5",
+        ".mine.h5.12.tmp",
+        "frame_000001.h5.bak",
+    ]
+    files = [
+        *(folder / FIELDS / name for name in theirs),
+        folder / ".notes.12.tmp",
+        folder / "summary.json.bak",
+    ]
     for path in files:
         path.write_text(NOTES)
     for steps in (5, 2):
@@ -131,16 +155,24 @@ def test_files_of_others_stay(tmp_path: Path) -> None:
         assert len(frames.t) == steps + 1
 
 
-@pytest.mark.parametrize("name", [*FILES[1:], "fields/mesh.h5", "fields/frame_000000.h5", "fields/frames_000000.h5"])
+@pytest.mark.parametrize(
+    "name", [*FILES[1:], "fields/mesh.h5", "fields/frame_000000.h5", "fields/frames_000000.h5"]
+)
 def test_a_folder_with_files_of_others_is_refused(tmp_path: Path, name: str) -> None:
     """Without the mark of a run they are not replaced: told before any work is done."""
     assert FILES[0] == "format.json"  # this one is the mark
     path = tmp_path / "run" / name
     path.parent.mkdir(parents=True)
     path.write_text(NOTES)
-    with pytest.raises(InputError, match=rf"{path.name}' is not of a run of vi_contact .* choose another output"):
+    with pytest.raises(
+        InputError, match=rf"{path.name}' is not of a run of vi_contact .* choose another output"
+    ):
         run(tmp_path / "run", 5)
-    assert path.read_text() == NOTES and not (tmp_path / "run" / "run.log").exists() or name == "run.log"
+    assert (
+        path.read_text() == NOTES
+        and not (tmp_path / "run" / "run.log").exists()
+        or name == "run.log"
+    )
     path.rename(tmp_path / "moved")  # the remedy
     run(tmp_path / "run", 5)
 
@@ -164,7 +196,11 @@ def test_only_the_files_of_a_run_are_removed_with_it(tmp_path: Path) -> None:
     (folder / "notes").write_text(NOTES)
     (folder / FIELDS / "notes").write_text(NOTES)
     remove_run(folder)
-    assert sorted(str(path.relative_to(folder)) for path in folder.rglob("*")) == ["fields", "fields/notes", "notes"]
+    assert sorted(str(path.relative_to(folder)) for path in folder.rglob("*")) == [
+        "fields",
+        "fields/notes",
+        "notes",
+    ]
     remove_run(folder)  # without the mark nothing is touched
     (folder / "history.h5").write_text(NOTES)
     remove_run(folder)
@@ -174,11 +210,21 @@ def test_only_the_files_of_a_run_are_removed_with_it(tmp_path: Path) -> None:
     assert not (tmp_path / "alone").exists()
 
 
-PICTURES = ("deformed.png", "film.gif", "report.pdf", "report.html", "peaks.csv", "model.png", "page.pdf", "table.csv")
+PICTURES = (
+    "deformed.png",
+    "film.gif",
+    "report.pdf",
+    "report.html",
+    "peaks.csv",
+    "model.png",
+    "page.pdf",
+    "table.csv",
+)
 
 
-def test_reports_and_pictures_replace_links(comm: Any, tmp_path: Path, notes: Path,
-                                            capsys: pytest.CaptureFixture[str]) -> None:
+def test_reports_and_pictures_replace_links(
+    comm: Any, tmp_path: Path, notes: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """By plot, film, report and post: a file takes the place of the link."""
     pytest.importorskip("matplotlib")
     folder = tmp_path / "run"
@@ -186,18 +232,37 @@ def test_reports_and_pictures_replace_links(comm: Any, tmp_path: Path, notes: Pa
     for name in PICTURES:
         (folder / name).symlink_to(notes)
     given, out = str(folder), "--out"
-    for words in (["plot", given], ["film", given], ["report", given, out, str(folder / "page.pdf")], ["report", given],
-                  ["post", "peaks", given, out, str(folder / "table.csv")]):
+    for words in (
+        ["plot", given],
+        ["film", given],
+        ["report", given, out, str(folder / "page.pdf")],
+        ["report", given],
+        ["post", "peaks", given, out, str(folder / "table.csv")],
+    ):
         assert main(words) == 0, capsys.readouterr().err
     assert notes.read_text() == NOTES
     for name in ("deformed.png", "film.gif", "report.pdf", "peaks.csv", "page.pdf", "table.csv"):
         assert (folder / name).is_file() and not (folder / name).is_symlink(), name
 
 
-@pytest.mark.parametrize("name", ["history.csv", "history.h5", "columns.json", "summary.json", "format.json", MODEL,
-                                  COPY, "fields/mesh.h5", "fields/frame_000000.h5", "fields"])
-def test_links_are_not_followed_by_readers(comm: Any, tmp_path: Path, name: str,
-                                           capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    "name",
+    [
+        "history.csv",
+        "history.h5",
+        "columns.json",
+        "summary.json",
+        "format.json",
+        MODEL,
+        COPY,
+        "fields/mesh.h5",
+        "fields/frame_000000.h5",
+        "fields",
+    ],
+)
+def test_links_are_not_followed_by_readers(
+    comm: Any, tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     """report, plot, film and post of somebody's folder: a sentence that names the link."""
     pytest.importorskip("matplotlib")
     folder = tmp_path / "run"
@@ -212,19 +277,25 @@ def test_links_are_not_followed_by_readers(comm: Any, tmp_path: Path, name: str,
             words = ["post", "checks"]
         assert main([*words, str(folder)]) == 1
         said = capsys.readouterr().err
-        assert f"{folder / name}' is a link, and a run reads and writes only files of its own folder" in said
+        assert (
+            f"{folder / name}' is a link, and a run reads and writes only files of its own folder"
+            in said
+        )
 
 
 @pytest.mark.parametrize("link", ["external", "soft"])
-def test_frames_elsewhere_are_not_drawn(comm: Any, tmp_path: Path, link: str,
-                                        capsys: pytest.CaptureFixture[str]) -> None:
+def test_frames_elsewhere_are_not_drawn(
+    comm: Any, tmp_path: Path, link: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     folder, other = tmp_path / "run", tmp_path / "other.h5"
     drawn_run(comm, folder)
     with h5py.File(other, "w") as file:
         file["u"] = np.ones((13, 3))
     with h5py.File(folder / FIELDS / "frame_000006.h5", "a") as file:
         del file["u"]
-        file["u"] = h5py.ExternalLink(str(other), "u") if link == "external" else h5py.SoftLink("/v")
+        file["u"] = (
+            h5py.ExternalLink(str(other), "u") if link == "external" else h5py.SoftLink("/v")
+        )
     frames = read_frames(folder)
     assert frames.at(0.0)[1].shape == frames.points.shape
     with pytest.raises(InputError, match="frame_000006.h5' is damaged: /u lies in another file"):
@@ -241,5 +312,7 @@ def test_an_index_that_leads_elsewhere_is_not_followed(comm: Any, tmp_path: Path
     assert read_function(problem, folder, "u", frame=1).name == "u"
     index = (folder / "fields.xdmf").read_text()
     (folder / "fields.xdmf").write_text(index.replace("fields/frame_000002.h5", "../other.h5"))
-    with pytest.raises(InputError, match=r"the fields in '.*' are incomplete or damaged \('../other.h5'\)"):
+    with pytest.raises(
+        InputError, match=r"the fields in '.*' are incomplete or damaged \('../other.h5'\)"
+    ):
         read_function(problem, folder, "u", frame=1)

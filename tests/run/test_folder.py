@@ -17,7 +17,14 @@ from chain import chain_problem
 
 from vi_contact.core.algebra import SerialComm
 from vi_contact.core.errors import InputError, ViContactError
-from vi_contact.core.files import hdf5_atomically, on_root, sentence, to_json, write_all, write_atomically
+from vi_contact.core.files import (
+    hdf5_atomically,
+    on_root,
+    sentence,
+    to_json,
+    write_all,
+    write_atomically,
+)
 from vi_contact.core.step import Row
 from vi_contact.laws.excitation import Harmonic
 from vi_contact.run.files import history as history_module
@@ -36,7 +43,11 @@ def run(out: Path | None, steps: int = 30, **more: Any) -> Solution:
     """The shaken chain between two walls, with a probe at its end."""
     shake = Harmonic(3.0, 2.0, direction=(1.0,))
     problem = chain_problem(5, gap=1e-3, left_gap=2e-3, excitation=shake, consistent=True)
-    settings: dict[str, Any] = {"scheme": ZienkiewiczWoodTaylor(), "solver": Condensed(), "dt": 5e-3}
+    settings: dict[str, Any] = {
+        "scheme": ZienkiewiczWoodTaylor(),
+        "solver": Condensed(),
+        "dt": 5e-3,
+    }
     record = [Energy(), Contact(), Probe({12: (5.0,)})]
     return simulate(problem, steps=steps, record=record, out=out, **(settings | more))
 
@@ -65,8 +76,14 @@ def test_units_are_documented(tmp_path: Path) -> None:
     """Every column has a unit and a meaning, in columns.json and as attributes in history.h5, which has arrays too."""
     solution = run(tmp_path)
     columns = json.loads((tmp_path / "columns.json").read_text())
-    assert list(columns) == list(solution.columns) and all(one["unit"] and one["meaning"] for one in columns.values())
-    assert columns["u_x_12"]["unit"] == "m" and columns["pressure"]["unit"] == "Pa" and columns["t"]["unit"] == "s"
+    assert list(columns) == list(solution.columns) and all(
+        one["unit"] and one["meaning"] for one in columns.values()
+    )
+    assert (
+        columns["u_x_12"]["unit"] == "m"
+        and columns["pressure"]["unit"] == "Pa"
+        and columns["t"]["unit"] == "s"
+    )
     with h5py.File(tmp_path / "history.h5") as file:
         assert set(file) == set(columns) | {"contact"}
         for name, one in columns.items():
@@ -96,7 +113,13 @@ def test_new_run_replaces_the_old_one(tmp_path: Path) -> None:
 @pytest.mark.serial
 def test_strict_json() -> None:
     """NaN and infinity become null, numpy values plain ones."""
-    facts = {"a": np.float64(0.1), "b": float("nan"), "c": {"d": np.inf}, "e": np.arange(2), "f": np.bool_(True)}
+    facts = {
+        "a": np.float64(0.1),
+        "b": float("nan"),
+        "c": {"d": np.inf},
+        "e": np.arange(2),
+        "f": np.bool_(True),
+    }
     text = to_json(facts)
     assert json.loads(text) == {"a": 0.1, "b": None, "c": {"d": None}, "e": [0, 1], "f": True}
 
@@ -119,7 +142,9 @@ def test_every_rank_gets_the_sentence(comm: Any) -> None:
     def broken() -> None:
         raise ZeroDivisionError("a defect")
 
-    with pytest.raises(ViContactError, match="the disk is full: 'history.csv' could not be written"):
+    with pytest.raises(
+        ViContactError, match="the disk is full: 'history.csv' could not be written"
+    ):
         on_root(ranks, full)
     with pytest.raises(InputError, match="the checkpoint is damaged"):
         on_root(ranks, wrong)
@@ -131,10 +156,19 @@ def test_every_rank_gets_the_sentence(comm: Any) -> None:
 @pytest.mark.serial
 def test_sentences() -> None:
     """One sentence each: path, reason, remedy."""
-    known = ((errno.ENOSPC, "the disk is full"), (errno.EACCES, "permissions"), (errno.EIO, "read or written"))
+    known = (
+        (errno.ENOSPC, "the disk is full"),
+        (errno.EACCES, "permissions"),
+        (errno.EIO, "read or written"),
+    )
     for number, words in known:
         text = sentence(OSError(number, "reason", "a/history.csv"))
-        assert words in text and "'a/history.csv'" in text and "\n" not in text and not text.endswith(".")
+        assert (
+            words in text
+            and "'a/history.csv'" in text
+            and "\n" not in text
+            and not text.endswith(".")
+        )
 
 
 @pytest.mark.serial
@@ -142,10 +176,17 @@ def test_unwritable_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     """Told before any work: not a folder, or one that takes no file (mocked, as root may write anywhere)."""
     (tmp_path / "file").write_text("")
     asked: list[int] = []
-    monkeypatch.setattr("vi_contact.run.session.March", lambda *_, **__: asked.append(1) or iter(()))
-    with pytest.raises(InputError, match=r"output folder '.*file' cannot be written \(File exists\): choose another"):
+    monkeypatch.setattr(
+        "vi_contact.run.session.March", lambda *_, **__: asked.append(1) or iter(())
+    )
+    with pytest.raises(
+        InputError,
+        match=r"output folder '.*file' cannot be written \(File exists\): choose another",
+    ):
         run(tmp_path / "file")
-    with pytest.raises(InputError, match=r"output folder '.*below' cannot be written \(Not a directory\)"):
+    with pytest.raises(
+        InputError, match=r"output folder '.*below' cannot be written \(Not a directory\)"
+    ):
         run(tmp_path / "file" / "below")
 
     def refuse(*_: Any) -> None:
@@ -165,7 +206,11 @@ def no_room_for(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
             raise OSError(errno.ENOSPC, "No space left on device")
         write_all(file, data)
 
-    for module in ("vi_contact.core.files", "vi_contact.run.files.history", "vi_contact.run.files.log"):
+    for module in (
+        "vi_contact.core.files",
+        "vi_contact.run.files.history",
+        "vi_contact.run.files.log",
+    ):
         monkeypatch.setattr(f"{module}.write_all", full)
 
 
@@ -173,7 +218,9 @@ def no_room_for(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_full_disk_from_the_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """No room for history.csv: one sentence, no traceback of HDF5, nothing computed."""
     no_room_for("history.csv", monkeypatch)
-    with pytest.raises(ViContactError, match=r"the disk is full: '.*history.csv' could not be written"):
+    with pytest.raises(
+        ViContactError, match=r"the disk is full: '.*history.csv' could not be written"
+    ):
         run(tmp_path)
 
 
@@ -191,13 +238,20 @@ def test_full_disk_on_all_ranks(comm: Any, shared_tmp: Path) -> None:
         with pytest.MonkeyPatch.context() as patch, refused:
             no_room_for(name, patch)
             simulate(
-                wall, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=1e-3, steps=5, out=folder,
+                wall,
+                scheme=ZienkiewiczWoodTaylor(),
+                solver=Condensed(),
+                dt=1e-3,
+                steps=5,
+                out=folder,
                 fields=XDMF(every=1),
             )
 
 
 @pytest.mark.serial
-def test_full_log(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_full_log(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """No room for run.log is told as of any other file."""
     no_room_for("run.log", monkeypatch)
     with pytest.raises(ViContactError, match=r"the disk is full: '.*run.log'"):
@@ -221,7 +275,9 @@ class Disk:
 
 @pytest.mark.serial
 @pytest.mark.parametrize("room", [9000, 9100, 9200, 12345])
-def test_disk_fills_up_during_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, room: int) -> None:
+def test_disk_fills_up_during_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, room: int
+) -> None:
     """The run stops with a sentence; every line before is whole, and the restart equals the straight run."""
     disk = Disk(room)
     monkeypatch.setattr(history_module, "write_all", disk)
@@ -284,15 +340,25 @@ COLUMNS = {
 def rows(count: int) -> list[Row]:
     """Rows with the numbers of every run, and two arrays."""
     return [
-        {"t": 0.1 * k, "k": k, "iterations": 2, "certificate": 1e-12, "escalated": 0,
-         "p": np.array([k, 1.0 / 3.0]), "on": np.array([k % 2 == 0])} for k in range(count)
+        {
+            "t": 0.1 * k,
+            "k": k,
+            "iterations": 2,
+            "certificate": 1e-12,
+            "escalated": 0,
+            "p": np.array([k, 1.0 / 3.0]),
+            "on": np.array([k % 2 == 0]),
+        }
+        for k in range(count)
     ]
 
 
 def written(folder: Path, count: int, *, save_at: int | None = None) -> HistoryFiles:
     """Files of so many rows, still open."""
     made = rows(count)
-    files = HistoryFiles(folder, Table(COLUMNS, made[0]), {name: np.zeros(2) for name in history_module.GEOMETRY})
+    files = HistoryFiles(
+        folder, Table(COLUMNS, made[0]), {name: np.zeros(2) for name in history_module.GEOMETRY}
+    )
     for row in made[1:]:
         files.append(row)
         if row["k"] == save_at:
@@ -320,7 +386,9 @@ def test_arrays_survive_in_the_journal(tmp_path: Path, cut: int) -> None:
     assert found["k"].tolist() == list(range(last + 1)) and found["on"].dtype == bool
     for k, wanted in enumerate(rows(last + 1)):
         assert found["t"][k] == wanted["t"]
-        assert np.array_equal(found["p"][k], wanted["p"]) and np.array_equal(found["on"][k], wanted["on"])
+        assert np.array_equal(found["p"][k], wanted["p"]) and np.array_equal(
+            found["on"][k], wanted["on"]
+        )
     if not cut:
         files.close()
         assert not journal.exists()
@@ -338,7 +406,10 @@ def test_damaged_histories_are_told(tmp_path: Path) -> None:
         (good.replace("0.2,2", "0.2,two"), "line 4 of '.*' is damaged"),
         (good.replace("0.2,2", "0.2,"), "line 4 of '.*' is damaged"),
         (good.replace("0.2,2", "0.2,2,2"), "line 4 of '.*' is damaged"),
-        (re.sub(r"(?m)^0\.2,2.*$", "2", good), "line 4 of '.*' is damaged"),  # it would fill the row
+        (
+            re.sub(r"(?m)^0\.2,2.*$", "2", good),
+            "line 4 of '.*' is damaged",
+        ),  # it would fill the row
         (good.replace("0.2,2", "0.2,7"), "do not follow each other"),
         (good.replace("0.2,2", "0.2,nan"), "do not follow each other"),
         ("\n".join(good.splitlines()[:4]), "does not reach step 4"),
@@ -362,10 +433,19 @@ def test_long_histories_stay_on_disk(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert "nothing" not in long.history and set(long.history) == set(kept.history)
     alone = run(None, 300)
     assert isinstance(alone.history, dict)
-    for name in ("steps", "iterations_per_step", "worst_certificate", "energy", "steps_in_contact", "smallest_gap"):
+    for name in (
+        "steps",
+        "iterations_per_step",
+        "worst_certificate",
+        "energy",
+        "steps_in_contact",
+        "smallest_gap",
+    ):
         assert long.facts[name] == kept.facts[name] == alone.facts[name], name
     run(tmp_path / "long", 5)
-    with pytest.raises(ViContactError, match="was replaced or is not on this machine: give every run a folder"):
+    with pytest.raises(
+        ViContactError, match="was replaced or is not on this machine: give every run a folder"
+    ):
         long.history["t"]
 
 
@@ -373,11 +453,15 @@ def test_long_histories_stay_on_disk(tmp_path: Path, monkeypatch: pytest.MonkeyP
 def test_memory_does_not_grow_with_steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without a folder the bytes of the numbers, some hundred a step; with one nothing beyond what is kept at most."""
     monkeypatch.setattr("vi_contact.run.files.table.KEPT", 0)
-    made: Any = {"iterations": 2, "certificate": 1e-12, "escalated": 0} | {f"c{i}": 1.0 for i in range(35)}
+    made: Any = {"iterations": 2, "certificate": 1e-12, "escalated": 0} | {
+        f"c{i}": 1.0 for i in range(35)
+    }
     columns = {name: ("-", name) for name in ("t", "k", *made)}
     peaks = {}
     for on_disk in (False, True):
-        table = Table(columns, {"t": 0.0, "k": 0} | made, tmp_path / "history.h5" if on_disk else None)
+        table = Table(
+            columns, {"t": 0.0, "k": 0} | made, tmp_path / "history.h5" if on_disk else None
+        )
         tracemalloc.start()
         for k in range(1, 3000):
             table.append({"t": 0.1 * k, "k": k} | made)
@@ -411,7 +495,10 @@ def test_folders_of_another_format(tmp_path: Path) -> None:
     about = tmp_path / "format.json"
     assert json.loads(about.read_text())["format"] == 1
     for text, words in (
-        ('{"format": 2}', r"has format 2 and this version of vi_contact reads 1: read it with the version that wrote"),
+        (
+            '{"format": 2}',
+            r"has format 2 and this version of vi_contact reads 1: read it with the version that wrote",
+        ),
         ('{"format": true}', "has format True"),
         ("[]", "'.*format.json' is damaged"),
     ):
@@ -425,7 +512,9 @@ def test_folders_of_another_format(tmp_path: Path) -> None:
 
 
 @pytest.mark.serial
-def test_rows_wait_for_each_other_but_not_for_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rows_wait_for_each_other_but_not_for_long(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Rows are written in blocks: before every checkpoint, and when the next step might make one late."""
     monkeypatch.setattr("vi_contact.run.files.writer.LATEST", 1e9)
     path, found = tmp_path / "history.csv", {}
@@ -449,8 +538,19 @@ def test_rows_wait_for_each_other_but_not_for_long(tmp_path: Path, monkeypatch: 
             return {"seen": 0.0}
 
     simulate(
-        chain_problem(5), scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=5e-3, steps=30, out=tmp_path,
-        record=[Slow()], checkpoint_every=10,
+        chain_problem(5),
+        scheme=ZienkiewiczWoodTaylor(),
+        solver=Condensed(),
+        dt=5e-3,
+        steps=30,
+        out=tmp_path,
+        record=[Slow()],
+        checkpoint_every=10,
     )
-    assert found[10] == 1 and found[11] == found[20] == 11 and found[21] == found[23] == 21 and found[24] == 24
+    assert (
+        found[10] == 1
+        and found[11] == found[20] == 11
+        and found[21] == found[23] == 21
+        and found[24] == 24
+    )
     assert path.read_bytes().count(b"\n") == 32

@@ -93,7 +93,11 @@ def spliced(data: bytes, dice: Dice) -> bytes:
 def headers(data: bytes, dice: Dice) -> bytes:
     """A byte in one of the headers of the archive: method, sizes, names, flags."""
     changed = bytearray(data)
-    marks = [place for mark in (b"PK\x01\x02", b"PK\x03\x04", b"PK\x05\x06") for place in _all(data, mark)]
+    marks = [
+        place
+        for mark in (b"PK\x01\x02", b"PK\x03\x04", b"PK\x05\x06")
+        for place in _all(data, mark)
+    ]
     changed[int(dice.choice(marks)) + int(dice.integers(4, 46))] = int(dice.integers(256))
     return bytes(changed)
 
@@ -108,7 +112,10 @@ TYPES = ("f4", ">f8", "i8", "c16", "U8", "?", "O", "M8[s]", "S3")
 
 def rearranged(arrays: Arrays, dice: Dice) -> Arrays:
     """Arrays that are missing, renamed, reshaped, of other types, with other numbers, or too many."""
-    found, name = dict(arrays), str(dice.choice([one for one in arrays if one not in ("about", "checksum")]))
+    found, name = (
+        dict(arrays),
+        str(dice.choice([one for one in arrays if one not in ("about", "checksum")])),
+    )
     values = found[name]
     match int(dice.integers(8)):
         case 0:
@@ -127,7 +134,9 @@ def rearranged(arrays: Arrays, dice: Dice) -> Arrays:
                 found[name] = values.astype(str(dice.choice(TYPES)))
         case 6:
             found[name] = values.astype(float)
-            found[name][int(dice.integers(len(values)))] = dice.choice([np.nan, np.inf, -1e308, 7.0])
+            found[name][int(dice.integers(len(values)))] = dice.choice(
+                [np.nan, np.inf, -1e308, 7.0]
+            )
         case 7:
             found["extra"] = dice.random(3)
     return found
@@ -188,8 +197,12 @@ def test_checkpoints(sound: Path, tmp_path: Path) -> None:
             refused += 1
         else:
             assert forged or difference(found, wanted) == 0.0, seed
-            assert all(np.all(np.isfinite(values)) for values in (found.u, found.v, found.r_n)), seed
-            assert (found.u.shape, found.active.dtype) == (wanted.u.shape, wanted.active.dtype), seed
+            assert all(np.all(np.isfinite(values)) for values in (found.u, found.v, found.r_n)), (
+                seed
+            )
+            assert (found.u.shape, found.active.dtype) == (wanted.u.shape, wanted.active.dtype), (
+                seed
+            )
         assert time.process_time() - begin < SECONDS, seed
     assert refused > 0.75 * CHECKPOINTS
 
@@ -216,7 +229,9 @@ def other_numbers(path: Path, dice: Dice) -> None:
         case 2:
             lines.insert(i, lines[int(dice.integers(len(lines)))])
         case 3:
-            lines[i] = lines[i].replace(",", str(dice.choice([";", ",,", ", ", ",nan,", ",1e999,"])), 1)
+            lines[i] = lines[i].replace(
+                ",", str(dice.choice([";", ",,", ", ", ",nan,", ",1e999,"])), 1
+            )
         case 4:
             lines[i] = "{" + lines[i] + "\u0660"
     path.write_text("\n".join(lines))
@@ -225,7 +240,10 @@ def other_numbers(path: Path, dice: Dice) -> None:
 def other_datasets(path: Path, dice: Dice) -> None:
     """A dataset that is missing, renamed, shorter, of another type, a group, with other numbers."""
     with h5py.File(path, "r+") as file:
-        names = [*(f"contact/{name}" for name in file["contact"]), *(name for name in file if name != "contact")]
+        names = [
+            *(f"contact/{name}" for name in file["contact"]),
+            *(name for name in file if name != "contact"),
+        ]
         name = str(dice.choice(names))
         values = file[name][()]
         del file[name]
@@ -248,7 +266,12 @@ def other_datasets(path: Path, dice: Dice) -> None:
 
 def damage(folder: Path, dice: Dice) -> str:
     """Does something to a file of the folder; its name."""
-    names = ["history.csv"] * 3 + ["history.h5"] * 3 + ["history.journal"] * 2 + ["columns.json", "summary.json"]
+    names = (
+        ["history.csv"] * 3
+        + ["history.h5"] * 3
+        + ["history.journal"] * 2
+        + ["columns.json", "summary.json"]
+    )
     path = folder / str(dice.choice([*names, "format.json"]))
     kind = dice.random()
     if kind < 0.1:
@@ -282,18 +305,26 @@ def test_folders(sound: Path, tmp_path: Path) -> None:
         else:
             kept += 1
             for column, values in wanted.history.items():
-                assert np.array_equal(found.history[column], values, equal_nan=True), (seed, name, column)
+                assert np.array_equal(found.history[column], values, equal_nan=True), (
+                    seed,
+                    name,
+                    column,
+                )
         assert {path.name: path.read_bytes() for path in folder.iterdir()} == before, (seed, name)
         try:
             again = read_run(folder).history["u_x_12"]
         except InputError as error:
             assert "\n" not in str(error), (seed, name)
         else:
-            held = len(again) if name != "history.csv" else rows  # later ones of a killed run have no second copy
+            held = (
+                len(again) if name != "history.csv" else rows
+            )  # later ones of a killed run have no second copy
             assert np.array_equal(again[:held], whole[:held]), (seed, name)
         assert time.process_time() - begin < SECONDS, (seed, name)
         shutil.rmtree(folder)
-    assert 1 < kept < 23  # 5 to 14 with other seeds: the files of other machines differ, and the dice fall elsewhere
+    assert (
+        1 < kept < 23
+    )  # 5 to 14 with other seeds: the files of other machines differ, and the dice fall elsewhere
 
 
 def restarted(folder: Path) -> Solution:

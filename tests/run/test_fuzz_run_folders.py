@@ -32,9 +32,28 @@ from vi_contact.run.files.reading import read_run
 
 pytestmark = pytest.mark.serial
 pytest.importorskip("matplotlib")
-COUNT, DRAWN = 50, 8  # how many folders, and how many of those that are drawn, which takes a second each
+COUNT, DRAWN = (
+    50,
+    8,
+)  # how many folders, and how many of those that are drawn, which takes a second each
 NO_NUMBERS = ["nan", "1e999", "1_0", "", "x", "1" * 5000, "\0", '"', "-1"]
-ODD: list[Any] = [None, [], {}, "", "x", -1, 0, 1e308, 10**400, True, [[1]], {"mean": "x"}, "\ud800", "$\\frac$", "\0"]
+ODD: list[Any] = [
+    None,
+    [],
+    {},
+    "",
+    "x",
+    -1,
+    0,
+    1e308,
+    10**400,
+    True,
+    [[1]],
+    {"mean": "x"},
+    "\ud800",
+    "$\\frac$",
+    "\0",
+]
 
 
 @pytest.fixture(scope="module")
@@ -42,12 +61,18 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A chain that bounces between walls, 40 steps."""
     folder = tmp_path_factory.mktemp("run") / "chain"
     shake = vc.Ricker(3.0, 6.0, direction=(1.0,))
-    problem = chain_problem(3, gap=1e-3, left_gap=2e-3, excitation=shake, consistent=True, damping=1e-3)
+    problem = chain_problem(
+        3, gap=1e-3, left_gap=2e-3, excitation=shake, consistent=True, damping=1e-3
+    )
     record = [vc.Energy(), vc.Contact(), vc.Probe({"end": (3.0,)}, acceleration=True)]
     scheme = vc.ZienkiewiczWoodTaylor()
-    vc.simulate(problem, scheme=scheme, dt=5e-3, steps=40, record=record, out=folder, progress=False)
+    vc.simulate(
+        problem, scheme=scheme, dt=5e-3, steps=40, record=record, out=folder, progress=False
+    )
     facts = json.loads((folder / "summary.json").read_text("utf-8"))
-    facts |= {name: 0.125 for name in facts if name.startswith("seconds")}  # whose digits are others in every run: the
+    facts |= {
+        name: 0.125 for name in facts if name.startswith("seconds")
+    }  # whose digits are others in every run: the
     facts["memory"]["peak_bytes"] = [2**28]  # dice would fall on other places of the file
     (folder / "summary.json").write_text(json.dumps(facts, indent=1), "utf-8")
     return folder
@@ -61,9 +86,9 @@ def flipped(data: bytes, random: Random) -> bytes:
         for _ in range(random.choice((1, 2, 20))):
             copy[random.randrange(len(copy))] ^= 1 << random.randrange(8)
     elif kind == 1:
-        del copy[place:place + random.randrange(1, 200)]
+        del copy[place : place + random.randrange(1, 200)]
     elif kind == 2:
-        copy[place:place] = copy[place:place + random.randrange(1, 200)]
+        copy[place:place] = copy[place : place + random.randrange(1, 200)]
     else:
         del copy[place:]
     return bytes(copy)
@@ -103,7 +128,10 @@ def mutated(folder: Path, random: Random, names: Sequence[str]) -> dict[str, Any
     if random.random() < 0.4 or not name.endswith((".csv", ".json")):
         return {"file": name, "data": flipped(data, random)}
     if name.endswith(".csv"):
-        return {"file": name, "data": (digit if random.random() < 0.3 else swapped)(data.decode(), random).encode()}
+        return {
+            "file": name,
+            "data": (digit if random.random() < 0.3 else swapped)(data.decode(), random).encode(),
+        }
     if random.random() < 0.2:
         text = random.choice(["[1]", "1", "[" * 3000, '{"a": NaN}', "{", "", "\ufeff{}"])
     else:
@@ -117,7 +145,7 @@ def digit(text: str, random: Random) -> str:
     places = [k for k, letter in enumerate(rest) if letter.isdecimal()]
     place = random.choice(places)
     other = random.choice([one for one in "0123456789" if one != rest[place]])
-    return f"{head}\n{rest[:place]}{other}{rest[place + 1:]}"
+    return f"{head}\n{rest[:place]}{other}{rest[place + 1 :]}"
 
 
 def copied(run: Path, folder: Path, change: Mapping[str, Any]) -> Path:
@@ -156,8 +184,11 @@ def test_what_is_read_are_the_numbers_of_the_run(run: Path, tmp_path: Path) -> N
                 if np.ndim(values) == 1:
                     assert np.array_equal(found.history[name], values, equal_nan=True), name
             assert all(len(values) == len(truth["t"]) for values in found.history.values())
-            assert all(isinstance(text, str) for pair in [*found.columns.values(), *header_facts(found)]
-                       for text in pair)
+            assert all(
+                isinstance(text, str)
+                for pair in [*found.columns.values(), *header_facts(found)]
+                for text in pair
+            )
             assert peaks(found.history, found.columns)
             counts[1] += bool(refused(partial(sections_of, found, {})))
         finally:
@@ -169,8 +200,12 @@ def test_what_is_read_are_the_numbers_of_the_run(run: Path, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("row", [2, 20, 41])
-@pytest.mark.parametrize("kind", ["digit", "line lost", "line doubled", "end lost", "lines exchanged"])
-def test_a_table_with_other_numbers_is_refused(run: Path, tmp_path: Path, kind: str, row: int) -> None:
+@pytest.mark.parametrize(
+    "kind", ["digit", "line lost", "line doubled", "end lost", "lines exchanged"]
+)
+def test_a_table_with_other_numbers_is_refused(
+    run: Path, tmp_path: Path, kind: str, row: int
+) -> None:
     """It looks like a table in every way; the other copy of the numbers, or their count, tells. The remedy works."""
     lines = (run / "history.csv").read_text().split("\n")
     if kind == "digit":
@@ -182,10 +217,14 @@ def test_a_table_with_other_numbers_is_refused(run: Path, tmp_path: Path, kind: 
     elif kind == "line doubled":
         lines.insert(row, lines[row - 1])
     elif kind == "end lost":
-        del lines[max(row - 1, 2):-1]
+        del lines[max(row - 1, 2) : -1]
     else:
-        lines[row - 2], lines[row - 1] = (lines[row - 1], lines[row - 2]) if row > 2 else (lines[1] + ",1", lines[0])
-    folder = copied(run, tmp_path / "run", {"file": "history.csv", "data": "\n".join(lines).encode()})
+        lines[row - 2], lines[row - 1] = (
+            (lines[row - 1], lines[row - 2]) if row > 2 else (lines[1] + ",1", lines[0])
+        )
+    folder = copied(
+        run, tmp_path / "run", {"file": "history.csv", "data": "\n".join(lines).encode()}
+    )
     with pytest.raises(InputError, match="history.csv.* (damaged|differ in|has no)") as caught:
         read_run(folder)
     if "differ in" in str(caught.value):
@@ -206,13 +245,18 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.fuzz
-def test_commands_end_with_a_file_or_a_sentence(drawn: Path, tmp_path: Path,
-                                                capsys: pytest.CaptureFixture[str]) -> None:
+def test_commands_end_with_a_file_or_a_sentence(
+    drawn: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """plot, film, report (PDF and HTML) and post of a folder with one file mutated: what they wanted to write is there,
     or a sentence names the file."""
     frames = [f"fields/{path.name}" for path in sorted((drawn / "fields").iterdir())]
-    commands = [(["plot"], "deformed.png"), (["film"], "film.gif"), (["report", "--title", "$\\frac"], "report.pdf"),
-                (["post", "peaks", "--out", "OUT"], "table.csv")]
+    commands = [
+        (["plot"], "deformed.png"),
+        (["film"], "film.gif"),
+        (["report", "--title", "$\\frac"], "report.pdf"),
+        (["post", "peaks", "--out", "OUT"], "table.csv"),
+    ]
     if can_write():
         commands.append((["report", "--out", "PAGE"], "page.html"))
 
@@ -228,13 +272,23 @@ def test_commands_end_with_a_file_or_a_sentence(drawn: Path, tmp_path: Path,
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("error")
-                warnings.filterwarnings("ignore", "Glyph")  # that no font has, in a text of a mutated file
+                warnings.filterwarnings(
+                    "ignore", "Glyph"
+                )  # that no font has, in a text of a mutated file
                 code = main([*words[:first], str(folder), *words[first:]])
             said = capsys.readouterr().err
             if code:
                 assert code == 1 and said.startswith("vi-contact: ") and said.count("\n") == 1, said
                 name = change["file"].rpartition("/")[2]
-                about = (name, "history.csv", "no steps yet", "no frames in", "columns", "units", "has bars or points")
+                about = (
+                    name,
+                    "history.csv",
+                    "no steps yet",
+                    "no frames in",
+                    "columns",
+                    "units",
+                    "has bars or points",
+                )
                 assert any(word in said for word in about), (change["file"], said)
             else:
                 assert (folder / change["made"]).stat().st_size > 50 and not said
@@ -257,23 +311,42 @@ def test_frames_have_the_numbers_of_the_run(drawn: Path, tmp_path: Path) -> None
         rebuilt(folder / "fields" / change["file"], change)
         try:
             found = refused(partial(read_frames, folder))
-            for t, (u, stress) in zip(truth.t.tolist(), wanted, strict=True) if found is not None else ():
+            for t, (u, stress) in (
+                zip(truth.t.tolist(), wanted, strict=True) if found is not None else ()
+            ):
                 at = refused(partial(found.at, t))
                 assert at is None or np.array_equal(at[1], u), t
-                assert at is None or np.array_equal(at[2], stress, equal_nan=True) or change["name"] == "von_mises", t
+                assert (
+                    at is None
+                    or np.array_equal(at[2], stress, equal_nan=True)
+                    or change["name"] == "von_mises"
+                ), t
         finally:
             shutil.rmtree(folder)
 
     def make(dice: Random) -> dict[str, Any]:
         file = dice.choice([frame, frame, "mesh.h5"])
-        name = dice.choice(["points", "cells"] if file == "mesh.h5" else ["u", "u", "v", "von_mises"])
+        name = dice.choice(
+            ["points", "cells"] if file == "mesh.h5" else ["u", "u", "v", "von_mises"]
+        )
         return {"file": file, "name": name, "kind": dice.choice(REBUILT), "n": dice.randrange(1, 4)}
 
     FRAMES.each(DRAWN, make, check)
 
 
 FRAMES = Fuzz("frames", __file__)
-REBUILT = ("lost", "renamed", "shorter", "longer", "flat", "texts", "group", "soft link", "complex", "deep")
+REBUILT = (
+    "lost",
+    "renamed",
+    "shorter",
+    "longer",
+    "flat",
+    "texts",
+    "group",
+    "soft link",
+    "complex",
+    "deep",
+)
 
 
 def rebuilt(path: Path, change: Mapping[str, Any]) -> None:
@@ -283,7 +356,8 @@ def rebuilt(path: Path, change: Mapping[str, Any]) -> None:
         values = file[name][()]
         del file[name]
         made: dict[str, Callable[[], Any]] = {
-            "lost": lambda: None, "renamed": lambda: file.create_dataset(f"{name}_", data=values),
+            "lost": lambda: None,
+            "renamed": lambda: file.create_dataset(f"{name}_", data=values),
             "shorter": lambda: file.create_dataset(name, data=values[:-n]),
             "longer": lambda: file.create_dataset(name, data=np.concatenate([values, values[:n]])),
             "flat": lambda: file.create_dataset(name, data=values.ravel()),
@@ -307,7 +381,9 @@ def test_arrays_of_other_files_are_not_followed(run: Path, tmp_path: Path) -> No
             shape = file["gap"].shape
             del file["gap"]
             if kind == "external":
-                file.create_dataset("gap", shape, "f8", external=[(str(secret), 0, h5py.h5f.UNLIMITED)])
+                file.create_dataset(
+                    "gap", shape, "f8", external=[(str(secret), 0, h5py.h5f.UNLIMITED)]
+                )
             elif kind == "link":
                 file["gap"] = h5py.ExternalLink(str(run / "history.h5"), "gap")
             elif kind == "virtual":
@@ -316,7 +392,9 @@ def test_arrays_of_other_files_are_not_followed(run: Path, tmp_path: Path) -> No
                 file.create_virtual_dataset("gap", layout)
             else:
                 file.create_dataset("gap", (shape[0], 10**12), "f8", chunks=(1, 1000))
-        with pytest.raises(InputError, match="lies in another file|is no array of numbers of this file"):
+        with pytest.raises(
+            InputError, match="lies in another file|is no array of numbers of this file"
+        ):
             read_run(folder)
 
 
@@ -327,7 +405,9 @@ def test_the_spectrum_begins_at_20_ms(run: Path) -> None:
     """Not at a part of the duration: 0.31 s for a record of 31 s."""
     record = ground_motion.Record(np.ones(3118), 0.01)
     assert shown_periods(record)[[0, -1]].tolist() == pytest.approx([0.02, 10.0])
-    assert shown_periods(ground_motion.Record(np.ones(50), 0.01))[[0, -1]].tolist() == pytest.approx([0.02, 1.0])
+    assert shown_periods(ground_motion.Record(np.ones(50), 0.01))[
+        [0, -1]
+    ].tolist() == pytest.approx([0.02, 1.0])
 
 
 def test_peak_accelerations_are_marked(run: Path) -> None:
@@ -336,13 +416,21 @@ def test_peak_accelerations_are_marked(run: Path) -> None:
     assert not any("convergent" in found[name] for name in ("a_g_x", "u_x_end", "contact_force_x"))
 
 
-@pytest.mark.parametrize(("dt", "told"), [
-    (0.01, False), (0.02, True), (vc.Schedule(((0.005, 0.1), (0.04, math.inf))), True), (vc.HalvedAtImpact(0.02), True),
-])
+@pytest.mark.parametrize(
+    ("dt", "told"),
+    [
+        (0.01, False),
+        (0.02, True),
+        (vc.Schedule(((0.005, 0.1), (0.04, math.inf))), True),
+        (vc.HalvedAtImpact(0.02), True),
+    ],
+)
 def test_a_step_longer_than_the_record_s_warns_once(dt: Any, told: bool, tmp_path: Path) -> None:
     shake = vc.GroundMotion(ground_motion.Record(np.sin(np.arange(30.0)), 0.01), direction=(1.0,))
     problem = chain_problem(3, gap=1e-3, excitation=shake, consistent=True)
-    done = vc.simulate(problem, scheme=vc.ZienkiewiczWoodTaylor(), dt=dt, t_end=0.2, out=tmp_path, progress=False)
+    done = vc.simulate(
+        problem, scheme=vc.ZienkiewiczWoodTaylor(), dt=dt, t_end=0.2, out=tmp_path, progress=False
+    )
     log = (tmp_path / "run.log").read_text("utf-8")
     assert log.count("is longer than the 0.01 s of the record") == told
     assert ("is longer than the 0.01 s" in " ".join(done.summary().split())) == told

@@ -19,8 +19,14 @@ from vi_contact.run.files.reading import read_run
 pytestmark = [pytest.mark.serial, pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")]
 FUZZ = Fuzz("kills at places", __file__)
 COUNT, KILLS, STEPS = 4, 3, 60
-PLACES = ("vi_contact.core.files.write_all", "vi_contact.run.files.history.write_all", "os.replace", "os.fsync",
-          "vi_contact.run.files.folder.remove", "vi_contact.run.files.log.write_all")
+PLACES = (
+    "vi_contact.core.files.write_all",
+    "vi_contact.run.files.history.write_all",
+    "os.replace",
+    "os.fsync",
+    "vi_contact.run.files.folder.remove",
+    "vi_contact.run.files.log.write_all",
+)
 
 
 def counted(patch: pytest.MonkeyPatch, at: int) -> list[int]:
@@ -52,7 +58,9 @@ def killed(folder: Path, at: int) -> bool:
         try:
             with pytest.MonkeyPatch.context() as patch:
                 counted(patch, at)
-                run(folder, STEPS, checkpoint_every=7, restart=(folder / "checkpoint.npz").is_file())
+                run(
+                    folder, STEPS, checkpoint_every=7, restart=(folder / "checkpoint.npz").is_file()
+                )
             os._exit(0)
         finally:
             os._exit(1)
@@ -75,9 +83,13 @@ def test_a_run_that_is_killed_again_and_again(tmp_path: Path) -> None:
         folder = tmp_path / f"killed {' '.join(map(str, places))}"
         for at in places:
             killings.append(killed(folder, at))
-            if (folder / "history.csv").is_file() and (folder / "history.csv").read_bytes().count(b"\n") > 1:
+            if (folder / "history.csv").is_file() and (folder / "history.csv").read_bytes().count(
+                b"\n"
+            ) > 1:
                 read_run(folder)
-        found = run(folder, STEPS, checkpoint_every=7, restart=(folder / "checkpoint.npz").is_file())
+        found = run(
+            folder, STEPS, checkpoint_every=7, restart=(folder / "checkpoint.npz").is_file()
+        )
         assert np.array_equal(found.state.u, straight.state.u)
         for name, values in read_run(tmp_path / "straight").history.items():
             assert np.array_equal(read_run(folder).history[name], values, equal_nan=True), name

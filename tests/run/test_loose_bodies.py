@@ -19,7 +19,9 @@ COMM = MPI.COMM_WORLD
 LOWER = BlockMesh(lengths=(1.0, 1.0), divisions=(4, 4))
 
 
-def stacked(*, gap: float = 0.0, contact: bool = False, clamp_both: bool = False) -> vc.ContactProblem:
+def stacked(
+    *, gap: float = 0.0, contact: bool = False, clamp_both: bool = False
+) -> vc.ContactProblem:
     """Two blocks one on the other whose meshes share no node; the ground in front of the lower one's left side."""
     mesh, tags = fem.build_mesh(TwoBlocks(lower=LOWER, upper=LOWER, gap=gap), COMM)
     material = vc.LinearElastic(E=1e9, nu=0.2, rho=2000.0)
@@ -39,8 +41,11 @@ def run(problem: vc.ContactProblem) -> Any:
 
 def test_meshes_that_are_not_merged_are_refused() -> None:
     """The 25 nodes of the upper block are around (0.5, 1.5) m, and 5 of them lie at nodes of the lower one."""
-    with pytest.raises(vc.InputError, match=r"nothing holds the body of 25 nodes around \(0.5, 1.5\), and no contact "
-                                            r"touches it: 5 of its nodes lie at the places of nodes of another body"):
+    with pytest.raises(
+        vc.InputError,
+        match=r"nothing holds the body of 25 nodes around \(0.5, 1.5\), and no contact "
+        r"touches it: 5 of its nodes lie at the places of nodes of another body",
+    ):
         run(stacked())
 
 

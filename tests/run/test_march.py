@@ -33,10 +33,14 @@ SCHEMES = [HALF, SS22(0.6, 0.7), NEWMARK]
 
 
 def test_initial_penetration_is_refused():
-    with pytest.raises(InputError, match=r"penetrates the obstacle by 0.002 m: reduce it or enlarge the gap"):
+    with pytest.raises(
+        InputError, match=r"penetrates the obstacle by 0.002 m: reduce it or enlarge the gap"
+    ):
         next(run(chain_problem(3, gap=0.01, u0=[0.0, 0.0, 0.012]), HALF, dt=0.1, steps=1))
     with pytest.raises(InputError, match="penetrates"):
-        next(run(chain_problem(3, gap=0.01, u0=[0.0, 0.0, 0.01 * (1 + 1e-7)]), HALF, dt=0.1, steps=1))
+        next(
+            run(chain_problem(3, gap=0.01, u0=[0.0, 0.0, 0.01 * (1 + 1e-7)]), HALF, dt=0.1, steps=1)
+        )
     touching = chain_problem(3, gap=0.01, u0=[0.0, 0.0, 0.01 * (1 + 1e-12)])
     assert len(list(run(touching, HALF, dt=0.1, steps=1))) == 1
 
@@ -66,11 +70,16 @@ def test_continuing_from_a_state_is_bit_equal(scheme, impact):
 def test_nan_load_stops_at_its_step():
     """The force on the last mass turns NaN after t = 0.035."""
     problem = shaken(excitation=())
-    problem = replace(problem, system=problem.system.with_load((np.ones(6), lambda t: np.nan if t > 0.035 else 0.0)))
+    problem = replace(
+        problem,
+        system=problem.system.with_load((np.ones(6), lambda t: np.nan if t > 0.035 else 0.0)),
+    )
     steps = run(problem, ZienkiewiczWoodTaylor(1.0), dt=0.01, steps=10)
     for _ in range(3):
         next(steps)
-    with pytest.raises(StepFailure, match=r"the load of step 4 at t = 0.04 s contains NaN or infinite"):
+    with pytest.raises(
+        StepFailure, match=r"the load of step 4 at t = 0.04 s contains NaN or infinite"
+    ):
         next(steps)
 
 
@@ -90,13 +99,17 @@ class Careless:
         if self.honest:
             raise StepFailure("careless: I have no idea")
         m = step.surface.count
-        return StepResult(step.A.factor.solve(step.b), np.zeros(m), np.zeros(m, dtype=bool), 0, "careless")
+        return StepResult(
+            step.A.factor.solve(step.b), np.zeros(m), np.zeros(m, dtype=bool), 0, "careless"
+        )
 
 
 @pytest.mark.parametrize("honest", [False, True])
 def test_bad_step_goes_to_the_next_solver(honest):
     """The steps that close escalate, are reported, and the run is the one of the good solver."""
-    bad = list(run(shaken(), HALF, dt=5e-3, steps=60, solver=Careless(honest), escalation=[Condensed()]))
+    bad = list(
+        run(shaken(), HALF, dt=5e-3, steps=60, solver=Careless(honest), escalation=[Condensed()])
+    )
     good = list(run(shaken(), HALF, dt=5e-3, steps=60))
     assert 5 < sum(report.new.active[0] for report in good) < 55
     for one, other in zip(bad, good, strict=True):
@@ -114,9 +127,17 @@ def test_without_escalation_a_bad_step_raises_and_says_where():
     assert len(done) == first.k - 1  # they were handed out
     message = str(caught.value)
     assert f"step {first.k} at t = {first.t:.6g} s" in message
-    for word in ("1e-09", "careless: Certificate(equilibrium=", "penetration=", "complementarity=", "try a smaller dt"):
+    for word in (
+        "1e-09",
+        "careless: Certificate(equilibrium=",
+        "penetration=",
+        "complementarity=",
+        "try a smaller dt",
+    ):
         assert word in message
-    both = run(shaken(), HALF, dt=5e-3, steps=60, solver=Careless(), escalation=[Careless(honest=True)])
+    both = run(
+        shaken(), HALF, dt=5e-3, steps=60, solver=Careless(), escalation=[Careless(honest=True)]
+    )
     with pytest.raises(StepFailure, match=r"careless: Certificate.*; careless: I have no idea"):
         list(both)
 
@@ -148,7 +169,9 @@ def test_static_stage_of_a_bar_standing_on_its_foot():
     assert state.r_n[0] == pytest.approx(rho * g * L / 2.0 - E * gap / L, rel=1e-12)
     assert state.active.all() and not state.v.any() and state.k == 0
     hanging = static_equilibrium(bar(20, clamped=True, gravity=g, gap=0.6), solver=Condensed())
-    assert not hanging.active.any() and hanging.u[0] == pytest.approx(rho * g * L**2 / (2.0 * E), rel=1e-12)
+    assert not hanging.active.any() and hanging.u[0] == pytest.approx(
+        rho * g * L**2 / (2.0 * E), rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=lambda s: type(s).__name__)
@@ -200,7 +223,9 @@ def test_static_spring_that_stays_closed_is_a_spring_of_the_structure():
 
 def ringing(**more: Any) -> ContactProblem:
     """Pressed on by 3000 N, the springs stay closed while it rings."""
-    return shaken(gap=0.0, stiffness=1e3, excitation=(), constant=3000.0, u0=np.linspace(0.2, 1.2, 6), **more)
+    return shaken(
+        gap=0.0, stiffness=1e3, excitation=(), constant=3000.0, u0=np.linspace(0.2, 1.2, 6), **more
+    )
 
 
 def displaced(problem: ContactProblem) -> State:
@@ -209,7 +234,9 @@ def displaced(problem: ContactProblem) -> State:
     return State(0.0, 0, system.u0, system.v0, np.zeros(1), np.ones(1, dtype=bool))
 
 
-@pytest.mark.parametrize("scheme", [NEWMARK, ZienkiewiczWoodTaylor(1.0), SS22(1.0, 1.0)], ids=["lmm", "zwt", "ss22"])
+@pytest.mark.parametrize(
+    "scheme", [NEWMARK, ZienkiewiczWoodTaylor(1.0), SS22(1.0, 1.0)], ids=["lmm", "zwt", "ss22"]
+)
 def test_dynamic_spring_that_stays_closed_is_a_spring_of_the_structure(scheme):
     """Exactly so for schemes that balance forces at the end of the step."""
     soft, stiff = sprung(ringing(), 4e3), glued(ringing(), 2e3)

@@ -21,7 +21,10 @@ from vi_contact.run.together import Group
 MODEL = build(Wall(divisions=(4, 6)), MPI.COMM_WORLD)
 DT = MODEL.time_step()
 BASE = MODEL.problem("face")
-SHAKEN = [replace(BASE, excitation=replace(BASE.excitation, amplitude=amplitude)) for amplitude in (1.0, 0.3, 2.5)]
+SHAKEN = [
+    replace(BASE, excitation=replace(BASE.excitation, amplitude=amplitude))
+    for amplitude in (1.0, 0.3, 2.5)
+]
 STEPS = 50
 
 
@@ -39,6 +42,7 @@ def run(problems, **settings):
 
 def apart(ours: vc.State, theirs: vc.State) -> float:
     """Return how far two states are apart, over the largest entries of one."""
+
     def over(one, other):
         return np.abs(one - other).max(initial=0.0) / (np.abs(other).max(initial=0.0) or 1.0)
 
@@ -50,11 +54,15 @@ def apart(ours: vc.State, theirs: vc.State) -> float:
 def steps_together(monkeypatch):
     """Count the runs of each step that was made together."""
     counts, finish = [], Group._finish
-    monkeypatch.setattr(Group, "_finish", lambda self, *args: (counts.append(len(self._runs)), finish(self, *args)))
+    monkeypatch.setattr(
+        Group, "_finish", lambda self, *args: (counts.append(len(self._runs)), finish(self, *args))
+    )
     return counts
 
 
-RUBBING = [replace(one, friction=vc.Coulomb(mu)) for one, mu in zip(SHAKEN, (0.2, 0.5, 0.0), strict=True)]
+RUBBING = [
+    replace(one, friction=vc.Coulomb(mu)) for one, mu in zip(SHAKEN, (0.2, 0.5, 0.0), strict=True)
+]
 LIGHT = [replace(one, impact=None, mass=vc.Redistributed()) for one in SHAKEN]
 
 
@@ -63,11 +71,19 @@ def alone(problems, scheme):
     return pytest.param(problems, scheme, marks=pytest.mark.serial)
 
 
-@pytest.mark.parametrize(("problems", "scheme"), [
-    (SHAKEN, None), alone(SHAKEN, vc.Newmark()), alone(SHAKEN, vc.HHT()), alone(SHAKEN, vc.SS22()),
-    alone(SHAKEN, vc.Houbolt()), (RUBBING, None), alone(LIGHT, None),
-    alone([replace(one, friction=vc.Coulomb(0.3)) for one in LIGHT], None),
-])
+@pytest.mark.parametrize(
+    ("problems", "scheme"),
+    [
+        (SHAKEN, None),
+        alone(SHAKEN, vc.Newmark()),
+        alone(SHAKEN, vc.HHT()),
+        alone(SHAKEN, vc.SS22()),
+        alone(SHAKEN, vc.Houbolt()),
+        (RUBBING, None),
+        alone(LIGHT, None),
+        alone([replace(one, friction=vc.Coulomb(0.3)) for one in LIGHT], None),
+    ],
+)
 def test_each_step_is_the_step_alone_from_the_same_state(problems, scheme, steps_together):
     reports, errors = run(problems, scheme=scheme)
     closed = 0.0
@@ -90,14 +106,24 @@ def test_each_step_is_the_step_alone_from_the_same_state(problems, scheme, steps
 def test_bodies_in_space(monkeypatch, steps_together, by_supernodes, friction):
     """A cube over the ground that it touches: substitutions by supernodes, as where bodies in space are large."""
     monkeypatch.setattr(contact_last, "SHORT_COLUMNS", 1.0 if by_supernodes else 1e3)
-    mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 1.0, 1.0), divisions=(3, 3, 3)), MPI.COMM_WORLD)
+    mesh, tags = fem.build_mesh(
+        BlockMesh(lengths=(1.0, 1.0, 1.0), divisions=(3, 3, 3)), MPI.COMM_WORLD
+    )
     system = fem.assemble(mesh, vc.LinearElastic(E=3e10, nu=0.2, rho=2400.0), clamped=tags["top"])
     ground = vc.HalfSpace(point=(0.0, 0.0, 0.0), normal=(0.0, 1.0, 0.0))
     surface, dt = fem.contact_surface(system, tags["bottom"], obstacle=ground), 6e-5
     laws = {} if friction is None else {"friction": friction}
-    problems = [vc.ContactProblem(
-        system, surface, mass=vc.ConsistentMass(), impact=vc.Inelastic(), **laws,
-        excitation=vc.Harmonic(amplitude, 400.0, direction=(0.3, 1.0, 0.1))) for amplitude in (1.0, -0.4, 2.0)]
+    problems = [
+        vc.ContactProblem(
+            system,
+            surface,
+            mass=vc.ConsistentMass(),
+            impact=vc.Inelastic(),
+            **laws,
+            excitation=vc.Harmonic(amplitude, 400.0, direction=(0.3, 1.0, 0.1)),
+        )
+        for amplitude in (1.0, -0.4, 2.0)
+    ]
     settings = {"scheme": vc.ZienkiewiczWoodTaylor(), "dt": dt, "solver": vc.Condensed()}
     reports, errors = run(problems, steps=24, **settings)
     closed = 0.0
@@ -121,13 +147,17 @@ def test_reports_hold_what_reports_of_march_hold(steps_together):
         alone, other = next(vc.march(SHAKEN[1], dt=DT, steps=1, state=report.old))
         for name in reversed(fields):
             assert type(getattr(report, name)) is type(getattr(other, name))
-        assert np.abs(report.step.b - other.step.b).max(initial=0.0) <= 1e-12 * np.abs(other.step.b).max(initial=0.0)
+        assert np.abs(report.step.b - other.step.b).max(initial=0.0) <= 1e-12 * np.abs(
+            other.step.b
+        ).max(initial=0.0)
         assert (report.step.t, report.result.iterations) == (alone.t, other.result.iterations)
         assert not hasattr(report, "another")
         for name, x in (("M", report.v_minus), ("M", report.new.v), ("K", report.new.u)):
             expected = getattr(report.problem.equations, name) @ x
             found = report.problem.equations.product(name, x)
-            assert np.abs(found - expected).max(initial=0.0) <= 1e-13 * np.abs(expected).max(initial=0.0)
+            assert np.abs(found - expected).max(initial=0.0) <= 1e-13 * np.abs(expected).max(
+                initial=0.0
+            )
     for before, after in itertools.pairwise(reports[1]):
         assert after.old is before.new
 
@@ -158,7 +188,11 @@ def test_a_run_that_fails_leaves_the_others_alone():
     broken = replace(BASE, excitation=Broken())
     reports, errors = run([SHAKEN[0], broken, SHAKEN[2]])
     expected, _ = run([SHAKEN[0], SHAKEN[2]])
-    assert isinstance(errors[1], vc.StepFailure) and "NaN" in str(errors[1]) and len(reports[1]) < STEPS
+    assert (
+        isinstance(errors[1], vc.StepFailure)
+        and "NaN" in str(errors[1])
+        and len(reports[1]) < STEPS
+    )
     for number, other in ((0, 0), (2, 1)):
         assert apart(reports[number][-1].new, expected[other][-1].new) < 1e-9
 
@@ -208,7 +242,9 @@ class Fails:
 
 @pytest.mark.two_ranks
 def test_a_run_that_escalates_goes_on_alone(steps_together):
-    reports, errors = run(RUBBING, solver=Fails(), escalation=[vc.Condensed(friction_method=vc.solvers.NSGS())])
+    reports, errors = run(
+        RUBBING, solver=Fails(), escalation=[vc.Condensed(friction_method=vc.solvers.NSGS())]
+    )
     escalated = [[one.new.k for one in reports[number] if one.escalated] for number in range(3)]
     assert not errors and escalated == [[], [12], []]
     expected, _ = run(RUBBING)
@@ -219,7 +255,10 @@ def test_a_run_that_escalates_goes_on_alone(steps_together):
 
 
 def test_runs_that_do_not_step_together_are_the_runs_alone(steps_together):
-    for settings in ({"scheme": vc.ContactStabilisedNewmark()}, {"dt": vc.HalvedAtImpact(DT, halvings=1)}):
+    for settings in (
+        {"scheme": vc.ContactStabilisedNewmark()},
+        {"dt": vc.HalvedAtImpact(DT, halvings=1)},
+    ):
         reports, errors = run(SHAKEN, **settings)
         for number, problem in enumerate(SHAKEN):
             *_, (alone, _) = vc.march(problem, **({"dt": DT, "steps": STEPS} | settings))

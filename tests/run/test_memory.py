@@ -26,12 +26,16 @@ def test_the_summary_counts_the_bytes(comm: Any, shared_tmp: Path) -> None:
     assert known["K"] == entry * (own + problem.turned.K.mat.getInfo()["nz_used"])
     assert known["A"] >= entry * own and known["mesh"] > 8 * 3 * problem.system.space.unknowns // 2
     assert "factor" in known or comm.size > 1  # PETSc's copies of its own do not tell
-    assert len(found["peak_bytes"]) == comm.size and all(2**20 < one < 2**40 for one in found["peak_bytes"])
+    assert len(found["peak_bytes"]) == comm.size and all(
+        2**20 < one < 2**40 for one in found["peak_bytes"]
+    )
     if comm.rank == 0:
         assert summary_of(shared_tmp)["memory"] == found
         told = (shared_tmp / "run.log").read_text()
         assert told.count("INFO memory [MB]: at most ") == 2 and in_words(found) in told
-        assert re.search(r"set up: .*mesh [\d.e-]+ s, assembling [\d.e-]+ s, contact [\d.e-]+ s, mass ", told)
+        assert re.search(
+            r"set up: .*mesh [\d.e-]+ s, assembling [\d.e-]+ s, contact [\d.e-]+ s, mass ", told
+        )
         assert re.search(r"INFO preparing [\d.e-]+ s\n", told)
     comm.Barrier()
 

@@ -23,16 +23,28 @@ SCHEMES = [HALF, SS22(0.6, 0.7), LinearMultistep.newmark()]
 
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=lambda s: type(s).__name__)
-@pytest.mark.parametrize("impact", [None, Inelastic(), Elastic()], ids=["none", "inelastic", "elastic"])
+@pytest.mark.parametrize(
+    "impact", [None, Inelastic(), Elastic()], ids=["none", "inelastic", "elastic"]
+)
 def test_positive_homogeneity(scheme, impact):
     """Loads, gap and base motion times 2.5: everything times 2.5, to 1e-12."""
     one = list(run(shaken(impact), scheme, dt=5e-3, steps=50))
-    more = list(run(shaken(impact, gap=0.025, excitation=replace(SHAKE, amplitude=-75.0)), scheme, dt=5e-3, steps=50))
+    more = list(
+        run(
+            shaken(impact, gap=0.025, excitation=replace(SHAKE, amplitude=-75.0)),
+            scheme,
+            dt=5e-3,
+            steps=50,
+        )
+    )
     assert changes(one) >= 2
     for name in ("u", "v", "r_n"):
         biggest = max(np.abs(getattr(report.new, name)).max() for report in one)
         for a, b in zip(one, more, strict=True):
-            assert np.abs(getattr(b.new, name) - 2.5 * getattr(a.new, name)).max() <= 1e-12 * 2.5 * biggest
+            assert (
+                np.abs(getattr(b.new, name) - 2.5 * getattr(a.new, name)).max()
+                <= 1e-12 * 2.5 * biggest
+            )
 
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=lambda s: type(s).__name__)
@@ -48,7 +60,9 @@ def test_translation_of_the_time_origin(scheme):
     """The same shaking one period (1/3 s) later, started one period later."""
     start = initial_state(shaken())
     now = list(run(shaken(Inelastic()), scheme, dt=5e-3, steps=60, state=start))
-    later = list(run(shaken(Inelastic()), scheme, dt=5e-3, steps=60, state=replace(start, t=1.0 / 3.0)))
+    later = list(
+        run(shaken(Inelastic()), scheme, dt=5e-3, steps=60, state=replace(start, t=1.0 / 3.0))
+    )
     assert changes(now) >= 2
     assert later[-1].new.t == pytest.approx(0.3 + 1.0 / 3.0)
     for a, b in zip(now, later, strict=True):
@@ -78,9 +92,13 @@ def test_units_do_not_matter():
 @pytest.mark.parametrize("impact", [None, Inelastic()], ids=["none", "inelastic"])
 def test_mirror_symmetry(impact):
     """A free chain between two walls: shaken the other way, with the gaps exchanged, it moves the other way."""
-    right = chain_problem(5, gap=0.02, left_gap=0.01, floating=True, stiffness=2e4, excitation=SHAKE, impact=impact)
+    right = chain_problem(
+        5, gap=0.02, left_gap=0.01, floating=True, stiffness=2e4, excitation=SHAKE, impact=impact
+    )
     back = replace(SHAKE, amplitude=-SHAKE.amplitude)
-    left = chain_problem(5, gap=0.01, left_gap=0.02, floating=True, stiffness=2e4, excitation=back, impact=impact)
+    left = chain_problem(
+        5, gap=0.01, left_gap=0.02, floating=True, stiffness=2e4, excitation=back, impact=impact
+    )
     reports = list(run(right, HALF, dt=5e-3, steps=100))
     assert changes(reports) > 5
     for one, other in zip(reports, run(left, HALF, dt=5e-3, steps=100), strict=True):
@@ -95,7 +113,16 @@ def test_doubled_condition_has_no_effect():
     surface = problem.surface
     twice = {
         name: np.repeat(getattr(surface, name), 2, axis=0)
-        for name in ("points", "normals", "weights", "gap0", "bilateral", "compliance", "owned", "tangents")
+        for name in (
+            "points",
+            "normals",
+            "weights",
+            "gap0",
+            "bilateral",
+            "compliance",
+            "owned",
+            "tangents",
+        )
     }
     problem = replace(problem, surface=replace(surface, **twice, slots=np.array([0, 1])))
     with pytest.raises(InputError, match="remove constraints that act on the same motion twice"):

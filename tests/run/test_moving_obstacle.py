@@ -33,8 +33,12 @@ from vi_contact.schemes.trapezoidal import Trapezoidal
 from vi_contact.solvers.condensed import Condensed
 
 SCHEMES = [
-    (Trapezoidal(), Redistributed()), (Newmark(), Redistributed()), (HHT(-0.1), Redistributed()),
-    (Houbolt(), Redistributed()), (Midpoint(), ConsistentMass()), (ContactStabilisedNewmark(), ConsistentMass()),
+    (Trapezoidal(), Redistributed()),
+    (Newmark(), Redistributed()),
+    (HHT(-0.1), Redistributed()),
+    (Houbolt(), Redistributed()),
+    (Midpoint(), ConsistentMass()),
+    (ContactStabilisedNewmark(), ConsistentMass()),
     (MoreauJean(), ConsistentMass()),
 ]
 RUBBING = [SCHEMES[0], *SCHEMES[4:]]
@@ -54,11 +58,16 @@ def test_a_rising_wall_is_a_falling_bar(scheme: Any, mass: Any) -> None:
     thrown = bar(60, gap=5.0, v0=lambda x: np.full_like(x, -10.0), mass=mass)
     one, two = (list(run(p, scheme, dt=dt, steps=steps)) for p in (thrown, pushed(mass)))
     # the very step that touches rounds differently, so the force of single steps is compared in the mean
-    forces = [np.array([float(report.balance.r_n.sum()) for report in reports]) for reports in (one, two)]
+    forces = [
+        np.array([float(report.balance.r_n.sum()) for report in reports]) for reports in (one, two)
+    ]
     assert np.abs(forces[0] - forces[1]).max() <= 1e-7 * np.abs(forces[0]).max()
     t = one[-1].new.t
     for a, b in zip(one[::20], two[::20], strict=True):
-        gaps = [p.surface.gap(r.new.t) - p.surface.normal_values(r.new.u) for p, r in ((thrown, a), (pushed(mass), b))]
+        gaps = [
+            p.surface.gap(r.new.t) - p.surface.normal_values(r.new.u)
+            for p, r in ((thrown, a), (pushed(mass), b))
+        ]
         assert gaps[0] == pytest.approx(gaps[1], abs=1e-7)
     assert t > 1.4
 
@@ -81,7 +90,9 @@ def test_its_work_is_in_the_ledger(scheme: Any, mass: Any) -> None:
 def test_a_held_point_follows_its_obstacle() -> None:
     """Bilateral on a moving wall: a prescribed motion."""
     given = bar(40, gap=0.0, mass=Redistributed())
-    moving = replace(given, surface=given.surface.bilateral_everywhere().moving(lambda t: 0.1 * np.sin(3.0 * t)))
+    moving = replace(
+        given, surface=given.surface.bilateral_everywhere().moving(lambda t: 0.1 * np.sin(3.0 * t))
+    )
     for report in run(moving, Trapezoidal(), dt=0.01, steps=100):
         u_n = moving.surface.normal_values(report.new.u)[0]
         assert u_n == pytest.approx(-0.1 * np.sin(3.0 * report.new.t), abs=1e-14)
@@ -89,7 +100,8 @@ def test_a_held_point_follows_its_obstacle() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "scheme, mass", [RUBBING[0], *(pytest.param(*one, marks=pytest.mark.serial) for one in RUBBING[1:])],
+    "scheme, mass",
+    [RUBBING[0], *(pytest.param(*one, marks=pytest.mark.serial) for one in RUBBING[1:])],
     ids=[repr(scheme) for scheme, _ in RUBBING],
 )
 def test_a_belt_drags_with_the_force_of_friction(scheme: Any, mass: Any) -> None:
@@ -98,8 +110,12 @@ def test_a_belt_drags_with_the_force_of_friction(scheme: Any, mass: Any) -> None
     g, mu, speed, dt = 10.0, 0.2, 0.5, 0.002
     mesh, tags = block(MPI.COMM_WORLD, lengths=(1.0, 0.5), divisions=(8, 4))
     rubber = LinearElastic(E=1.0e7, nu=0.2, rho=1000.0)
-    system = assemble(mesh, rubber, loads=BodyForce((0.0, -1000.0 * g)), damping=Rayleigh(0.0, 2e-3))
-    surface = contact_surface(system, tags["bottom"], obstacle=HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0)))
+    system = assemble(
+        mesh, rubber, loads=BodyForce((0.0, -1000.0 * g)), damping=Rayleigh(0.0, 2e-3)
+    )
+    surface = contact_surface(
+        system, tags["bottom"], obstacle=HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
+    )
     rest = static_equilibrium(ContactProblem(system, surface), solver=Condensed())
     start = replace(rest, r_t=np.zeros((surface.count, 1)))
     dragged = surface.everywhere(surface.tangential_values(system.influence[:, 0]))

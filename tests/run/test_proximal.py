@@ -51,7 +51,9 @@ def certificate(problem: ContactProblem, state: State) -> Certificate:
     )  # fmt: skip
     result = StepResult(state.u, state.r_n, state.active, 0, "", r_t=state.r_t)
     reaction = surface.reaction_load(state.r_n, len(load), state.r_t)
-    return replace(kkt_residual(step, result), resultant=RigidBodies(problem).imbalance(load, reaction))
+    return replace(
+        kkt_residual(step, result), resultant=RigidBodies(problem).imbalance(load, reaction)
+    )
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,9 @@ class Counting:
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize(("size", "far"), [(0.5, 1.0), (0.5, 4.0), (0.25, 2.0), (0.2, 2.0), (0.15, 4.0)])
+@pytest.mark.parametrize(
+    ("size", "far"), [(0.5, 1.0), (0.5, 4.0), (0.25, 2.0), (0.2, 2.0), (0.15, 4.0)]
+)
 def test_the_channel_comes_to_rest_on_every_mesh(size: float, far: float) -> None:
     """Concrete in soil 200 times as soft, which contact alone holds: 1e-11, two digits below the tolerance."""
     model = build(Channel(ChannelMesh(size=size, far=far)), COMM)
@@ -89,7 +93,9 @@ def leaning(n: int, *, soil: float = 2.5e6, rho: float = 1800.0) -> ContactProbl
     """A block of concrete, n cells wide, on soft ground that is clamped at its base, under vertical and horizontal
     pressure on its top."""
     bodies = {
-        "block": BlockMesh(lengths=(WIDTH, HEIGHT), divisions=(n, n + n // 4), corner=(WIDTH, WIDTH)),
+        "block": BlockMesh(
+            lengths=(WIDTH, HEIGHT), divisions=(n, n + n // 4), corner=(WIDTH, WIDTH)
+        ),
         "ground": BlockMesh(lengths=(3.0 * WIDTH, WIDTH), divisions=(3 * n, n)),
     }
     mesh, tags = build_mesh(Blocks(bodies), COMM)
@@ -104,7 +110,9 @@ def leaning(n: int, *, soil: float = 2.5e6, rho: float = 1800.0) -> ContactProbl
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("n", "soil", "rho"), [(16, 2.5e6, 1800.0), (32, 2.5e6, 24.0), (16, 2.5e5, 1800.0)])
+@pytest.mark.parametrize(
+    ("n", "soil", "rho"), [(16, 2.5e6, 1800.0), (32, 2.5e6, 24.0), (16, 2.5e5, 1800.0)]
+)
 def test_a_stiff_block_leans_on_soft_ground(n: int, soil: float, rho: float) -> None:
     """Ten thousand times as soft and more, on any mesh and however light: weight, thrust and moment to 1e-9, in a few
     dozen steps of one factorisation."""
@@ -113,7 +121,9 @@ def test_a_stiff_block_leans_on_soft_ground(n: int, soil: float, rho: float) -> 
     weight, x = WEIGHT * WIDTH * HEIGHT, problem.surface.points[:, 0] - 1.5 * WIDTH
     thrust = LEAN * weight
     assert state.r_t is not None and state.active.all()
-    force, along, moment = COMM.allreduce(np.array([state.r_n.sum(), state.r_t.sum(), state.r_n @ x]))
+    force, along, moment = COMM.allreduce(
+        np.array([state.r_n.sum(), state.r_t.sum(), state.r_n @ x])
+    )
     assert force == pytest.approx(weight, rel=1e-9)
     assert abs(along) == pytest.approx(thrust, rel=1e-8)  # 1e-9 of what acts on the block
     assert moment == pytest.approx(thrust * HEIGHT, rel=1e-8)
@@ -127,7 +137,9 @@ def test_nodal_residuals_add_up_on_a_body() -> None:
     problem = leaning(16)
     state = static_equilibrium(problem)
     system = problem.static_load
-    missing = 5e-10 * np.abs(system.load(0.0)).max() * system.influence[:, 1] * (system.space.bodies == 0)
+    missing = (
+        5e-10 * np.abs(system.load(0.0)).max() * system.influence[:, 1] * (system.space.bodies == 0)
+    )
     load = system.load(0.0)
     reaction = problem.surface.reaction_load(state.r_n, len(load), state.r_t)
     wrong = RigidBodies(problem).imbalance(load + missing, reaction)
@@ -144,12 +156,16 @@ def test_held_bodies_and_components_are_no_free_motions() -> None:
     whole = [Prescribed(tags[f"lower_{side}"]) for side in ("bottom", "top")]
     along = [Prescribed(tags[f"upper_{side}"], components=(0,)) for side in ("bottom", "top")]
     for held, free in ((whole, 3), ([*whole, *along], 1)):
-        system = assemble(mesh, CONCRETE, prescribed=held, loads=Traction(tags["upper_top"], (0.0, -1.0e3)))
+        system = assemble(
+            mesh, CONCRETE, prescribed=held, loads=Traction(tags["upper_top"], (0.0, -1.0e3))
+        )
         pair = contact_pair(system, tags["upper_bottom"], tags["lower_top"])
         problem = ContactProblem(system, pair)
         motions = [motion for body in RigidBodies(problem)._free for motion in body.motions.T]
         assert len(motions) == free and system.floating
-        assert COMM.allreduce(static_equilibrium(problem).r_n.sum()) == pytest.approx(1.0e3, rel=1e-12)
+        assert COMM.allreduce(static_equilibrium(problem).r_n.sum()) == pytest.approx(
+            1.0e3, rel=1e-12
+        )
 
 
 @pytest.mark.parametrize("ratio", [1e-8, 1e-10])
@@ -159,8 +175,12 @@ def test_a_clamped_body_floats_on_no_contrast(ratio: float) -> None:
     high, low = (lambda x: x[1] > 1.0 - 1e-9), (lambda x: x[1] < 1.0 + 1e-9)
     parts = Cells.where("high", mesh, high), Cells.where("low", mesh, low)
     moduli, push = (1e11, 1e11 * ratio), 1e8 * ratio
-    materials = [(part, LinearElastic(E=E, nu=0.0, rho=1.0)) for part, E in zip(parts, moduli, strict=True)]
-    system = assemble(mesh, materials, clamped=tags["bottom"], loads=Traction(tags["top"], (0.0, -push)))
+    materials = [
+        (part, LinearElastic(E=E, nu=0.0, rho=1.0)) for part, E in zip(parts, moduli, strict=True)
+    ]
+    system = assemble(
+        mesh, materials, clamped=tags["bottom"], loads=Traction(tags["top"], (0.0, -push))
+    )
     u = static_equilibrium(linear(system)).u
     assert not system.floating
     sag = COMM.allreduce(np.abs(u).max(initial=0.0), op=MPI.MAX)
@@ -183,7 +203,11 @@ def test_resultants_are_those_of_motions_that_nothing_holds(angle: float) -> Non
     resultants leaves none, and costs no force that has none."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 2), angle=angle)
     ground = HalfSpace(point=(0.0, 0.0), normal=(-np.sin(angle), np.cos(angle)))
-    for held, free in (((), 3), (Prescribed(tags["left"], components=(0,)), 1), (Prescribed(tags["left"]), 0)):
+    for held, free in (
+        ((), 3),
+        (Prescribed(tags["left"], components=(0,)), 1),
+        (Prescribed(tags["left"]), 0),
+    ):
         system = assemble(mesh, CONCRETE, prescribed=held)
         surface = contact_surface(system, tags["bottom"], obstacle=ground) if free == 3 else None
         problem = linear(system) if surface is None else ContactProblem(system, surface)
@@ -212,11 +236,17 @@ def test_a_method_that_crawls_comes_to_an_end() -> None:
     mesh, tags = block(COMM, lengths=(1.0, 3.0), divisions=(2, 4))
     system = assemble(mesh, CONCRETE, loads=BodyForce((2.0e3, -CONCRETE.rho * 9.81)))
     ground = HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
-    problem = ContactProblem(system, contact_surface(system, tags["bottom"], obstacle=ground), friction=Coulomb(0.5))
+    problem = ContactProblem(
+        system, contact_surface(system, tags["bottom"], obstacle=ground), friction=Coulomb(0.5)
+    )
     solver = Counting(Condensed(friction_method=NSGS(max_iterations=30)))
     with pytest.raises(StepFailure, match="held by contact alone was not solved") as failure:
         static_equilibrium(problem, solver=solver)
-    assert len(solver.prepared) == 2 and "time step" not in str(failure.value) and "Condensed()" in str(failure.value)
+    assert (
+        len(solver.prepared) == 2
+        and "time step" not in str(failure.value)
+        and "Condensed()" in str(failure.value)
+    )
 
 
 @pytest.mark.serial

@@ -18,16 +18,28 @@ from vi_contact.core.problem import ContactProblem
 from vi_contact.core.protocols import FrictionLaw
 from vi_contact.core.step import State
 from vi_contact.core.surfaces import ContactSurface
-from vi_contact.laws.friction import Coulomb, ExponentialDecay, SlipRateCoulomb, StaticKinetic, Tresca
+from vi_contact.laws.friction import (
+    Coulomb,
+    ExponentialDecay,
+    SlipRateCoulomb,
+    StaticKinetic,
+    Tresca,
+)
 from vi_contact.run.static import quasi_static, static_equilibrium
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.friction.nsgs import NSGS
 
 pytestmark = pytest.mark.serial
-STIFFNESS, THRESHOLD, H = 4.0e6, 50.0, 0.1  # EA of the bar [N], friction per length [N/m], distance of its nodes [m]
+STIFFNESS, THRESHOLD, H = (
+    4.0e6,
+    50.0,
+    0.1,
+)  # EA of the bar [N], friction per length [N/m], distance of its nodes [m]
 
 
-def pulled(problem: ContactProblem, direction: Array, history: Callable[[float], float]) -> ContactProblem:
+def pulled(
+    problem: ContactProblem, direction: Array, history: Callable[[float], float]
+) -> ContactProblem:
     """With the nodal forces direction · history(t) added."""
     return replace(problem, system=problem.system.with_load((direction, history)))
 
@@ -59,7 +71,10 @@ def test_one_stage_is_the_static_equilibrium():
     problem = slider(lambda t: 3.0 if t == 1.0 else 1.0)
     there, back = ends(problem, [1.0, 2.0])
     assert np.array_equal(there.u, static_equilibrium(problem, solver=Condensed(), t=1.0).u)
-    assert static_equilibrium(problem, solver=Condensed(), t=2.0).u[0] == 0.0 and back.u[0] == there.u[0] > 0.0
+    assert (
+        static_equilibrium(problem, solver=Condensed(), t=2.0).u[0] == 0.0
+        and back.u[0] == there.u[0] > 0.0
+    )
 
 
 def test_a_base_that_slides_takes_the_mass_along():
@@ -68,10 +83,14 @@ def test_a_base_that_slides_takes_the_mass_along():
     ways = [0.0, 0.5e-4, 1.0e-4, 5.0e-4, 4.5e-4, 3.0e-4, 0.0]
     moving = problem.surface.moving(along=lambda t: ways[round(t)])
     found = ends(replace(problem, surface=moving), range(len(ways)))
-    assert [1.0e4 * state.u[0] for state in found] == pytest.approx([0.0, 0.5, 1.0, 1.0, 0.5, -1.0, -1.0], abs=1e-12)
+    assert [1.0e4 * state.u[0] for state in found] == pytest.approx(
+        [0.0, 0.5, 1.0, 1.0, 0.5, -1.0, -1.0], abs=1e-12
+    )
 
 
-def bar_on_bed(friction: FrictionLaw, history: Callable[[float], float], *, cells: int = 40) -> ContactProblem:
+def bar_on_bed(
+    friction: FrictionLaw, history: Callable[[float], float], *, cells: int = 40
+) -> ContactProblem:
     """A bar pressed against a rough base by 200 N/m, held at its far end and pulled at its near end, node 0.
 
     Half a cell belongs to the near end. The base is in direction +y, so that no change of basis is needed.
@@ -81,14 +100,25 @@ def bar_on_bed(friction: FrictionLaw, history: Callable[[float], float], *, cell
     own, side = np.full(cells, 2.0), np.full(cells - 1, -1.0)
     own[0] = 1.0
     K = STIFFNESS / H * sp.diags([side, own, side], [-1, 0, 1])
-    system = two_component_system(sp.diags(lengths), K, STIFFNESS / H * sp.identity(cells), np.zeros(cells))
+    system = two_component_system(
+        sp.diags(lengths), K, STIFFNESS / H * sp.identity(cells), np.zeros(cells)
+    )
     press = np.column_stack([np.zeros(cells), 4.0 * THRESHOLD * lengths]).ravel()
-    system = replace(system, floating=False).with_load((press, lambda t: 1.0), (np.eye(2 * cells)[0], history))
+    system = replace(system, floating=False).with_load(
+        (press, lambda t: 1.0), (np.eye(2 * cells)[0], history)
+    )
     nodes = np.arange(cells)
     surface = ContactSurface(
-        comm=SerialComm(), points=np.column_stack([H * nodes, 0.0 * nodes]), normals=np.tile([0.0, 1.0], (cells, 1)),
-        weights=lengths, gap0=np.zeros(cells), bilateral=np.zeros(cells, dtype=bool), compliance=np.zeros(cells),
-        owned=2 * nodes + 1, slots=nodes, tangents=2 * nodes[:, None],
+        comm=SerialComm(),
+        points=np.column_stack([H * nodes, 0.0 * nodes]),
+        normals=np.tile([0.0, 1.0], (cells, 1)),
+        weights=lengths,
+        gap0=np.zeros(cells),
+        bilateral=np.zeros(cells, dtype=bool),
+        compliance=np.zeros(cells),
+        owned=2 * nodes + 1,
+        slots=nodes,
+        tangents=2 * nodes[:, None],
     )
     return ContactProblem(system, surface, friction=friction)
 
@@ -141,11 +171,15 @@ def test_the_part_that_moved_last_slips():
     assert there.r_t[:11, 0] == pytest.approx(limit[:11], rel=1e-12)
     assert back.r_t[:4, 0] == pytest.approx(-limit[:4], rel=1e-12)
     assert back.r_t[4, 0] == pytest.approx(0.5 * limit[4], rel=1e-11)
-    assert back.r_t[5:11, 0] == pytest.approx(limit[5:11], rel=1e-12) and np.abs(back.r_t[12:]).max() < 1e-9
+    assert (
+        back.r_t[5:11, 0] == pytest.approx(limit[5:11], rel=1e-12)
+        and np.abs(back.r_t[12:]).max() < 1e-9
+    )
 
 
 def test_continued_history_is_the_same():
     """Stopped after 7 stages and continued from that state: the same to the last bit."""
+
     def history(t: float) -> float:
         return float(8.0 * THRESHOLD * H * np.sin(0.5 * t))
 
@@ -160,7 +194,9 @@ def test_continued_history_is_the_same():
 def test_another_friction_method():
     """Gauss-Seidel: the same history to 1e-9."""
     problem = bar_on_bed(Coulomb(0.25), lambda t: float(8.0 * THRESHOLD * H * np.sin(t)), cells=20)
-    other = quasi_static(problem, range(1, 7), solver=Condensed(friction_method=NSGS(tolerance=1e-13)))
+    other = quasi_static(
+        problem, range(1, 7), solver=Condensed(friction_method=NSGS(tolerance=1e-13))
+    )
     for one, two in zip(ends(problem, range(1, 7)), other, strict=True):
         assert np.abs(one.u - two.u).max() < 1e-9 * np.abs(one.u).max()
 
@@ -171,10 +207,14 @@ def test_times_must_increase(times):
         quasi_static(slider(lambda t: 0.0), times, solver=Condensed())
 
 
-@pytest.mark.parametrize("mu", [ExponentialDecay(0.6, 0.4, v_c=0.1), StaticKinetic(0.6, 0.4)], ids=repr)
+@pytest.mark.parametrize(
+    "mu", [ExponentialDecay(0.6, 0.4, v_c=0.1), StaticKinetic(0.6, 0.4)], ids=repr
+)
 def test_friction_that_asks_for_a_rate_is_refused(mu):
     problem = replace(slider(lambda t: t), friction=SlipRateCoulomb(mu))
-    with pytest.raises(InputError, match="no slip rate for SlipRateCoulomb.*: use Coulomb .*or compute"):
+    with pytest.raises(
+        InputError, match="no slip rate for SlipRateCoulomb.*: use Coulomb .*or compute"
+    ):
         quasi_static(problem, [1.0], solver=Condensed())
 
 
@@ -185,5 +225,7 @@ def test_a_load_beyond_friction_is_refused_when_it_comes():
     problem = pulled(pulled(problem, weight, lambda t: 1.0), np.tile([0.5, 0.0], 5), lambda t: t)
     stages = quasi_static(problem, [0.5, 0.99, 1.01], solver=Condensed())
     assert [next(stages).t, next(stages).t] == [0.5, 0.99]
-    with pytest.raises(InputError, match=r"no static equilibrium: its loads carry it off along \(1, 0\)"):
+    with pytest.raises(
+        InputError, match=r"no static equilibrium: its loads carry it off along \(1, 0\)"
+    ):
         next(stages)

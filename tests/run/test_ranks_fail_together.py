@@ -59,7 +59,9 @@ def failing(comm: Any, after: float = -1.0, value: Any = None) -> Any:
 
 def body(comm: Any, loads: Any = (), **data: Any) -> tuple[Any, Any]:
     mesh, tags = block(comm, lengths=(2.0, 1.0), divisions=(4, 2))
-    return fem.assemble(mesh, STEEL, clamped=tags["top"], loads=loads(tags) if loads else (), **data), tags
+    return fem.assemble(
+        mesh, STEEL, clamped=tags["top"], loads=loads(tags) if loads else (), **data
+    ), tags
 
 
 def resting(comm: Any, loads: Any = (), **more: Any) -> Any:
@@ -75,7 +77,9 @@ def pulled(history: Any) -> Any:
 @pytest.mark.parametrize("after", [-1.0, 4.5 * WALL_DT], ids=["start", "later"])
 def test_the_history_of_a_load(comm: Any, shared_tmp: Path, after: float, value: Any) -> None:
     problem = resting(comm, pulled(failing(comm, after, value)))
-    words = "the history of a load or excitation" + (" at t = .* ended in ValueError: no such time" * (value is None))
+    words = "the history of a load or excitation" + (
+        " at t = .* ended in ValueError: no such time" * (value is None)
+    )
     with pytest.raises(vc.InputError, match=words):
         vc.simulate(problem, **NO_PROGRESS, steps=8, out=shared_tmp)
     comm.Barrier()
@@ -85,10 +89,15 @@ def test_the_history_of_a_load(comm: Any, shared_tmp: Path, after: float, value:
         assert np.all(np.isfinite(run.history["certificate"]))
 
 
-@pytest.mark.parametrize("stage", [
-    lambda problem: vc.static_equilibrium(problem), lambda problem: list(vc.quasi_static(problem, [1.0, 2.0])),
-    lambda problem: list(vc.march(problem, dt=WALL_DT, steps=2)),
-], ids=["static", "quasi_static", "march"])
+@pytest.mark.parametrize(
+    "stage",
+    [
+        lambda problem: vc.static_equilibrium(problem),
+        lambda problem: list(vc.quasi_static(problem, [1.0, 2.0])),
+        lambda problem: list(vc.march(problem, dt=WALL_DT, steps=2)),
+    ],
+    ids=["static", "quasi_static", "march"],
+)
 def test_histories_in_other_loops(comm: Any, stage: Any) -> None:
     with pytest.raises(vc.InputError, match="the history of a load or excitation at t"):
         stage(resting(comm, pulled(failing(comm))))
@@ -98,7 +107,9 @@ def test_histories_in_other_loops(comm: Any, stage: Any) -> None:
 @pytest.mark.parametrize("value", [None, np.nan, "a"], ids=str)
 def test_an_obstacle_that_moves(comm: Any, way: str, value: Any) -> None:
     system, tags = body(comm)
-    surface = fem.contact_surface(system, tags["bottom"]).moving(**{way: failing(comm, 0.5 * WALL_DT, value)})
+    surface = fem.contact_surface(system, tags["bottom"]).moving(
+        **{way: failing(comm, 0.5 * WALL_DT, value)}
+    )
     problem = vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3))
     with pytest.raises(vc.InputError, match=f"a moving obstacle: {way}"):
         list(vc.march(problem, dt=WALL_DT, steps=2))
@@ -110,7 +121,9 @@ def test_a_gap_of_one_rank(comm: Any, value: Any) -> None:
     seen = failing(comm, value=value)
     words = "the initial gap contains NaN" if value is not None else "no such time"
     with pytest.raises((vc.InputError, vc.ViContactError, ValueError), match=words):
-        fem.contact_surface(system, tags["bottom"], obstacle=AnalyticGap(lambda x: np.full(len(x), seen(0.0))))
+        fem.contact_surface(
+            system, tags["bottom"], obstacle=AnalyticGap(lambda x: np.full(len(x), seen(0.0)))
+        )
 
 
 @dataclass(frozen=True)
@@ -126,7 +139,9 @@ class Shaking:
 
 
 def test_an_excitation(comm: Any) -> None:
-    with pytest.raises(vc.InputError, match="excitation at t = .* ended in ValueError: no such time"):
+    with pytest.raises(
+        vc.InputError, match="excitation at t = .* ended in ValueError: no such time"
+    ):
         list(vc.march(resting(comm, excitation=Shaking(comm)), dt=WALL_DT, steps=2))
 
 
@@ -147,9 +162,13 @@ def test_a_friction_law(comm: Any, solver: Any) -> None:
         return [fem.Traction(tags["left"], (1.0e3, -1.0e4))]
 
     problem = resting(comm, press, friction=Rough(0.3))
-    owner = problem.surface.count > 0 and not any(comm.allgather(problem.surface.count)[:comm.rank])
+    owner = problem.surface.count > 0 and not any(
+        comm.allgather(problem.surface.count)[: comm.rank]
+    )
     object.__setattr__(problem.friction, "failing", owner)
-    with pytest.raises(vc.InputError, match="the friction law Rough ended in ValueError: no such pressure"):
+    with pytest.raises(
+        vc.InputError, match="the friction law Rough ended in ValueError: no such pressure"
+    ):
         list(vc.march(problem, dt=WALL_DT, steps=3, solver=solver))
 
 
@@ -181,14 +200,18 @@ def test_a_recorder(comm: Any, shared_tmp: Path, k: int) -> None:
     run = {"scheme": vc.ZienkiewiczWoodTaylor(), **NO_PROGRESS, "out": shared_tmp}
     record = [Failing(comm, k), vc.Energy(), vc.Contact()]
     words = f"the recorder Failing {'in step 7, t = 0.0125 s,' if k else 'at the start'} ended in KeyError: 'own'"
-    with pytest.raises(KeyError if last(comm) else vc.InputError, match="'own'" if last(comm) else words):
+    with pytest.raises(
+        KeyError if last(comm) else vc.InputError, match="'own'" if last(comm) else words
+    ):
         vc.simulate(problem, **run, steps=30, record=record)
     comm.Barrier()
     if k:
         found = vc.read_run(shared_tmp)
         assert found.history["k"][-1] == 6 and found.facts["status"] == "failed"
         assert ("the recorder Failing" in found.facts["reason"]) == (comm.size > 1)
-        rest = vc.simulate(problem, **run, steps=9, record=[Failing(comm, -1), *record[1:]], restart=True)
+        rest = vc.simulate(
+            problem, **run, steps=9, record=[Failing(comm, -1), *record[1:]], restart=True
+        )
         assert list(rest.history["k"]) == list(range(10))
 
 
@@ -226,7 +249,11 @@ class OwnSolver(vc.Condensed):
 
     def prepare(self, *given: Any) -> Any:
         made = super().prepare(*given)
-        return type("Prepared", (), {"solve": lambda _, step: self.answer(made.solve(step)), "close": lambda _: None})()
+        return type(
+            "Prepared",
+            (),
+            {"solve": lambda _, step: self.answer(made.solve(step)), "close": lambda _: None},
+        )()
 
     def answer(self, result: Any) -> Any:
         if getattr(self, "fails", False):
@@ -249,17 +276,28 @@ def test_an_impact_law_of_the_users_own(comm: Any) -> None:
     def press(tags: Any) -> Any:
         return [fem.Traction(tags["left"], (1.0e3, -1.0e4))]
 
-    with pytest.raises(vc.InputError, match="the impact law Bouncing ended in ZeroDivisionError: bounce"):
+    with pytest.raises(
+        vc.InputError, match="the impact law Bouncing ended in ZeroDivisionError: bounce"
+    ):
         list(vc.march(resting(comm, press, impact=Bouncing(0.5)), dt=WALL_DT, steps=3))
 
 
 # Arguments that must agree
 
 SOLVED = {
-    "steps": (3, 4), "dt": (WALL_DT, 2.0 * WALL_DT), "tolerance": (1e-9, 1e-8), "t_end": (None, 1.0),
-    "scheme": (vc.Trapezoidal(), vc.Newmark()), "solver": (vc.Condensed(), vc.Volume()), "restart": (False, True),
-    "checkpoint_every": (100, 10), "record": ([vc.Energy()], [vc.Energy(), vc.Contact()]), "out": (None, "folder"),
-    "callback": (None, lambda state, report: None), "escalation": ((), (vc.Volume(),)), "wall_time": (None, "1:00"),
+    "steps": (3, 4),
+    "dt": (WALL_DT, 2.0 * WALL_DT),
+    "tolerance": (1e-9, 1e-8),
+    "t_end": (None, 1.0),
+    "scheme": (vc.Trapezoidal(), vc.Newmark()),
+    "solver": (vc.Condensed(), vc.Volume()),
+    "restart": (False, True),
+    "checkpoint_every": (100, 10),
+    "record": ([vc.Energy()], [vc.Energy(), vc.Contact()]),
+    "out": (None, "folder"),
+    "callback": (None, lambda state, report: None),
+    "escalation": ((), (vc.Volume(),)),
+    "wall_time": (None, "1:00"),
     "scheme's numbers": (vc.HHT(-0.1), vc.HHT(-0.2)),
 }
 
@@ -275,7 +313,9 @@ def _differ(comm: Any, call: Any, words: str) -> None:
     if comm.size == 1:  # agrees with itself
         assert words
         return
-    with pytest.raises(vc.InputError, match=rf"{words}.* on rank 0 and .* on rank {comm.size - 1}; give the same"):
+    with pytest.raises(
+        vc.InputError, match=rf"{words}.* on rank 0 and .* on rank {comm.size - 1}; give the same"
+    ):
         call()
 
 
@@ -290,12 +330,17 @@ OTHERS = {
     "assemble: material": lambda c: block_of(c, replace(STEEL, rho=2000.0 + last(c))),
     "assemble: damping": lambda c: body(c, damping=vc.MassProportional(1.0 + last(c))),
     "assemble: degree": lambda c: body(c, degree=1 + last(c)),
-    "assemble: loads": lambda c: body(c, lambda tags: [fem.Traction(tags["left"], (1.0, 2.0 * last(c)))]),
+    "assemble: loads": lambda c: body(
+        c, lambda tags: [fem.Traction(tags["left"], (1.0, 2.0 * last(c)))]
+    ),
     "contact_surface: facets": lambda c: faces(c, "left" if last(c) else "bottom"),
-    "contact_surface: feature_angle": lambda c: faces(c, "bottom", feature_angle=0.5 + 0.1 * last(c)),
+    "contact_surface: feature_angle": lambda c: faces(
+        c, "bottom", feature_angle=0.5 + 0.1 * last(c)
+    ),
     "contact_surface: points": lambda c: faces(c, "bottom", points=[[0.5 + 0.5 * last(c), 0.0]]),
-    "contact_surface: obstacle":
-        lambda c: faces(c, "bottom", obstacle=vc.HalfSpace((0.0, -0.1 * last(c)), (0.0, 1.0))),
+    "contact_surface: obstacle": lambda c: faces(
+        c, "bottom", obstacle=vc.HalfSpace((0.0, -0.1 * last(c)), (0.0, 1.0))
+    ),
 }
 
 
@@ -351,21 +396,38 @@ def test_a_frame_goes_on_and_tells_at_its_end() -> None:
         assert users("f", lambda: 1 / 0, 3) == 3
         done.append(1)
     assert done == [1]
-    with pytest.raises(vc.InputError, match="f ended in ZeroDivisionError"):  # without a frame at once
+    with pytest.raises(
+        vc.InputError, match="f ended in ZeroDivisionError"
+    ):  # without a frame at once
         users("f", lambda: 1 / 0, 3)
     other = (False, None, "", "KeyError('a')")
-    with pytest.raises(vc.ViContactError, match=r"rank 1: KeyError\('a'\)"), together(Two(0, other)):
+    with (
+        pytest.raises(vc.ViContactError, match=r"rank 1: KeyError\('a'\)"),
+        together(Two(0, other)),
+    ):
         done.append(2)
-    with pytest.raises(vc.StepFailure, match="too far"), together(Two(0, (False, 1, "too far", ""))):
+    with (
+        pytest.raises(vc.StepFailure, match="too far"),
+        together(Two(0, (False, 1, "too far", ""))),
+    ):
         done.append(3)
     assert done == [1, 2, 3]
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("same", [
-    (1, 1.0), ([1.0] * 70, [1.0] * 70), (np.ones(3), np.ones(3)), (Parts((1.0,)), Parts((2.0, 3.0))),
-    (float("nan"), float("nan")), ({"a": [1, "b", None]}, {"a": [1, "b", None]}), ([[1], [2, 3]], [[1], [2, 3]]),
-], ids=str)
+@pytest.mark.parametrize(
+    "same",
+    [
+        (1, 1.0),
+        ([1.0] * 70, [1.0] * 70),
+        (np.ones(3), np.ones(3)),
+        (Parts((1.0,)), Parts((2.0, 3.0))),
+        (float("nan"), float("nan")),
+        ({"a": [1, "b", None]}, {"a": [1, "b", None]}),
+        ([[1], [2, 3]], [[1], [2, 3]]),
+    ],
+    ids=str,
+)
 def test_what_is_alike(same: Any) -> None:
     told = []
     for value in same:
@@ -373,5 +435,3 @@ def test_what_is_alike(same: Any) -> None:
         comm.gather = lambda mine: told.append(mine) or [mine, mine]  # type: ignore[func-returns-value]
         agree(comm, "f", {"x": value})
     assert told[0] == told[1]
-
-

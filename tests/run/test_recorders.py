@@ -31,12 +31,19 @@ DT = 5e-3
 
 def reports(problem: ContactProblem, scheme: Any, steps: int = 300) -> list[Report]:
     """The reports of a march with the condensed solver."""
-    return [report for _, report in march(problem, scheme=scheme, solver=Condensed(), dt=DT, steps=steps)]
+    return [
+        report
+        for _, report in march(problem, scheme=scheme, solver=Condensed(), dt=DT, steps=steps)
+    ]
 
 
-def history(problem: ContactProblem, scheme: Any, steps: int = 300, **more: Any) -> dict[str, Array]:
+def history(
+    problem: ContactProblem, scheme: Any, steps: int = 300, **more: Any
+) -> dict[str, Array]:
     """The history of a simulation."""
-    return dict(simulate(problem, scheme=scheme, solver=Condensed(), dt=DT, steps=steps, **more).history)
+    return dict(
+        simulate(problem, scheme=scheme, solver=Condensed(), dt=DT, steps=steps, **more).history
+    )
 
 
 def test_contact_without_arrays() -> None:
@@ -54,7 +61,9 @@ def test_contact_without_arrays() -> None:
 def ledger_defect(found: dict[str, Array]) -> Array:
     """E + D_damping + D_contact + D_impact + D_algorithmic - W - E(0), over max E (V9.7)."""
     total = found["energy_kinetic"] + found["energy_strain"]
-    losses = sum(found[name] for name in ("loss_damping", "loss_contact", "loss_impact", "loss_algorithmic"))
+    losses = sum(
+        found[name] for name in ("loss_damping", "loss_contact", "loss_impact", "loss_algorithmic")
+    )
     return np.asarray(total + losses - found["work_input"] - total[0]) / total.max()
 
 
@@ -69,11 +78,20 @@ def ledger_defect(found: dict[str, Array]) -> Array:
     ],
     ids=repr,
 )
-@pytest.mark.parametrize("impact", [None, Inelastic(), Inelastic(ImpulseUpdate()), Newton(0.5)], ids=repr)
+@pytest.mark.parametrize(
+    "impact", [None, Inelastic(), Inelastic(ImpulseUpdate()), Newton(0.5)], ids=repr
+)
 def test_v9_7_ledger_closes(scheme: Any, impact: Any) -> None:
     """V9.7: W + E(0) = E + D_damping + D_contact + D_impact + D_algorithmic to 1e-10 max E, walls on both sides."""
     problem = chain_problem(
-        5, gap=1e-3, left_gap=2e-3, excitation=SHAKE, impact=impact, damping=1e-4, consistent=True, constant=1.0
+        5,
+        gap=1e-3,
+        left_gap=2e-3,
+        excitation=SHAKE,
+        impact=impact,
+        damping=1e-4,
+        consistent=True,
+        constant=1.0,
     )
     found = history(problem, scheme)
     assert found["contact_active"].max() > 0
@@ -86,8 +104,12 @@ def test_v9_7_ledger_closes(scheme: Any, impact: Any) -> None:
 
 def test_energies_are_those_of_the_final_state() -> None:
     """Kinetic and strain energy against dense matrices, in the system's own unknowns."""
-    problem = chain_problem(4, gap=1e-3, left_gap=2e-3, excitation=SHAKE, impact=Inelastic(), consistent=True)
-    solution = simulate(problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=DT, steps=200)
+    problem = chain_problem(
+        4, gap=1e-3, left_gap=2e-3, excitation=SHAKE, impact=Inelastic(), consistent=True
+    )
+    solution = simulate(
+        problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=DT, steps=200
+    )
     M, K = problem.system.M.csr.toarray(), problem.system.K.csr.toarray()
     u, v = problem.cartesian(solution.state.u), problem.cartesian(solution.state.v)
     assert solution.history["energy_kinetic"][-1] == pytest.approx(0.5 * v @ M @ v, rel=1e-13)
@@ -97,8 +119,13 @@ def test_energies_are_those_of_the_final_state() -> None:
 @pytest.mark.parametrize("wrong", ["force", "reaction", "displacement"])
 def test_v9_7_defect_sees_a_wrong_step(wrong: str) -> None:
     """A step that does not satisfy its equation of motion leaves a defect: the ledger is not a tautology."""
-    problem, scheme = chain_problem(5, gap=1e-3, excitation=SHAKE, consistent=True), ZienkiewiczWoodTaylor()
-    closing = [one for one in reports(problem, scheme) if one.new.active[0] and not one.old.active[0]]
+    problem, scheme = (
+        chain_problem(5, gap=1e-3, excitation=SHAKE, consistent=True),
+        ZienkiewiczWoodTaylor(),
+    )
+    closing = [
+        one for one in reports(problem, scheme) if one.new.active[0] and not one.old.active[0]
+    ]
     report, recorder = closing[-1], Energy()
     recorder.start(problem, report.old)
     row = recorder.row(report)
@@ -110,9 +137,13 @@ def test_v9_7_defect_sees_a_wrong_step(wrong: str) -> None:
     elif wrong == "reaction":
         balance = replace(balance, r_n=1.001 * balance.r_n)
     else:
-        balance = scheme.balance(problem, report.old, replace(report.new, u=1.001 * report.new.u), DT)
+        balance = scheme.balance(
+            problem, report.old, replace(report.new, u=1.001 * report.new.u), DT
+        )
     recorder.start(problem, report.old)
-    assert abs(recorder.row(replace(report, averages=lambda: balance))["energy_defect"]) > 1e-7 * size
+    assert (
+        abs(recorder.row(replace(report, averages=lambda: balance))["energy_defect"]) > 1e-7 * size
+    )
 
 
 def test_v9_1_midpoint_loses_only_by_contact() -> None:
@@ -135,18 +166,24 @@ def test_v9_2_newmark_gains_at_release() -> None:
     r_n, gap = 0.5 * found["pressure"][:, 0], found["gap"][:, 0]
     change = 0.5 * (r_n[:-1] * gap[1:] - r_n[1:] * gap[:-1])
     assert change.max() > 1e-6 * total.max()
-    assert np.abs(np.diff(total) - change).max() < 1e-10 * total.max()  # as V9.7: 1/dt² amplifies round-off
+    assert (
+        np.abs(np.diff(total) - change).max() < 1e-10 * total.max()
+    )  # as V9.7: 1/dt² amplifies round-off
 
 
 @pytest.mark.parametrize("reading", ["literal", "projection"])
 def test_v9_6_impact_loss(reading: str) -> None:
     """V9.6: ½ v⁻ᵀMv⁻ - ½ v⁺ᵀMv⁺ step by step; for the M-projection and e = 0 it is ½ |v⁻ - v⁺|²_M >= 0."""
     law = Inelastic() if reading == "literal" else Inelastic(ImpulseUpdate())
-    problem = chain_problem(10, gap=1e-3, excitation=SHAKE, impact=law, consistent=True, stiffness=1e4)
+    problem = chain_problem(
+        10, gap=1e-3, excitation=SHAKE, impact=law, consistent=True, stiffness=1e4
+    )
     M = problem.equations.M.csr.toarray()
     found = history(problem, ZienkiewiczWoodTaylor())["loss_impact"]
     steps = reports(problem, ZienkiewiczWoodTaylor())
-    losses = np.array([0.5 * one.v_minus @ M @ one.v_minus - 0.5 * one.new.v @ M @ one.new.v for one in steps])
+    losses = np.array(
+        [0.5 * one.v_minus @ M @ one.v_minus - 0.5 * one.new.v @ M @ one.new.v for one in steps]
+    )
     assert np.abs(np.diff(found) - losses).max() < 1e-12 * np.abs(found).max()
     if reading == "literal":
         assert losses.min() < 0.0 < losses.max()
@@ -158,8 +195,12 @@ def test_v9_6_impact_loss(reading: str) -> None:
 
 def test_v9_8_momentum() -> None:
     """V9.8: contact impulses of a free chain under a constant force are its change of momentum less the force's."""
-    problem = chain_problem(5, gap=1e-2, left_gap=2e-2, floating=True, constant=7.0, consistent=True)
-    solution = simulate(problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=DT, steps=400)
+    problem = chain_problem(
+        5, gap=1e-2, left_gap=2e-2, floating=True, constant=7.0, consistent=True
+    )
+    solution = simulate(
+        problem, scheme=ZienkiewiczWoodTaylor(), solver=Condensed(), dt=DT, steps=400
+    )
     momentum = np.ones(5) @ problem.system.M.csr @ problem.cartesian(solution.state.v)
     impulse = DT * solution.history["contact_force_x"].sum()
     assert impulse < -1.0
@@ -180,7 +221,11 @@ def test_contact_by_hand() -> None:
     u[4], u[0] = 0.5, 0.2
     row = Contact().start(problem, state_of([2.0, 6.0], [True, False], u))
     assert row["contact_uplift"] == 0.75 and row["contact_active"] == 1
-    assert row["contact_resultant"] == 8.0 and row["contact_force_x"] == 4.0 and row["contact_x"] == 2.0
+    assert (
+        row["contact_resultant"] == 8.0
+        and row["contact_force_x"] == 4.0
+        and row["contact_x"] == 2.0
+    )
     assert row["pressure"].tolist() == [2.0, 2.0] and row["contact_max_pressure"] == 2.0
     assert row["gap"] == pytest.approx([0.0, 0.05], abs=1e-16)
     assert row["contact_min_gap"] == row["gap"].min()
@@ -191,16 +236,31 @@ def test_contact_open_and_absent() -> None:
     """Open contact acts nowhere; without conditions everything is lifted."""
     problem = chain_problem(3, gap=0.5)
     row = Contact().start(problem, state_of([0.0], [False], np.zeros(3)))
-    assert np.isnan(row["contact_x"]) and row["contact_uplift"] == 1.0 and str(row["contact_force_x"]) == "0.0"
+    assert (
+        np.isnan(row["contact_x"])
+        and row["contact_uplift"] == 1.0
+        and str(row["contact_force_x"]) == "0.0"
+    )
     surface = chain_surface(3)
     none = replace(
-        surface, points=np.zeros((0, 1)), normals=np.zeros((0, 1)), weights=np.zeros(0), gap0=np.zeros(0),
-        bilateral=np.zeros(0, bool), compliance=np.zeros(0), owned=np.zeros(0, int), slots=np.zeros(0, int),
+        surface,
+        points=np.zeros((0, 1)),
+        normals=np.zeros((0, 1)),
+        weights=np.zeros(0),
+        gap0=np.zeros(0),
+        bilateral=np.zeros(0, bool),
+        compliance=np.zeros(0),
+        owned=np.zeros(0, int),
+        slots=np.zeros(0, int),
         tangents=np.zeros((0, 0), int),
     )
     nowhere = State(0.0, 0, np.zeros(3), np.zeros(3), np.zeros(0), np.zeros(0, bool))
     row = Contact().start(replace(problem, surface=none), nowhere)
-    assert row["contact_uplift"] == 1.0 and row["contact_resultant"] == 0.0 and np.isnan(row["contact_min_gap"])
+    assert (
+        row["contact_uplift"] == 1.0
+        and row["contact_resultant"] == 0.0
+        and np.isnan(row["contact_min_gap"])
+    )
 
 
 def test_contact_on_springs_adds_their_shortening() -> None:
@@ -231,7 +291,10 @@ def test_probe_absolute_acceleration_of_a_free_body_is_zero() -> None:
     trapezoid = 0.5 * (ground[1:] + ground[:-1])
     midpoint = np.array([SHAKE.acceleration((k + 0.5) * DT) for k in range(50)])
     assert np.abs(midpoint).max() > 1.0
-    for name in ("a_x_a", "a_x_b"):  # the scheme takes the load at midpoints, the recorder the mean of both ends
+    for name in (
+        "a_x_a",
+        "a_x_b",
+    ):  # the scheme takes the load at midpoints, the recorder the mean of both ends
         assert found[name][1:] == pytest.approx(trapezoid - midpoint, abs=1e-9)
         assert found[name][0] == ground[0]
 
@@ -259,4 +322,8 @@ def test_steps_tell_time_iterations_and_ground() -> None:
     assert found["t"] == pytest.approx(DT * np.arange(21), rel=1e-14)
     assert found["a_g_x"].tolist() == [SHAKE.acceleration(t) for t in found["t"]]
     steps = Steps()
-    assert [name for name in steps.columns() if name.startswith("a_g")] == ["a_g_x", "a_g_y", "a_g_z"]
+    assert [name for name in steps.columns() if name.startswith("a_g")] == [
+        "a_g_x",
+        "a_g_y",
+        "a_g_z",
+    ]

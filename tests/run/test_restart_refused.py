@@ -43,12 +43,21 @@ OTHERS: dict[str, tuple[dict[str, Any], str]] = {
     "damping": ({"problem": chain(damping=1.01e-4)}, "another damping"),
     "undamped": ({"problem": chain(damping=0.0)}, "another damping"),
     "load": ({"problem": chain(constant=1e-3)}, "another load"),
-    "excitation": ({"problem": chain(excitation=Harmonic(3.0, 2.001, direction=(1.0,)))}, "another excitation"),
+    "excitation": (
+        {"problem": chain(excitation=Harmonic(3.0, 2.001, direction=(1.0,)))},
+        "another excitation",
+    ),
     "none": ({"problem": chain(excitation=())}, "another excitation"),
     "gap": ({"problem": chain(gap=1.001e-3)}, "another contact surface or obstacle"),
-    "impact": ({"problem": chain(impact=Elastic())}, r"impact law = Inelastic\(.*\) but this one has Newton"),
+    "impact": (
+        {"problem": chain(impact=Elastic())},
+        r"impact law = Inelastic\(.*\) but this one has Newton",
+    ),
     "dt": ({"dt": 5.001e-3}, "dt = 0.005 but this one has 0.005001"),
-    "scheme": ({"scheme": ZienkiewiczWoodTaylor(phi=0.51)}, r"scheme = Z.*phi=0.5\) but this one has .*phi=0.51"),
+    "scheme": (
+        {"scheme": ZienkiewiczWoodTaylor(phi=0.51)},
+        r"scheme = Z.*phi=0.5\) but this one has .*phi=0.51",
+    ),
 }
 
 
@@ -65,16 +74,23 @@ def left(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_another_problem_is_refused_by_name(left: Path, name: str) -> None:
     """One sentence that says what differs; asked for by name, the run goes on as the other one."""
     arguments, words = OTHERS[name]
-    with pytest.raises(InputError, match=rf"is of a run with {words}.*: restart the same run, .*\(changed=True\)"):
+    with pytest.raises(
+        InputError, match=rf"is of a run with {words}.*: restart the same run, .*\(changed=True\)"
+    ):
         run(None, 80, restart=left, **arguments)
     goes_on = run(None, 80, restart=left, changed=True, **arguments)
-    assert len(goes_on.history["t"]) == (81 if name != "dt" else 141)  # after another dt steps are counted anew
+    assert len(goes_on.history["t"]) == (
+        81 if name != "dt" else 141
+    )  # after another dt steps are counted anew
 
 
 @serial
 def test_another_size_is_never_allowed(left: Path) -> None:
     """Another number of unknowns or contact points fits nothing."""
-    with pytest.raises(InputError, match="contact points = 2 but this one has 1: restart the same run, or start a new"):
+    with pytest.raises(
+        InputError,
+        match="contact points = 2 but this one has 1: restart the same run, or start a new",
+    ):
         run(None, 80, restart=left, changed=True, problem=chain(left_gap=None))
 
 
@@ -83,15 +99,24 @@ def test_what_may_differ(left: Path, tmp_path: Path) -> None:
     """Round-off of matrices, loads and dt, and the solver."""
     tiny = 1.0 + 1e-13
     problem = chain(stiffness=1e3 * tiny, mass=2.0 * tiny, damping=1e-4 / tiny, gap=1e-3 * tiny)
-    again = run(None, 80, restart=left, problem=problem, dt=5e-3 * tiny, solver=Condensed(Hildreth()))
-    assert np.allclose(again.history["u_x_12"], run(None, 80).history["u_x_12"], rtol=1e-6, atol=1e-12)
+    again = run(
+        None, 80, restart=left, problem=problem, dt=5e-3 * tiny, solver=Condensed(Hildreth())
+    )
+    assert np.allclose(
+        again.history["u_x_12"], run(None, 80).history["u_x_12"], rtol=1e-6, atol=1e-12
+    )
 
 
 @serial
 def test_one_sample_of_a_record() -> None:
     """One of 5000 samples is another."""
-    one, two = (identity(chain(excitation=tabulated(peak)), SS22(), 5e-3, start=0.0, end=20.0) for peak in (0.3, 0.4))
-    assert differences(one, two) == {"excitation": "another excitation"} and not differences(one, one)
+    one, two = (
+        identity(chain(excitation=tabulated(peak)), SS22(), 5e-3, start=0.0, end=20.0)
+        for peak in (0.3, 0.4)
+    )
+    assert differences(one, two) == {"excitation": "another excitation"} and not differences(
+        one, one
+    )
 
 
 @dataclass(frozen=True)
@@ -136,9 +161,15 @@ def test_texts_of_laws() -> None:
         def __repr__(self) -> str:
             return self.text
 
-    ours: dict[str, Any] = {"law": text_of(Law("Law(mu=np.float64(0.30000000000000004), many=(1e-3, inf))"))}
+    ours: dict[str, Any] = {
+        "law": text_of(Law("Law(mu=np.float64(0.30000000000000004), many=(1e-3, inf))"))
+    }
     assert not differences(ours, {"law": "Law(mu=0.3, many=(0.001, inf))"})
-    for other in ("Law(mu=0.31, many=(0.001, inf))", "Law(mu=0.3, many=(0.001, nan))", "Law(mu=0.3, many=(0.001,))"):
+    for other in (
+        "Law(mu=0.31, many=(0.001, inf))",
+        "Law(mu=0.3, many=(0.001, nan))",
+        "Law(mu=0.3, many=(0.001,))",
+    ):
         assert differences(ours, {"law": other})
     assert differences({"numbers": [(1.0, 2.0)]}, {"numbers": "none"})
 
@@ -160,7 +191,9 @@ CRAFTED: dict[str, Callable[[dict[str, Any]], Any]] = {
     "flat": lambda arrays: arrays.update(u=arrays["u"][:, None]),
     "missing": lambda arrays: arrays.pop("v"),
     "without reactions": lambda arrays: arrays.pop("r_n"),
-    "short memory": lambda arrays: arrays.update({name: arrays[name][:-1] for name in arrays if "memory_" in name}),
+    "short memory": lambda arrays: arrays.update(
+        {name: arrays[name][:-1] for name in arrays if "memory_" in name}
+    ),
     "nan": lambda arrays: arrays["u"].__setitem__(2, np.nan),
     "integers": lambda arrays: arrays.update(u=arrays["u"].astype(int)),
     "texts": lambda arrays: arrays.update(u=arrays["u"].astype(str)),
@@ -200,7 +233,9 @@ def test_crafted_checkpoints_are_told(old: Path, tmp_path: Path, name: str) -> N
     """What nobody has written: one sentence, also where no checksum gives it away."""
     (tmp_path / "checkpoint.npz").write_bytes((old / "checkpoint.npz").read_bytes())
     crafted(tmp_path, CRAFTED[name])
-    with pytest.raises(InputError, match=r"the checkpoint '.*' is damaged \(.*\): start a new run$"):
+    with pytest.raises(
+        InputError, match=r"the checkpoint '.*' is damaged \(.*\): start a new run$"
+    ):
         run(None, 25, restart=tmp_path, **PLAIN)
 
 
@@ -208,9 +243,15 @@ def test_crafted_checkpoints_are_told(old: Path, tmp_path: Path, name: str) -> N
 def test_checksum_sees_everything() -> None:
     """Names, types, shapes and values."""
     one = {"a": np.arange(4.0), "b": np.array("text")}
-    others = [{"c": one["a"], "b": one["b"]}, one | {"a": one["a"].astype(int)}, one | {"a": one["a"].reshape(2, 2)},
-              one | {"a": np.array([0.0, 1.0, 2.0, np.nextafter(3.0, 4.0)])}]
-    assert len({checksum(found) for found in (one, *others)}) == 5 and checksum(one) == checksum(dict(one))
+    others = [
+        {"c": one["a"], "b": one["b"]},
+        one | {"a": one["a"].astype(int)},
+        one | {"a": one["a"].reshape(2, 2)},
+        one | {"a": np.array([0.0, 1.0, 2.0, np.nextafter(3.0, 4.0)])},
+    ]
+    assert len({checksum(found) for found in (one, *others)}) == 5 and checksum(one) == checksum(
+        dict(one)
+    )
 
 
 # Any number of ranks --------------------------------------------------------------------------------------------------
@@ -229,11 +270,17 @@ def test_other_ranks_are_the_same_problem(comm: Any) -> None:
         mu = 0.3 + 0.01 * np.arange(box.surface.total)
         return replace(box, friction=SlipRateCoulomb(ExponentialDecay(mu, 0.2, 1.0)))
 
-    for make in (wall, lambda ranks: replace(rubbing_box(ranks, None), friction=Coulomb(0.3)), rough):
+    for make in (
+        wall,
+        lambda ranks: replace(rubbing_box(ranks, None), friction=Coulomb(0.3)),
+        rough,
+    ):
         spread, alone = numbers(make(comm)), numbers(make(MPI.COMM_SELF))
         assert not differences(spread, alone) and spread.keys() == alone.keys()
         for name, own in alone.items():
-            for (a, size), (b, _) in zip(own, spread[name], strict=True) if isinstance(own, list) else ():
+            for (a, size), (b, _) in (
+                zip(own, spread[name], strict=True) if isinstance(own, list) else ()
+            ):
                 assert abs(a - b) <= 1e-11 * size, name
 
 
@@ -244,12 +291,25 @@ def test_another_material_is_refused_on_all_ranks(comm: Any, shared_tmp: Path) -
 
     run_wall(comm, shared_tmp, 6)
     with pytest.raises(InputError, match="is of a run with another stiffness"):
-        run_wall(comm, shared_tmp, 9, problem=shaken_wall(comm, angle=0.3, gap=1e-7, nu=0.2001), restart=True)
+        run_wall(
+            comm,
+            shared_tmp,
+            9,
+            problem=shaken_wall(comm, angle=0.3, gap=1e-7, nu=0.2001),
+            restart=True,
+        )
     box = rubbing_box(comm, None)
     laws = [SlipRateCoulomb(lambda speed, mu=mu: mu + 0.0 * speed) for mu in (0.3, 0.31)]
-    settings: dict[str, Any] = {"scheme": Trapezoidal(), "dt": 1e-3, "steps": 2, "out": shared_tmp / "box"}
+    settings: dict[str, Any] = {
+        "scheme": Trapezoidal(),
+        "dt": 1e-3,
+        "steps": 2,
+        "out": shared_tmp / "box",
+    }
     simulate(replace(box, friction=laws[0]), **settings)
     with pytest.raises(InputError, match="is of a run with another friction: restart"):
         simulate(replace(box, friction=laws[1]), restart=True, **settings)
-    with pytest.raises(InputError, match=r"friction law = SlipRateCoulomb.* but this one has Coulomb\(mu=0.3\)"):
+    with pytest.raises(
+        InputError, match=r"friction law = SlipRateCoulomb.* but this one has Coulomb\(mu=0.3\)"
+    ):
         simulate(replace(box, friction=Coulomb(0.3)), restart=True, **settings)

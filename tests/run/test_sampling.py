@@ -33,8 +33,14 @@ class Engine:
         return value if len(given) == 1 else np.full(given[0].shape, value)
 
 
-def body(comm: Any, load: Any = None, value: Any = None, motion: Any = None, moving: Any = None,
-         **more: Any) -> vc.ContactProblem:
+def body(
+    comm: Any,
+    load: Any = None,
+    value: Any = None,
+    motion: Any = None,
+    moving: Any = None,
+    **more: Any,
+) -> vc.ContactProblem:
     mesh, tags = block(comm, lengths=(2.0, 1.0), divisions=(2, 2))
     loads = [fem.Traction(tags["left"], value or (1.0, 0.0), history=load)] if load or value else []
     held = {"clamped": tags["top"]} if motion is None else {"prescribed": motion(tags)}
@@ -45,7 +51,9 @@ def body(comm: Any, load: Any = None, value: Any = None, motion: Any = None, mov
 
 def prescribed(shake: Any) -> Any:
     base = soil.base_motion(shake)
-    return lambda tags: fem.Prescribed(tags["top"], base.displacement, base.velocity, base.acceleration)
+    return lambda tags: fem.Prescribed(
+        tags["top"], base.displacement, base.velocity, base.acceleration
+    )
 
 
 PLACES = {
@@ -68,7 +76,11 @@ def lengthy(comm: Any, name: str, dt: float) -> str | None:
 def test_a_multiple_of_half_a_period_sees_nothing(comm: Any, name: str) -> None:
     for halves in (1, 2, 3):
         said = lengthy(comm, name, 0.25 * halves)
-        assert said is not None and f"is {halves} times half the period of" in said and "0.25 s, so that" in said
+        assert (
+            said is not None
+            and f"is {halves} times half the period of" in said
+            and "0.25 s, so that" in said
+        )
         assert said.endswith("take a dt of at most 0.025 s, a twentieth of the period")
     said = lengthy(comm, name, 0.2)
     assert said is not None and "has only 2.5 steps in the period of 0.5 s" in said
@@ -76,17 +88,25 @@ def test_a_multiple_of_half_a_period_sees_nothing(comm: Any, name: str) -> None:
 
 
 MOTIONS: list[Any] = [
-    (vc.Ricker(1.0, 2.0), 0.125), (vc.HalfSine(1.0, 0.4), 0.2), (vc.FullSine(1.0, 0.4), 0.1),
-    (vc.Rectangular(1.0, 0.4), 0.4), (vc.Tabulated((0.0, 0.1, 0.2, 0.3), (0.0, 1.0, -1.0, 0.0)), 0.1),
+    (vc.Ricker(1.0, 2.0), 0.125),
+    (vc.HalfSine(1.0, 0.4), 0.2),
+    (vc.FullSine(1.0, 0.4), 0.1),
+    (vc.Rectangular(1.0, 0.4), 0.4),
+    (vc.Tabulated((0.0, 0.1, 0.2, 0.3), (0.0, 1.0, -1.0, 0.0)), 0.1),
     (vc.GroundMotion(RECORD), 0.01),
 ]
 
 
 @pytest.mark.parametrize(("motion", "longest"), MOTIONS, ids=lambda one: type(one).__name__)
 @pytest.mark.parametrize("place", ["excitation", "load", "base"])
-def test_every_motion_has_its_longest_step(comm: Any, motion: Any, longest: float, place: str) -> None:
-    acting = {"excitation": {"excitation": motion}, "load": {"load": motion.acceleration},
-              "base": {"motion": prescribed(motion)}}[place]
+def test_every_motion_has_its_longest_step(
+    comm: Any, motion: Any, longest: float, place: str
+) -> None:
+    acting = {
+        "excitation": {"excitation": motion},
+        "load": {"load": motion.acceleration},
+        "base": {"motion": prescribed(motion)},
+    }[place]
     problem = body(comm, **acting)
     assert sampling_warning(problem, longest) is None
     said = sampling_warning(problem, 1.01 * longest)

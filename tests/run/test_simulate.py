@@ -40,12 +40,19 @@ DT = 5e-3
 def problem(**more: Any) -> ContactProblem:
     """The shaken chain between two walls."""
     shake = Harmonic(3.0, 2.0, direction=(1.0,))
-    return chain_problem(5, gap=1e-3, left_gap=2e-3, excitation=shake, impact=Inelastic(), consistent=True, **more)
+    return chain_problem(
+        5, gap=1e-3, left_gap=2e-3, excitation=shake, impact=Inelastic(), consistent=True, **more
+    )
 
 
 def run(steps: int | None = 100, **more: Any) -> Solution:
     """A run with the usual settings."""
-    settings: dict[str, Any] = {"scheme": ZienkiewiczWoodTaylor(), "solver": Condensed(), "dt": DT, "steps": steps}
+    settings: dict[str, Any] = {
+        "scheme": ZienkiewiczWoodTaylor(),
+        "solver": Condensed(),
+        "dt": DT,
+        "steps": steps,
+    }
     return simulate(problem(), **(settings | more))
 
 
@@ -95,8 +102,13 @@ def test_no_steps() -> None:
     """A run of no steps has the initial row, and no times per step."""
     solution = run(0)
     assert solution.history["t"].tolist() == [0.0]
-    assert np.isnan(solution.facts["seconds_per_step"]) and np.isnan(solution.facts["seconds_per_linear_step"])
-    assert "0 steps" in solution.summary() and json.loads(to_json(solution.facts))["seconds_per_step"] is None
+    assert np.isnan(solution.facts["seconds_per_step"]) and np.isnan(
+        solution.facts["seconds_per_linear_step"]
+    )
+    assert (
+        "0 steps" in solution.summary()
+        and json.loads(to_json(solution.facts))["seconds_per_step"] is None
+    )
 
 
 def test_summary_for_people_and_programs(tmp_path: Path) -> None:
@@ -107,7 +119,9 @@ def test_summary_for_people_and_programs(tmp_path: Path) -> None:
     assert found["status"] == "finished" and found["steps"] == 100 and found["ranks"] == 1
     assert found["unknowns"] == 5 and found["contact_points"] == 2 and found["dt"] == DT
     assert found["worst_certificate"] == history["certificate"].max() <= 1e-9
-    assert found["iterations_per_step"]["mean"] == pytest.approx(history["iterations"][1:].mean(), rel=1e-14)
+    assert found["iterations_per_step"]["mean"] == pytest.approx(
+        history["iterations"][1:].mean(), rel=1e-14
+    )
     assert found["iterations_per_step"]["max"] == history["iterations"].max() > 0
     assert found["energy"]["work_input"] == history["work_input"][-1]
     assert 0.0 < found["energy_defect"] == found["energy"]["energy_defect"] < 1e-10
@@ -115,7 +129,14 @@ def test_summary_for_people_and_programs(tmp_path: Path) -> None:
     assert {"vi_contact", "python", "numpy", "scipy", "h5py"} <= set(found["versions"])
     assert found["cross_check"] is None and found["reason"] == ""
     text = solution.summary()
-    for words in ("100 steps", "iterations per step", "worst certificate", "impact loss", "defect", "linear step"):
+    for words in (
+        "100 steps",
+        "iterations per step",
+        "worst certificate",
+        "impact loss",
+        "defect",
+        "linear step",
+    ):
         assert words in text
     assert max(map(len, text.splitlines())) <= 120
 
@@ -124,7 +145,7 @@ def test_cross_check_is_reported(tmp_path: Path) -> None:
     """The comparison that accompanied the run is in the summary: two methods agree to 1e-8 (V9, metamorphic)."""
     checked = CrossChecked(Condensed(), (Condensed(Hildreth()),))
     solution = run(solver=checked, cross_check=checked, out=tmp_path)
-    (method, difference), = summary_of(tmp_path)["cross_check"].items()
+    ((method, difference),) = summary_of(tmp_path)["cross_check"].items()
     assert "Hildreth" in method and max(difference["u"], difference["r_n"]) < 1e-8
     assert method in solution.summary()
     assert summary_of(tmp_path)["solver"] == repr(Condensed())
@@ -135,7 +156,10 @@ def test_escalation_is_recorded(tmp_path: Path) -> None:
     solution = run(10, solver=Wrong(), escalation=(Condensed(),), out=tmp_path)
     assert solution.history["escalated"].tolist() == [0.0] + 10 * [1.0]
     assert summary_of(tmp_path)["escalated_steps"] == 10
-    assert "step 7, t = 0.035 s: escalated to condensed ActiveSet" in (tmp_path / "run.log").read_text()
+    assert (
+        "step 7, t = 0.035 s: escalated to condensed ActiveSet"
+        in (tmp_path / "run.log").read_text()
+    )
     assert same(solution.state, run(10).state)
 
 
@@ -162,7 +186,9 @@ def test_failed_step_keeps_what_was_computed(tmp_path: Path) -> None:
     assert same(run(out=tmp_path, restart=True).state, run().state)
 
 
-@pytest.mark.parametrize("error", [KeyboardInterrupt(), RuntimeError("the recorder broke")], ids=["ctrl-c", "defect"])
+@pytest.mark.parametrize(
+    "error", [KeyboardInterrupt(), RuntimeError("the recorder broke")], ids=["ctrl-c", "defect"]
+)
 def test_interrupted_run_goes_on(tmp_path: Path, error: BaseException) -> None:
     """Ctrl-C or a defect in a recorder at step 57: all files are complete, and the restart equals the straight run."""
     with pytest.raises(type(error)):
@@ -185,14 +211,25 @@ def test_log_shows_progress(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     lines = (tmp_path / "run.log").read_text().splitlines()
     progress = [line for line in lines if " left" in line]
     assert len(progress) == 10 and "step 100, t = 0.5 s: 100 of 100 steps" in progress[-1]
-    for words in ("versions: vi_contact", "ranks: 1", "dt: 0.005", "scheme: Zien", "checkpoint of step 40", "finished"):
+    for words in (
+        "versions: vi_contact",
+        "ranks: 1",
+        "dt: 0.005",
+        "scheme: Zien",
+        "checkpoint of step 40",
+        "finished",
+    ):
         assert any(words in line for line in lines), words
     captured = capsys.readouterr()
     assert captured.out == "" and captured.err == ""
-    assert logging.getLogger("vi_contact").handlers == [] and logging.getLogger("vi_contact").propagate
+    assert (
+        logging.getLogger("vi_contact").handlers == [] and logging.getLogger("vi_contact").propagate
+    )
 
 
-def test_progress_line_on_a_terminal(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_progress_line_on_a_terminal(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """On a terminal a bar with time, iterations and worst certificate; none when it is not wanted."""
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
     run(20)
@@ -210,7 +247,10 @@ def test_bad_arguments_change_nothing(tmp_path: Path) -> None:
         ("checkpoint_every is 0", {"checkpoint_every": 0}),
         ("dt is -1.0", {"dt": -1.0}),
         ("give either steps or t_end", {"t_end": 1.0}),
-        ("two recorders have the column 'u_x_a'", {"record": [Probe({"a": (1.0,)}), Probe({"a": (2.0,)})]}),
+        (
+            "two recorders have the column 'u_x_a'",
+            {"record": [Probe({"a": (1.0,)}), Probe({"a": (2.0,)})]},
+        ),
         ("give a point of the body", {"record": [Probe({"a": (99.0,)})]}),
     ]
     for words, arguments in wrong:
@@ -246,14 +286,23 @@ class Own:
         ({}, {"a": 1.0}, "names the column 'a' in columns"),
         ({"a": 1.0}, {"b": 1.0}, "names the column 'a' in columns"),
         ({"a": 1.0}, {"a": 1.0, "b": 1.0}, "names the column 'b' in columns"),
-        ({"a": 1.0}, {"a": "one"}, "column 'a' is 'one': let its recorder return a number or an array"),
+        (
+            {"a": 1.0},
+            {"a": "one"},
+            "column 'a' is 'one': let its recorder return a number or an array",
+        ),
         ({"a": None}, {"a": 1.0}, "column 'a' is None"),
     ],
 )
 def test_recorders_of_ones_own_fill_what_they_announce(first: Any, later: Any, words: str) -> None:
     with pytest.raises(InputError, match=words):
         run(3, record=[Own(first, later)])
-    assert run(3, record=[Own({"a": 1}, {"a": np.float32(2.0)})]).history["a"].tolist() == [1.0, 2.0, 2.0, 2.0]
+    assert run(3, record=[Own({"a": 1}, {"a": np.float32(2.0)})]).history["a"].tolist() == [
+        1.0,
+        2.0,
+        2.0,
+        2.0,
+    ]
 
 
 @pytest.mark.parametrize("value", ["1.0", None, np.ones(2), 1j], ids=repr)
@@ -265,7 +314,9 @@ def test_histories_return_one_number(value: Any) -> None:
             return value if t > 0.01 else np.float64(t)
 
     shaken = chain_problem(5, excitation=Late(1.0, 1.0, direction=(1.0,)), consistent=True)
-    with pytest.raises(InputError, match=r"the history of a load or excitation is .* at t = 0.01.* return one real"):
+    with pytest.raises(
+        InputError, match=r"the history of a load or excitation is .* at t = 0.01.* return one real"
+    ):
         simulate(shaken, dt=DT, steps=9, progress=False)
 
 
@@ -273,7 +324,10 @@ def test_histories_return_one_number(value: Any) -> None:
     ("arguments", "words"),
     [
         ({"problem": "chain"}, "static_equilibrium: problem is 'chain'; give a ContactProblem"),
-        ({"solver": "condensed"}, "static_equilibrium: solver is 'condensed'; give a solver, such as"),
+        (
+            {"solver": "condensed"},
+            "static_equilibrium: solver is 'condensed'; give a solver, such as",
+        ),
         ({"solver": Condensed}, "make an object of it"),
         ({"tolerance": np.nan}, "static_equilibrium: tolerance is nan; give a relative residual"),
         ({"t": np.nan}, "static_equilibrium: t is nan; give a finite number in s"),

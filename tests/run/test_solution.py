@@ -14,7 +14,7 @@ from fem_problems import WALL_DT, shaken_wall
 import vi_contact as vc
 
 SHAKE = vc.Harmonic(30.0, 3.0, direction=(1.0,))
-NASTY = "</table><script>alert(1)</script>&\""
+NASTY = '</table><script>alert(1)</script>&"'
 
 
 class Strict(HTMLParser):
@@ -54,7 +54,9 @@ class Nasty(vc.Midpoint):
 @pytest.mark.serial
 def test_html_is_a_table_and_a_picture_of_its_own() -> None:
     """It parses, names are escaped, and nothing refers to another place."""
-    solution = vc.simulate(chain_problem(3, excitation=SHAKE), scheme=Nasty(), dt=1e-3, steps=5, progress=False)
+    solution = vc.simulate(
+        chain_problem(3, excitation=SHAKE), scheme=Nasty(), dt=1e-3, steps=5, progress=False
+    )
     page = Strict(text := solution._repr_html_())
     assert page.seen == {"table", "tr", "th", "td", "img"}
     assert NASTY in page.texts and "worst certificate" in page.texts and "http" not in text
@@ -65,9 +67,15 @@ def test_html_is_a_table_and_a_picture_of_its_own() -> None:
 
 @pytest.mark.serial
 def test_a_solution_shows_its_summary() -> None:
-    solution = vc.simulate(chain_problem(3, excitation=SHAKE), scheme=vc.Midpoint(), dt=1e-3, steps=5, progress=False)
-    assert repr(solution) == solution.summary() and repr(solution).startswith("run finished: 5 steps of 0.001 s, t = 0")
-    assert "\n  worst certificate          " in repr(solution) and "\n    contact work             " in repr(solution)
+    solution = vc.simulate(
+        chain_problem(3, excitation=SHAKE), scheme=vc.Midpoint(), dt=1e-3, steps=5, progress=False
+    )
+    assert repr(solution) == solution.summary() and repr(solution).startswith(
+        "run finished: 5 steps of 0.001 s, t = 0"
+    )
+    assert "\n  worst certificate          " in repr(
+        solution
+    ) and "\n    contact work             " in repr(solution)
 
 
 def test_problems_and_states_are_told_in_a_few_lines(comm: Any) -> None:
@@ -75,10 +83,22 @@ def test_problems_and_states_are_told_in_a_few_lines(comm: Any) -> None:
     problem = replace(shaken_wall(comm), friction=vc.Coulomb(tuple([0.3] * 6)))
     told = repr(problem)
     assert "array" not in told and len(told.splitlines()) == 7 and len(told) < 600
-    for word in ("ContactProblem with 6 contact conditions", "60 unknowns in 2D, undamped, supported", "impact: Inelas",
-                 "friction: Coulomb(", "mass: ConsistentMass()", "excitation: Harmonic(", "FemSurface("):
+    for word in (
+        "ContactProblem with 6 contact conditions",
+        "60 unknowns in 2D, undamped, supported",
+        "impact: Inelas",
+        "friction: Coulomb(",
+        "mass: ConsistentMass()",
+        "excitation: Harmonic(",
+        "FemSurface(",
+    ):
         assert word in told
     state = vc.simulate(problem, dt=WALL_DT, steps=2, progress=False).state
     assert repr(state).startswith(f"State(t={state.t} s, k=2, ") and "array" not in repr(state)
     assert repr(replace(problem, mass=None)).count("mass: 'that of the time scheme'") == 1
-    assert repr(problem.surface.on_springs(1e9)).count(f"{problem.surface.count} on springs, 0 bilateral)") == 1
+    assert (
+        repr(problem.surface.on_springs(1e9)).count(
+            f"{problem.surface.count} on springs, 0 bilateral)"
+        )
+        == 1
+    )

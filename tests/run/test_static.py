@@ -39,7 +39,11 @@ def weight_of(problem: ContactProblem) -> float:
 def unbalanced(problem: ContactProblem, state: State) -> float:
     """The largest nodal K u + B_nᵀ r_n - f over the largest nodal load."""
     system = problem.static_load
-    residual = system.K @ state.u + problem.surface.reaction_load(state.r_n, system.rows) - system.load(state.t)
+    residual = (
+        system.K @ state.u
+        + problem.surface.reaction_load(state.r_n, system.rows)
+        - system.load(state.t)
+    )
     return max_over_ranks(COMM, residual) / max_over_ranks(COMM, system.load(state.t))
 
 
@@ -52,7 +56,9 @@ def test_bar_stands_on_its_foot(gap):
     x = np.linspace(0.0, 10.0, 11)
     assert state.r_n[0] == pytest.approx(100.0, rel=1e-12)
     exact = -gap - 10.0 * (10.0 * x - x**2 / 2.0) / 900.0
-    np.testing.assert_allclose(problem.cartesian(state.u), exact, rtol=0.0, atol=1e-11 * np.abs(exact).max())
+    np.testing.assert_allclose(
+        problem.cartesian(state.u), exact, rtol=0.0, atol=1e-11 * np.abs(exact).max()
+    )
     assert not state.v.any() and state.active.all()
 
 
@@ -103,7 +109,9 @@ def test_reactions_carry_the_weight(shape):
     state = static_equilibrium(problem, solver=Condensed())
     push = COMM.allreduce(problem.surface.normals.T @ state.r_n)
     load = problem.system.load(0.0).reshape(-1, problem.system.space.dimension)
-    assert push == pytest.approx(COMM.allreduce(load.sum(axis=0)), abs=1e-10 * COMM.allreduce(state.r_n.sum()))
+    assert push == pytest.approx(
+        COMM.allreduce(load.sum(axis=0)), abs=1e-10 * COMM.allreduce(state.r_n.sum())
+    )
     assert unbalanced(problem, state) < 1e-9 and problem.surface.some(state.active)
     sag = max_over_ranks(COMM, state.u)
     for new, _ in march(
@@ -122,7 +130,11 @@ def test_free_motions_keep_their_place():
         system, points = problem.system, problem.system.space.points
         motions = [system.influence[:, i] for i in range(points.shape[1]) if i != 1]
         if points.shape[1] == 3:
-            motions.append(system.space.restrict(np.column_stack([points[:, 2], 0.0 * points[:, 0], -points[:, 0]])))
+            motions.append(
+                system.space.restrict(
+                    np.column_stack([points[:, 2], 0.0 * points[:, 0], -points[:, 0]])
+                )
+            )
         size = system.algebra.dot(motions[0], system.M @ np.abs(state.u))
         for motion in motions:
             assert abs(system.algebra.dot(motion, system.M @ state.u)) < 1e-9 * size
@@ -146,7 +158,9 @@ def test_partly_lifted_base_balances_moments():
     weight, moment = 2400.0 * G * 3.0, 8.0e3 * 3.0
     assert 0 < state.active.sum() < 13 and state.r_n.min() == 0.0
     assert state.r_n.sum() == pytest.approx(weight, rel=1e-10)
-    assert state.r_n @ problem.surface.whole().points[:, 0] == pytest.approx(weight / 2.0 + moment, rel=1e-9)
+    assert state.r_n @ problem.surface.whole().points[:, 0] == pytest.approx(
+        weight / 2.0 + moment, rel=1e-9
+    )
 
 
 @pytest.mark.two_ranks
@@ -178,9 +192,15 @@ def test_balanced_loads_need_no_support():
     ("case", "way"),
     [
         ({"up": True}, r"\(0, 1\)"),
-        ({"push": 1.0}, r"\(1, .*\)"),  # 1 Pa on the top of a block that is free to slide: its weight is 70 kPa
+        (
+            {"push": 1.0},
+            r"\(1, .*\)",
+        ),  # 1 Pa on the top of a block that is free to slide: its weight is 70 kPa
         ({"push": 1.3e4, "held": True}, r"\(1, "),  # T H > W L / 2: it tips over
-        ({"points": [(0.0, 0.0), (0.25, 0.0)], "held": True}, r"\(1, -0.17\)"),  # supported on the left quarter only
+        (
+            {"points": [(0.0, 0.0), (0.25, 0.0)], "held": True},
+            r"\(1, -0.17\)",
+        ),  # supported on the left quarter only
         ({"push": -20.0, "lengths": (1.0, 1.5, 0.7), "divisions": (3, 4, 2)}, r"\(-1, .*\)"),
     ],
     ids=["lifted", "pushed", "tipped", "ledge", "pushed in 3D"],
@@ -188,7 +208,9 @@ def test_balanced_loads_need_no_support():
 @pytest.mark.parametrize("gap", [0.0, 1.0e-3])
 def test_no_equilibrium_is_refused(case, way, gap):
     problem = standing(gap=gap, **case)
-    with pytest.raises(InputError, match="no static equilibrium: its loads carry it off along " + way):
+    with pytest.raises(
+        InputError, match="no static equilibrium: its loads carry it off along " + way
+    ):
         static_equilibrium(problem, solver=Condensed())
 
 
@@ -204,25 +226,35 @@ def test_friction_holds_a_block_up_to_its_coefficient(gap):
         pull = 2400.0 * G * np.array([np.sin(theta), -np.cos(theta)])
         system = assemble(mesh, CONCRETE, loads=BodyForce(tuple(pull)))
         return ContactProblem(
-            system, contact_surface(system, tags["bottom"], obstacle=ground), friction=Coulomb(mu=0.3)
+            system,
+            contact_surface(system, tags["bottom"], obstacle=ground),
+            friction=Coulomb(mu=0.3),
         )
 
     theta = float(np.arctan(0.99 * 0.3))
     slope = on_slope(theta)
     state = gathered(slope.surface, static_equilibrium(slope, solver=Condensed()))
     assert state.r_n.sum() == pytest.approx(4800.0 * G * np.cos(theta), rel=1e-9)
-    assert state.r_t is not None and state.r_t.sum() == pytest.approx(4800.0 * G * np.sin(theta), rel=1e-9)
+    assert state.r_t is not None and state.r_t.sum() == pytest.approx(
+        4800.0 * G * np.sin(theta), rel=1e-9
+    )
     used = np.abs(state.r_t[:, 0]) / np.where(state.r_n > 0.0, 0.3 * state.r_n, 1.0)
     assert used.max() < 1.0 + 1e-9 and used.min() < 0.999 and np.sum(used > 1.0 - 1e-9) > 0
-    with pytest.raises(InputError, match=r"no static equilibrium: its loads carry it off along \(1, 0\)"):
+    with pytest.raises(
+        InputError, match=r"no static equilibrium: its loads carry it off along \(1, 0\)"
+    ):
         static_equilibrium(on_slope(float(np.arctan(1.01 * 0.3))), solver=Condensed())
 
 
 def test_floating_without_contact_is_refused():
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(2, 3))
     weight = BodyForce((0.0, -CONCRETE.rho * G))
-    problem = linear(assemble(mesh, CONCRETE, loads=weight, prescribed=Prescribed(tags["left"], components=(0,))))
-    with pytest.raises(InputError, match=r"along \(0, -1\) and neither contact nor a prescribed displacement stops"):
+    problem = linear(
+        assemble(mesh, CONCRETE, loads=weight, prescribed=Prescribed(tags["left"], components=(0,)))
+    )
+    with pytest.raises(
+        InputError, match=r"along \(0, -1\) and neither contact nor a prescribed displacement stops"
+    ):
         static_equilibrium(problem, solver=Condensed())
 
 
@@ -235,7 +267,10 @@ def test_pressed_by_a_moving_side_and_its_weight():
         return 0.0 * x + 1e-3
 
     system = assemble(
-        mesh, COLUMN, prescribed=held_by(tags, "left", shift, 0), loads=BodyForce((0.0, -COLUMN.rho * G))
+        mesh,
+        COLUMN,
+        prescribed=held_by(tags, "left", shift, 0),
+        loads=BodyForce((0.0, -COLUMN.rho * G)),
     )
     ground = HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
     problem = ContactProblem(system, contact_surface(system, tags["bottom"], obstacle=ground))

@@ -47,14 +47,19 @@ def channel() -> vc.ContactProblem:
     return build(Channel(ChannelMesh(size=0.5, far=1.0)), COMM).problem(excitation=())
 
 
-PROBLEMS: dict[str, tuple[Callable[[], vc.ContactProblem], int]] = {  # name -> problem, linear iterations in all
+PROBLEMS: dict[
+    str, tuple[Callable[[], vc.ContactProblem], int]
+] = {  # name -> problem, linear iterations in all
     "inclined": (lambda: standing(angle=0.3), 200),
     "with a gap": (lambda: standing(gap=0.01), 230),
     "in space": (lambda: standing(**SPACE), 310),
     "stack": (lambda: stack(2), 500),
     "stack in space": (lambda: stack(3), 770),
     "channel": (channel, 3800),
-    "pushed and rubbing": (lambda: replace(standing(push=1e3, **SPACE), friction=vc.Coulomb(0.5)), 900),
+    "pushed and rubbing": (
+        lambda: replace(standing(push=1e3, **SPACE), friction=vc.Coulomb(0.5)),
+        900,
+    ),
     "channel that rubs": (lambda: replace(channel(), friction=vc.Coulomb(0.5)), 8000),
 }
 
@@ -75,7 +80,10 @@ def test_as_with_a_factor(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also where the body stands along the ground, which nothing but its start says."""
     problem, most = PROBLEMS[name][0](), PROBLEMS[name][1]
     exact = vc.static_equilibrium(problem, solver=vc.Condensed())
-    for factor in ("petsc_algebra.PetscFactor", "copied_factor.ContactLast"):  # nothing is factorised
+    for factor in (
+        "petsc_algebra.PetscFactor",
+        "copied_factor.ContactLast",
+    ):  # nothing is factorised
         monkeypatch.setattr(f"vi_contact.fem.{factor}", None)
     Watched.prepared.clear()
     found = vc.static_equilibrium(problem, solver=Watched())
@@ -98,5 +106,7 @@ def test_the_preconditioner_does_not_move_the_body(kind: str) -> None:
 
 
 def test_loads_that_carry_a_body_off_are_named() -> None:
-    with pytest.raises(InputError, match=r"its loads carry it off along \(1, 0\) and neither contact"):
+    with pytest.raises(
+        InputError, match=r"its loads carry it off along \(1, 0\) and neither contact"
+    ):
         vc.static_equilibrium(standing(push=1.0), solver=Iterative())

@@ -41,7 +41,9 @@ def test_gravity_stage_balances_forces_and_stays_still(angle, simplices):
     start = static_equilibrium(problem, solver=Condensed())
     contact = system.load(0.0) - system.K @ problem.cartesian(start.u)
     push = COMM.allreduce(problem.surface.normals.T @ start.r_n)
-    assert COMM.allreduce(contact.reshape(-1, 2).sum(axis=0)) == pytest.approx(push, abs=1e-9 * weight)
+    assert COMM.allreduce(contact.reshape(-1, 2).sum(axis=0)) == pytest.approx(
+        push, abs=1e-9 * weight
+    )
     assert 0.5 * weight * cos(angle) < COMM.allreduce(start.r_n.sum()) < weight * cos(angle)
     stays_still(problem, start)
 
@@ -57,7 +59,9 @@ def test_gravity_stage_shares_the_weight():
     r_n = problem.surface.everywhere(start.r_n)
     assert start.active.all()
     assert r_n.sum() == pytest.approx(0.5 * 3.0 * 2400.0 * 9.80665, rel=1e-12)
-    assert r_n / problem.surface.whole().weights == pytest.approx(np.full(3, 1.5 * 2400.0 * 9.80665), rel=1e-12)
+    assert r_n / problem.surface.whole().weights == pytest.approx(
+        np.full(3, 1.5 * 2400.0 * 9.80665), rel=1e-12
+    )
     stays_still(problem, start)
 
 
@@ -76,7 +80,9 @@ def test_gravity_stage_of_a_clamped_wall_leaves_its_side_touching():
     """A wall beside the ground, Poisson's ratio 0.2: its weight widens it against the ground, Σ r_n > 0. The clamped
     base balances these reactions and carries the whole weight."""
     mesh, tags = block(COMM, lengths=(2.0, 3.0), divisions=(4, 6))
-    system = assemble(mesh, CONCRETE, clamped=tags["bottom"], loads=BodyForce((0.0, -CONCRETE.rho * 9.80665)))
+    system = assemble(
+        mesh, CONCRETE, clamped=tags["bottom"], loads=BodyForce((0.0, -CONCRETE.rho * 9.80665))
+    )
     ground = HalfSpace(point=(2.0, 0.0), normal=(-1.0, 0.0))
     problem = ContactProblem(system, contact_surface(system, tags["right"], obstacle=ground))
     start = static_equilibrium(problem, solver=Condensed())
@@ -85,7 +91,9 @@ def test_gravity_stage_of_a_clamped_wall_leaves_its_side_touching():
     free = assemble(mesh, CONCRETE, loads=BodyForce((0.0, -CONCRETE.rho * 9.80665)))
     points, u = field(system, start.u)
     forces = field(free, free.K @ free.space.restrict(u[free.space.nodes]))[1]
-    base = forces[points[:, 1] == 0.0]  # K u of the unclamped body: supports minus the base's own share of the weight
+    base = forces[
+        points[:, 1] == 0.0
+    ]  # K u of the unclamped body: supports minus the base's own share of the weight
     weight = 6.0 * CONCRETE.rho * 9.80665
     own = CONCRETE.rho * 9.80665 * 0.5 * 2.0 * 0.5  # half of the lowest row of elements
     assert base[:, 0].sum() == pytest.approx(pushing, rel=1e-9)
@@ -95,10 +103,14 @@ def test_gravity_stage_of_a_clamped_wall_leaves_its_side_touching():
 def test_bilateral_points_pull_as_well():
     """Lifted by a traction, held points carry the tension that unilateral ones refuse."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 2))
-    system = assemble(mesh, CONCRETE, clamped=tags["left"], loads=Traction(tags["top"], (0.0, 1.0e6)))
+    system = assemble(
+        mesh, CONCRETE, clamped=tags["left"], loads=Traction(tags["top"], (0.0, 1.0e6))
+    )
     one = contact_surface(system, tags["bottom"], obstacle=GROUND)
     assert not one.bilateral.any() and one.bilateral_everywhere().bilateral.all()
-    held = static_equilibrium(ContactProblem(system, one.bilateral_everywhere()), solver=Condensed())
+    held = static_equilibrium(
+        ContactProblem(system, one.bilateral_everywhere()), solver=Condensed()
+    )
     loose = static_equilibrium(ContactProblem(system, one), solver=Condensed())
     assert held.active.all() and one.some(held.r_n < 0.0)
     assert max_over_ranks(COMM, one.normal_values(held.u)) <= 1e-15 * max_over_ranks(COMM, held.u)
@@ -108,13 +120,20 @@ def test_bilateral_points_pull_as_well():
 def spring_support(stiffness: float | None) -> tuple[ContactSurface, Array, Array]:
     """(surface, u_n, r_n) of a block pressed down by 1 mm at its top; nu = 0, so that it is a spring of 2e10 Pa/m."""
     mesh, tags = block(COMM, lengths=(2.0, 1.0), divisions=(4, 2))
-    press = [held_by(tags, "top", lambda x: 0.0 * x - 1e-3, 1), Prescribed(tags["left"], components=(0,))]
+    press = [
+        held_by(tags, "top", lambda x: 0.0 * x - 1e-3, 1),
+        Prescribed(tags["left"], components=(0,)),
+    ]
     material = LinearElastic(E=2.0e10, nu=0.0, rho=2400.0)
     system = assemble(mesh, material, section=PlaneStress(0.4), prescribed=press)
     surface = contact_surface(system, tags["bottom"], obstacle=GROUND)
     surface = surface if stiffness is None else surface.on_springs(stiffness)
     state = static_equilibrium(ContactProblem(system, surface), solver=Condensed())
-    return surface.whole(), surface.everywhere(surface.normal_values(state.u)), surface.everywhere(state.r_n)
+    return (
+        surface.whole(),
+        surface.everywhere(surface.normal_values(state.u)),
+        surface.everywhere(state.r_n),
+    )
 
 
 @pytest.mark.parametrize("stiffness", [1.0e9, 1.0e12])

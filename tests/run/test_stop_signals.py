@@ -56,12 +56,18 @@ def test_a_signal_ends_the_run_after_the_step(tmp_path: Path, number: signal.Sig
     """Checkpoint, summary and one sentence; the old handlers are back, and the restart is the straight run."""
     before = [signal.getsignal(one) for one in SIGNALS]
     record = [Energy(), Contact(), AtStep(57, kill(number))]
-    with pytest.raises(Interrupted, match=rf"{number.name} ended the run after step 57, .* checkpoint in '") as caught:
+    with pytest.raises(
+        Interrupted, match=rf"{number.name} ended the run after step 57, .* checkpoint in '"
+    ) as caught:
         run(tmp_path / "parts", 100, record=record)
     assert caught.value.number == number and isinstance(caught.value, KeyboardInterrupt)
     assert [signal.getsignal(one) for one in SIGNALS] == before
     found = summary_of(tmp_path / "parts")
-    assert (found["status"], found["steps"], found["reason"]) == ("interrupted", 57, str(caught.value))
+    assert (found["status"], found["steps"], found["reason"]) == (
+        "interrupted",
+        57,
+        str(caught.value),
+    )
     assert "interrupted after 57 steps" in (tmp_path / "parts" / "run.log").read_text()
     record = [Energy(), Contact(), AtStep(-1, bool)]
     run(tmp_path / "parts", 100, record=record, restart=True)
@@ -81,7 +87,10 @@ def test_a_signal_in_the_last_step(tmp_path: Path) -> None:
 def test_what_is_ignored_stays_ignored() -> None:
     """nohup, jobs in the background, and handlers that the caller wrote himself."""
     got: list[int] = []
-    with changed(signal.SIGHUP, signal.SIG_IGN), changed(signal.SIGTERM, lambda number, frame: got.append(number)):
+    with (
+        changed(signal.SIGHUP, signal.SIG_IGN),
+        changed(signal.SIGTERM, lambda number, frame: got.append(number)),
+    ):
         kept = run(None, 30, record=[AtStep(5, kill(signal.SIGHUP))])
         run(None, 30, record=[AtStep(5, kill(signal.SIGTERM))])
     assert len(kept.history["t"]) == 31 and got == [signal.SIGTERM]
@@ -110,9 +119,13 @@ def test_in_a_thread() -> None:
 @serial
 def test_second_ctrl_c() -> None:
     """It ends the process at once, whatever it does."""
-    code = ("import os, signal, time\nfrom vi_contact.run.stop_signals import StopSignals\nwith StopSignals():\n"
-            "    os.kill(os.getpid(), signal.SIGINT)\n    os.kill(os.getpid(), signal.SIGINT)\n    time.sleep(600)")
-    done = subprocess.run([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": PACKAGE}, timeout=600)
+    code = (
+        "import os, signal, time\nfrom vi_contact.run.stop_signals import StopSignals\nwith StopSignals():\n"
+        "    os.kill(os.getpid(), signal.SIGINT)\n    os.kill(os.getpid(), signal.SIGINT)\n    time.sleep(600)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": PACKAGE}, timeout=600
+    )
     assert done.returncode == -signal.SIGINT
 
 
@@ -122,7 +135,10 @@ def test_exit_status_of_the_command_line(
 ) -> None:
     """One sentence on standard error, 128 + n."""
     monkeypatch.setattr("vi_contact.cli.entry.world", SerialComm)
-    for error, status in ((Interrupted("SIGTERM ended the run", signal.SIGTERM), 143), (KeyboardInterrupt(), 130)):
+    for error, status in (
+        (Interrupted("SIGTERM ended the run", signal.SIGTERM), 143),
+        (KeyboardInterrupt(), 130),
+    ):
 
         def stop(*_: Any, error: BaseException = error, **__: Any) -> None:
             raise error
@@ -171,8 +187,11 @@ run(Path({out!r}), 10**6, checkpoint_every=10)
 def another_run(out: Path) -> Iterator[subprocess.Popen[bytes]]:
     """A run of another process, under way."""
     code = FIRST.format(tests=TESTS, out=str(out))
-    child = subprocess.Popen([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": PACKAGE},
-                             stderr=subprocess.PIPE)
+    child = subprocess.Popen(
+        [sys.executable, "-c", code],
+        env=os.environ | {"PYTHONPATH": PACKAGE},
+        stderr=subprocess.PIPE,
+    )
     try:
         deadline = time.monotonic() + 600
         while not (out / "checkpoint.npz").is_file():
@@ -188,7 +207,9 @@ def another_run(out: Path) -> Iterator[subprocess.Popen[bytes]]:
 def test_two_runs_into_one_folder(tmp_path: Path) -> None:
     """The second is refused and changes nothing; the first is whole; killed, it holds nobody up."""
     with another_run(tmp_path) as first:
-        with pytest.raises(InputError, match=rf"another run writes into .* \(process {first.pid} on .*\): wait"):
+        with pytest.raises(
+            InputError, match=rf"another run writes into .* \(process {first.pid} on .*\): wait"
+        ):
             run(tmp_path, 5)
         with pytest.raises(InputError, match="another run writes into"):
             run(tmp_path, 5, restart=True)
@@ -249,7 +270,10 @@ def test_all_ranks_are_refused(comm: Any, shared_tmp: Path) -> None:
     holder = open(shared_tmp / folder_lock.LOCK, "wb") if comm.rank == 0 else None  # noqa: SIM115
     if holder is not None:
         folder_lock.fcntl.flock(holder, folder_lock.fcntl.LOCK_EX)
-    with pytest.raises(InputError, match="another run writes into"), locked(MpiComm(comm), shared_tmp):
+    with (
+        pytest.raises(InputError, match="another run writes into"),
+        locked(MpiComm(comm), shared_tmp),
+    ):
         pass
     if holder is not None:
         holder.close()

@@ -31,7 +31,11 @@ from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
 
 serial = pytest.mark.serial
-HALF, NEWMARK, DISSIPATIVE = ZienkiewiczWoodTaylor(), LinearMultistep.newmark(), LinearMultistep.newmark(0.3025, 0.6)
+HALF, NEWMARK, DISSIPATIVE = (
+    ZienkiewiczWoodTaylor(),
+    LinearMultistep.newmark(),
+    LinearMultistep.newmark(0.3025, 0.6),
+)
 SCHEMES = [HALF, SS22(), NEWMARK]
 THREE = Schedule(((4e-3, 0.2), (1e-3, 0.3), (2.5e-3, inf)))
 LONG = Schedule(((4e-3, 0.4), (1e-3, 0.6), (2.5e-3, inf)))  # contacts open and close in every piece
@@ -69,8 +73,18 @@ def test_steps_of_a_constant_dt(dt, steps, t_end, t0, expected):
         (160, None, 0.0, ((4e-3, 50), (1e-3, 100), (2.5e-3, 10))),
         (None, 0.3, 0.0, ((4e-3, 50), (1e-3, 100))),
         (110, None, 0.2, ((4e-3, 0), (1e-3, 100), (2.5e-3, 10))),
-        (None, 0.4, 0.1999, ((4e-3, 1), (1e-3, 97), (2.5e-3, 40))),  # on from 0.2039: 97 steps reach 0.3
-        (None, 0.4, 0.2 - 1e-12, ((4e-3, 0), (1e-3, 100), (2.5e-3, 40))),  # round-off adds no step to any piece
+        (
+            None,
+            0.4,
+            0.1999,
+            ((4e-3, 1), (1e-3, 97), (2.5e-3, 40)),
+        ),  # on from 0.2039: 97 steps reach 0.3
+        (
+            None,
+            0.4,
+            0.2 - 1e-12,
+            ((4e-3, 0), (1e-3, 100), (2.5e-3, 40)),
+        ),  # round-off adds no step to any piece
     ],
 )
 def test_steps_of_a_schedule(steps, t_end, t0, parts):
@@ -78,7 +92,9 @@ def test_steps_of_a_schedule(steps, t_end, t0, parts):
     found = step_plan(THREE, steps, t_end, t0)
     assert found.parts == parts and found.steps == sum(count for _, count in parts)
     sizes = [dt for dt, count in parts for _ in range(count)]
-    assert [found.dt(base) for base in range(found.steps)] == sizes and found.dt(found.steps + 5) == sizes[-1]
+    assert [found.dt(base) for base in range(found.steps)] == sizes and found.dt(
+        found.steps + 5
+    ) == sizes[-1]
 
 
 @serial
@@ -109,20 +125,45 @@ def test_round_off_of_many_pieces_adds_no_step(t0):
         (0.1, None, -0.5, "t_end after the start"),
         (0.1, None, np.nan, "finite t_end"),
         (0.1, None, np.inf, "finite t_end"),
-        (1e-90, None, 1e300, r"the run to t_end = 1e\+300 s has more than 1e\+09 steps of dt = 1e-90 s: give"),
+        (
+            1e-90,
+            None,
+            1e300,
+            r"the run to t_end = 1e\+300 s has more than 1e\+09 steps of dt = 1e-90 s: give",
+        ),
         (1e-320, 2, None, r"dt is 9.99989e-321 s: give a time step between 1e-100 and 1e\+100 s"),
         (1e200, 2, None, r"dt is 1e\+200 s: give a time step between 1e-100 and 1e\+100 s"),
         (1e-30, None, 1.0, r"the run to t_end = 1 s has more than 1e\+09 steps of dt = 1e-30 s"),
         (0.1, 10**10, None, r"the run has more than 1e\+09 steps of dt = 0.1 s"),
-        (Schedule(((1e-30, 0.5), (0.1, inf))), None, 1.0, r"more than 1e\+09 steps of dt = 1e-30 s"),
+        (
+            Schedule(((1e-30, 0.5), (0.1, inf))),
+            None,
+            1.0,
+            r"more than 1e\+09 steps of dt = 1e-30 s",
+        ),
         (0.1, None, "1", "t_end = '1' s: give a finite"),
         (0.1, True, None, "steps is True: give a whole number"),
         (True, 5, None, "dt is True: give a positive time step"),
         (10**400, 5, None, "dt is 1000.*: give a positive time step"),
         (0.1, 2.5, None, "whole number of steps"),
-        (Schedule(((0.1, 1.0), (0.2, 2.0))), None, 2.5, "last piece of the Schedule ends at 2 s, before t_end = 2.5 s"),
-        (Schedule(((0.1, 1.0), (0.2, 2.0))), 17, None, "ends at 2 s, before the 2 steps that are left"),
-        (HalvedAtImpact(Schedule(((0.1, 1.0),))), 11, None, "ends at 1 s, before the 1 steps that are left: end it"),
+        (
+            Schedule(((0.1, 1.0), (0.2, 2.0))),
+            None,
+            2.5,
+            "last piece of the Schedule ends at 2 s, before t_end = 2.5 s",
+        ),
+        (
+            Schedule(((0.1, 1.0), (0.2, 2.0))),
+            17,
+            None,
+            "ends at 2 s, before the 2 steps that are left",
+        ),
+        (
+            HalvedAtImpact(Schedule(((0.1, 1.0),))),
+            11,
+            None,
+            "ends at 1 s, before the 1 steps that are left: end it",
+        ),
     ],
 )
 def test_nonsense_is_named(dt, steps, t_end, word):
@@ -138,7 +179,10 @@ def test_nonsense_is_named(dt, steps, t_end, word):
     [
         (lambda: Schedule(()), "Schedule has no pieces: give at least one"),
         (lambda: Schedule(((0.1, 1.0), (0.0, 2.0))), "dt is 0.0: give a positive time step"),
-        (lambda: Schedule(((0.1, 1.0), (0.2, 1.0))), "until 1 s does not end after 1 s: give increasing times"),
+        (
+            lambda: Schedule(((0.1, 1.0), (0.2, 1.0))),
+            "until 1 s does not end after 1 s: give increasing times",
+        ),
         (lambda: Schedule(((0.1, inf), (0.2, inf))), "until inf s does not end after inf s"),
         (lambda: Schedule(((0.1, np.nan),)), "until nan s does not end"),
         (lambda: Schedule((0.1, 0.2)), r"Schedule pieces are \(0.1, 0.2\): give pairs"),
@@ -162,7 +206,9 @@ def test_plans_say_the_same_whatever_numbers_they_are_given():
     plain = HalvedAtImpact(Schedule(((1e-3, 1.0), (1.0, inf))), 2)
     other = HalvedAtImpact(Schedule([[np.float64(1e-3), 1], (1, np.inf)]), np.int64(2))  # type: ignore[arg-type]
     assert plain == other and repr(plain) == repr(other)
-    assert repr(plain) == "HalvedAtImpact(dt=Schedule(pieces=((0.001, 1.0), (1.0, inf))), halvings=2)"
+    assert (
+        repr(plain) == "HalvedAtImpact(dt=Schedule(pieces=((0.001, 1.0), (1.0, inf))), halvings=2)"
+    )
 
 
 # schedules
@@ -204,13 +250,17 @@ def test_ledger_closes_across_changes(scheme, plan):
     for one, two in pairwise(reports):
         assert np.array_equal(two.old.u, one.new.u) and np.array_equal(two.old.v, one.new.v)
         assert two.old.t == one.new.t and two.new.k == two.old.k + 1
-    solution = simulate(problem, scheme=scheme, solver=Condensed(), dt=plan, steps=600, record=[Energy()])
+    solution = simulate(
+        problem, scheme=scheme, solver=Condensed(), dt=plan, steps=600, record=[Energy()]
+    )
     assert solution.facts["energy_defect"] < 1e-10 and solution.history["certificate"].max() < 1e-9
 
 
 def linear_error(scheme: Any, dt: float) -> float:
     """max |u - exact| / max |u| at t = 1 s of a free vibration, dt changed to dt/2 at 0.3 s and to 2 dt at 0.6 s."""
-    problem = chain_problem(4, gap=1e3, stiffness=50.0, u0=[0.1, -0.2, 0.3, 0.1], v0=[1.0, 0.0, -1.0, 0.5])
+    problem = chain_problem(
+        4, gap=1e3, stiffness=50.0, u0=[0.1, -0.2, 0.3, 0.1], v0=[1.0, 0.0, -1.0, 0.5]
+    )
     plan = Schedule(((dt, 0.3), (0.5 * dt, 0.6), (2.0 * dt, inf)))
     *_, last = run(problem, scheme, dt=plan, t_end=1.0, steps=None)
     system = problem.equations
@@ -226,7 +276,14 @@ def linear_error(scheme: Any, dt: float) -> float:
 @serial
 @pytest.mark.parametrize(
     ("scheme", "order"),
-    [(HALF, 2), (SS22(), 2), (NEWMARK, 2), (Trapezoidal(), 2), (ZienkiewiczWoodTaylor(1.0), 1), (DISSIPATIVE, 1)],
+    [
+        (HALF, 2),
+        (SS22(), 2),
+        (NEWMARK, 2),
+        (Trapezoidal(), 2),
+        (ZienkiewiczWoodTaylor(1.0), 1),
+        (DISSIPATIVE, 1),
+    ],
     ids=repr,
 )
 def test_order_with_a_change_in_mid_run(scheme, order):
@@ -280,7 +337,9 @@ def test_factors_of_pieces_that_are_over_are_freed():
     for i, _ in enumerate(run(shaken(), scheme, dt=plan, steps=50)):
         assert scheme.alive == {sizes[i // 5]} and scheme.sizes == sizes[: i // 5 + 1]
     halved, dyadic = Counted(), Schedule(((4e-3, 0.4), (2e-3, inf)))
-    alive = [set(halved.alive) for _ in run(shaken(), halved, dt=HalvedAtImpact(dyadic, 2), steps=200)]
+    alive = [
+        set(halved.alive) for _ in run(shaken(), halved, dt=HalvedAtImpact(dyadic, 2), steps=200)
+    ]
     assert alive[-1] == {2e-3, 1e-3, 0.5e-3} and {4e-3, 2e-3, 1e-3} in alive
     assert halved.sizes == [4e-3, 2e-3, 1e-3, 0.5e-3]  # shared by both pieces
 
@@ -305,7 +364,9 @@ def test_every_closure_happens_in_a_shortest_step(scheme):
     assert sum(closing) >= 4 and set(levels[closing]) == {halvings}
     assert [report.new.k for report in reports] == list(range(1, len(reports) + 1))
     base = np.cumsum(2.0**-levels)
-    assert base[-1] == 500 and set(np.arange(1, 501)) <= set(base)  # every base step ends; nothing is skipped
+    assert base[-1] == 500 and set(np.arange(1, 501)) <= set(
+        base
+    )  # every base step ends; nothing is skipped
     assert all(report.certificate.worst <= 1e-9 for report in reports)
 
 
@@ -328,8 +389,14 @@ def test_rejected_attempts_leave_no_trace(scheme):
 @pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
 def test_no_halvings_is_the_constant_dt(scheme):
     plain = list(run(shaken(Inelastic()), scheme, dt=5e-3, steps=100))
-    for plan in (HalvedAtImpact(5e-3, 0), Schedule(((5e-3, inf),)), Schedule(((5e-3, 0.2), (5e-3, inf)))):
-        for one, other in zip(plain, run(shaken(Inelastic()), scheme, dt=plan, steps=100), strict=True):
+    for plan in (
+        HalvedAtImpact(5e-3, 0),
+        Schedule(((5e-3, inf),)),
+        Schedule(((5e-3, 0.2), (5e-3, inf))),
+    ):
+        for one, other in zip(
+            plain, run(shaken(Inelastic()), scheme, dt=plan, steps=100), strict=True
+        ):
             assert difference(one.new, other.new) == 0.0
 
 
@@ -358,7 +425,10 @@ def test_time_of_the_first_contact_of_the_thrown_bar(halvings, dt):
 @serial
 def test_contact_work_of_the_thrown_bar_falls_with_halving():
     """V9.1: the first closure loses its reaction times the gap before it, which halving makes smaller."""
-    lost, dt = [], 0.5 / 44.9  # the bar arrives at 0.9 of a step, 0.15 of a quarter, 0.025 after the last sixteenth
+    lost, dt = (
+        [],
+        0.5 / 44.9,
+    )  # the bar arrives at 0.9 of a step, 0.15 of a quarter, 0.025 after the last sixteenth
     for halvings in (0, 2, 4):
         reports = run(thrown(100), HALF, dt=HalvedAtImpact(dt, halvings), steps=100)
         report = next(report for report in reports if report.new.active.any())

@@ -23,7 +23,11 @@ from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
 
 serial = pytest.mark.serial
-HALF, NEWMARK, DISSIPATIVE = ZienkiewiczWoodTaylor(), LinearMultistep.newmark(), LinearMultistep.newmark(0.3025, 0.6)
+HALF, NEWMARK, DISSIPATIVE = (
+    ZienkiewiczWoodTaylor(),
+    LinearMultistep.newmark(),
+    LinearMultistep.newmark(0.3025, 0.6),
+)
 THREE = Schedule(((4e-3, 0.2), (1e-3, 0.3), (2.5e-3, inf)))
 
 
@@ -44,23 +48,37 @@ def test_what_a_run_counts(tmp_path: Path):
     assert "300 of 300 steps" in log and log.count(" left") == 10 and "300 steps to do" in log
     assert difference(run_chain(None, None, t_end=1.5, dt=plan).state, solution.state) == 0.0
     plain = run_chain(None, 300)
-    assert plain.facts["halved_steps"] == 0 and plain.facts["base_steps"] == 300 and "halved" not in plain.summary()
+    assert (
+        plain.facts["halved_steps"] == 0
+        and plain.facts["base_steps"] == 300
+        and "halved" not in plain.summary()
+    )
 
 
-PLANS = [THREE, HalvedAtImpact(5e-3, 3), HalvedAtImpact(Schedule(((5e-3, 0.31), (2.5e-3, 0.4), (4e-3, inf))), 2)]
+PLANS = [
+    THREE,
+    HalvedAtImpact(5e-3, 3),
+    HalvedAtImpact(Schedule(((5e-3, 0.31), (2.5e-3, 0.4), (4e-3, inf))), 2),
+]
 
 
 @pytest.mark.slow
 @serial
 @pytest.mark.parametrize(
-    "scheme, plan", [*zip((HALF, NEWMARK, DISSIPATIVE), PLANS, strict=True), (NEWMARK, PLANS[2])], ids=repr
+    "scheme, plan",
+    [*zip((HALF, NEWMARK, DISSIPATIVE), PLANS, strict=True), (NEWMARK, PLANS[2])],
+    ids=repr,
 )
 def test_restart_with_a_plan_to_the_last_bit(tmp_path: Path, scheme: Any, plan: Any):
     """From checkpoints here and there, also right after halved steps: state and files of the straight run."""
     straight = run_chain(tmp_path / "straight", 200, scheme=scheme, dt=plan)
     method = Method(chain(), scheme, [Condensed()], plan, tolerance=1e-9)
     loop = March(method, step_plan(plan, 199, None), initial_state(chain()))
-    halved = [loop.base for _ in loop if loop.ended and loop.dt < step_plan(plan, 199, None).dt(loop.base - 1)]
+    halved = [
+        loop.base
+        for _ in loop
+        if loop.ended and loop.dt < step_plan(plan, 199, None).dt(loop.base - 1)
+    ]
     assert bool(halved) == isinstance(plan, HalvedAtImpact)
     stops = sorted({50, 75, 101, 150, *halved[:2]})
     for stop in stops:
@@ -78,7 +96,9 @@ class Stop(Exception):
 
 @serial
 @pytest.mark.parametrize("scheme", [HALF, DISSIPATIVE], ids=repr)
-def test_a_run_that_stops_inside_a_halved_step_goes_on_from_the_base_step_before(tmp_path: Path, scheme: Any):
+def test_a_run_that_stops_inside_a_halved_step_goes_on_from_the_base_step_before(
+    tmp_path: Path, scheme: Any
+):
     """Rows of the unfinished base step are in history.csv, and are computed again, to the last bit."""
     plan = HalvedAtImpact(5e-3, 3)
 
@@ -105,7 +125,11 @@ def test_a_run_that_stops_inside_a_halved_step_goes_on_from_the_base_step_before
 def test_checkpoints_are_of_base_steps_only(tmp_path: Path):
     """One after every tenth base step, and the last; none in between."""
     solution = run_chain(tmp_path, 60, dt=HalvedAtImpact(5e-3, 3), checkpoint_every=10)
-    lines = [line for line in (tmp_path / "run.log").read_text().splitlines() if "checkpoint of step" in line]
+    lines = [
+        line
+        for line in (tmp_path / "run.log").read_text().splitlines()
+        if "checkpoint of step" in line
+    ]
     steps = [int(line.rsplit(" ", 1)[1]) for line in lines]
     ends = [int(np.argmin(np.abs(solution.history["t"] - 0.05 * i))) for i in range(1, 7)]
     assert steps == ends and steps[-1] > 60
@@ -117,9 +141,18 @@ def test_another_plan_is_refused(tmp_path: Path):
     run_chain(tmp_path, 60, dt=plan)
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}
     wrong: list[tuple[Any, str]] = [
-        (5e-3, r"of a run with dt = HalvedAtImpact\(dt=0.005, halvings=3\) but this one has 0.005: restart the same"),
-        (HalvedAtImpact(5e-3, 2), r"but this one has HalvedAtImpact\(dt=0.005, halvings=2\): restart the same run"),
-        (Schedule(((5e-3, inf),)), r"this one has Schedule\(pieces=\(\(0.005, inf\),\)\): restart the same run"),
+        (
+            5e-3,
+            r"of a run with dt = HalvedAtImpact\(dt=0.005, halvings=3\) but this one has 0.005: restart the same",
+        ),
+        (
+            HalvedAtImpact(5e-3, 2),
+            r"but this one has HalvedAtImpact\(dt=0.005, halvings=2\): restart the same run",
+        ),
+        (
+            Schedule(((5e-3, inf),)),
+            r"this one has Schedule\(pieces=\(\(0.005, inf\),\)\): restart the same run",
+        ),
     ]
     for other, words in wrong:
         with pytest.raises(InputError, match=words):
@@ -136,7 +169,10 @@ def test_halved_wall_on_any_number_of_ranks(comm: Any, shared_tmp: Path, solver:
     pytest.importorskip("dolfinx")
     from vi_contact.solvers.volume.route import Volume
 
-    more = {"dt": HalvedAtImpact(Schedule(((1.0 / 280.0, 0.1), (1.0 / 560.0, inf))), 2), "scheme": HALF}
+    more = {
+        "dt": HalvedAtImpact(Schedule(((1.0 / 280.0, 0.1), (1.0 / 560.0, inf))), 2),
+        "scheme": HALF,
+    }
     more["solver"] = Condensed() if solver == "condensed" else Volume()
     problem = wall(comm)
     straight = run_wall(comm, shared_tmp / "straight", 60, problem=problem, **more)

@@ -57,21 +57,50 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Iterator[Clock]:
 
 
 @serial
-@pytest.mark.parametrize(("text", "seconds"), [
-    ("90", 5400), ("1:30", 90), ("11:30:00", 41400), ("2-12", 216000), ("2-12:30", 217800), ("2-12:30:15", 217815),
-    ("0-0:0:1", 1), ("120:00", 7200),
-])
+@pytest.mark.parametrize(
+    ("text", "seconds"),
+    [
+        ("90", 5400),
+        ("1:30", 90),
+        ("11:30:00", 41400),
+        ("2-12", 216000),
+        ("2-12:30", 217800),
+        ("2-12:30:15", 217815),
+        ("0-0:0:1", 1),
+        ("120:00", 7200),
+    ],
+)
 def test_slurm_reads_it_so(text: str, seconds: float) -> None:
     """The six forms of sbatch(1), --time: the same digits mean minutes first without days, hours first with them."""
     assert seconds_of(text) == seconds
 
 
 @serial
-@pytest.mark.parametrize("text", ["", "0", "0:00", "-1", "1:2:3:4", "1-2:3:4:5", "1-", "half", "1.5", "1:", " 1", 60,
-                                  "٣", "9" * 400, "UNLIMITED"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "0",
+        "0:00",
+        "-1",
+        "1:2:3:4",
+        "1-2:3:4:5",
+        "1-",
+        "half",
+        "1.5",
+        "1:",
+        " 1",
+        60,
+        "٣",
+        "9" * 400,
+        "UNLIMITED",
+    ],
+)
 def test_what_slurm_does_not_read(text: Any, tmp_path: Path) -> None:
     """One sentence, before anything is written; no folder, no wall time."""
-    with pytest.raises(InputError, match="the wall time is .*: give minutes, minutes:seconds, .*'11:30:00'"):
+    with pytest.raises(
+        InputError, match="the wall time is .*: give minutes, minutes:seconds, .*'11:30:00'"
+    ):
         run(tmp_path / "none", 5, wall_time=text)
     assert not (tmp_path / "none").exists()
     with pytest.raises(InputError, match="wall_time needs a folder"):
@@ -109,12 +138,19 @@ def test_the_run_ends_before_the_time_and_goes_on(tmp_path: Path, clock: Clock) 
     """Steps of 10 s, 600 s: saved, told and of a status of its own; the restart is the straight run to the last bit."""
     clock.now = 35.0  # what came before the run counts
     record = [Energy(), Contact(), clock.takes(10.0)]
-    with pytest.raises(OutOfTime, match=r"s left of the wall time 10:00 ended the run after step 55, .* restart it "
-                                        r"from its checkpoint in '") as caught:
+    with pytest.raises(
+        OutOfTime,
+        match=r"s left of the wall time 10:00 ended the run after step 55, .* restart it "
+        r"from its checkpoint in '",
+    ) as caught:
         run(tmp_path / "parts", 100, record=record, wall_time="10:00")
     assert caught.value.status == 75 and isinstance(caught.value, Interrupted)
     found = summary_of(tmp_path / "parts")
-    assert (found["status"], found["steps"], found["reason"]) == ("interrupted", 55, str(caught.value))
+    assert (found["status"], found["steps"], found["reason"]) == (
+        "interrupted",
+        55,
+        str(caught.value),
+    )
     assert "565 s are left of the wall time 10:00" in (tmp_path / "parts" / "run.log").read_text()
     clock.now = 0.0
     run(tmp_path / "parts", 100, record=record, restart=True, wall_time="1:00:00")
@@ -129,7 +165,10 @@ def test_too_little_time_still_makes_a_step(tmp_path: Path, clock: Clock) -> Non
     for k in (1, 2, 3):
         with pytest.raises(OutOfTime, match=f"after step {k}, "):
             run(tmp_path, 4, record=record, restart=k > 1, wall_time="0:30")
-    assert run(tmp_path, 4, record=record, restart=True, wall_time="0:30").facts["status"] == "finished"
+    assert (
+        run(tmp_path, 4, record=record, restart=True, wall_time="0:30").facts["status"]
+        == "finished"
+    )
 
 
 def test_one_rank_is_late(comm: Any, shared_tmp: Path, clock: Clock) -> None:
@@ -148,7 +187,9 @@ def test_one_rank_is_late(comm: Any, shared_tmp: Path, clock: Clock) -> None:
 
 
 @serial
-def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Status 75 and one sentence; what is no wall time is refused."""
     pytest.importorskip("dolfinx")
     monkeypatch.setattr("vi_contact.cli.entry.world", SerialComm)
@@ -156,7 +197,9 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     short = ["run", "wall", "--steps", "3", "--quiet", "--out", str(tmp_path / "wall")]
     assert main([*short, "--wall-time", "0:05:00"]) == 75
     said = capsys.readouterr()
-    assert said.out == "" and said.err.startswith("vi-contact: 0 s left of the wall time 0:05:00 ended the run after")
+    assert said.out == "" and said.err.startswith(
+        "vi-contact: 0 s left of the wall time 0:05:00 ended the run after"
+    )
     assert said.err.count("\n") == 1
     assert main([*short, "--wall-time", "soon"]) == 1
     said = capsys.readouterr().err
@@ -171,23 +214,41 @@ def test_the_batch_script_of_the_guide(tmp_path: Path) -> None:
     pytest.importorskip("dolfinx")
     guide = (Path(PACKAGE) / "docs" / "guide" / "clusters.md").read_text(encoding="utf-8")
     script = guide.split("```bash\n")[1].split("```")[0]
-    for old, new in (("case=dam.toml", "case=wall"), ("--wall-time 11:45:00", "--wall-time 0:01 --steps 2")):
+    for old, new in (
+        ("case=dam.toml", "case=wall"),
+        ("--wall-time 11:45:00", "--wall-time 0:01 --steps 2"),
+    ):
         assert script.count(old) == 1
         script = script.replace(old, new)
     (tmp_path / "job.sh").write_text(script)
-    tools = {"srun": 'while [ "$1" != vi-contact ]; do shift; done; shift; sleep 1; exec "$PYTHON" -m vi_contact "$@"',
-             "sbatch": 'echo again >> "$SLURM_SUBMIT_DIR/jobs"; exec bash "$1"'}
+    tools = {
+        "srun": 'while [ "$1" != vi-contact ]; do shift; done; shift; sleep 1; exec "$PYTHON" -m vi_contact "$@"',
+        "sbatch": 'echo again >> "$SLURM_SUBMIT_DIR/jobs"; exec bash "$1"',
+    }
     for name, does in tools.items():
         (tmp_path / name).write_text(f"#!/bin/bash\n{does}\n")
         (tmp_path / name).chmod(0o755)
-    environment = {"PYTHON": sys.executable, "PYTHONPATH": PACKAGE, "SLURM_SUBMIT_DIR": str(tmp_path),
-                   "PATH": f"{tmp_path}:{os.environ['PATH']}"}
-    done = subprocess.run(["bash", "job.sh"], cwd=tmp_path, env=os.environ | environment, capture_output=True,
-                          text=True, timeout=600)
+    environment = {
+        "PYTHON": sys.executable,
+        "PYTHONPATH": PACKAGE,
+        "SLURM_SUBMIT_DIR": str(tmp_path),
+        "PATH": f"{tmp_path}:{os.environ['PATH']}",
+    }
+    done = subprocess.run(
+        ["bash", "job.sh"],
+        cwd=tmp_path,
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        timeout=600,
+    )
     assert (tmp_path / "jobs").read_text().split() == ["again"], done.stderr
     found = summary_of(tmp_path / "results" / "dam")
     assert (found["status"], found["steps"], found["restarted_from_step"]) == ("finished", 2, 1)
-    assert done.stderr.count("of the wall time 0:01 ended the run after step") == 1 and done.returncode == 75
+    assert (
+        done.stderr.count("of the wall time 0:01 ended the run after step") == 1
+        and done.returncode == 75
+    )
 
 
 @serial
@@ -195,7 +256,14 @@ def test_the_age_is_that_of_the_process() -> None:
     """A process that has slept before it imports anything is at least so old, and no older than who has started it."""
     code = "import time\ntime.sleep(0.5)\nfrom vi_contact.run.wall_time import age\nprint(age())"
     begin = time.monotonic()
-    said = subprocess.run([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": PACKAGE}, check=True,
-                          capture_output=True, text=True).stdout
-    assert 0.5 <= float(said) <= time.monotonic() - begin + 0.1  # a tick of the kernel is a hundredth of a second
+    said = subprocess.run(
+        [sys.executable, "-c", code],
+        env=os.environ | {"PYTHONPATH": PACKAGE},
+        check=True,
+        capture_output=True,
+        text=True,
+    ).stdout
+    assert (
+        0.5 <= float(said) <= time.monotonic() - begin + 0.1
+    )  # a tick of the kernel is a hundredth of a second
     assert age() >= float(said)

@@ -42,8 +42,14 @@ from vi_contact.solvers.condensed import Condensed
 pytestmark = pytest.mark.serial
 CONSISTENT, MASSLESS = ConsistentMass(), Redistributed()
 SCHEMES = [
-    Newmark(), Newmark(0.3025, 0.6), HHT(), HHT(-1 / 3), GeneralisedAlpha.spectral_radius(0.8),
-    GeneralisedAlpha.spectral_radius(0.0), Houbolt(), LinearMultistep.newmark(0.3025, 0.6),
+    Newmark(),
+    Newmark(0.3025, 0.6),
+    HHT(),
+    HHT(-1 / 3),
+    GeneralisedAlpha.spectral_radius(0.8),
+    GeneralisedAlpha.spectral_radius(0.0),
+    Houbolt(),
+    LinearMultistep.newmark(0.3025, 0.6),
 ]
 schemes = pytest.mark.parametrize("scheme", SCHEMES, ids=repr)
 
@@ -61,7 +67,9 @@ def test_acceleration_of_resting_contacts() -> None:
     a, reaction = acceleration(resting, np.zeros(11), np.zeros(11))
     assert a[0] == 0.0  # not the whole bar: stress has not built up, only the foot is held
     assert 0.0 < reaction[0] < 100.0 and not reaction[1:].any()
-    rigid = bar(1, E=0.0, gravity=10.0, lumped=True)  # without stiffness the foot carries half the bar
+    rigid = bar(
+        1, E=0.0, gravity=10.0, lumped=True
+    )  # without stiffness the foot carries half the bar
     assert acceleration(rigid, np.zeros(2), np.zeros(2))[1][0] == pytest.approx(50.0, rel=1e-13)
     lifted = bar(10, gap=1.0, gravity=10.0)
     a, reaction = acceleration(lifted, np.zeros(11), np.zeros(11))
@@ -100,17 +108,23 @@ def test_acceleration_without_mass_at_the_contact() -> None:
     assert reaction[0] == pytest.approx(system.load(0.0)[0] - (system.K @ u)[0], rel=1e-13)
 
 
-@pytest.mark.parametrize(("pull", "speed", "slips"), [(0.2, 0.0, False), (2.0, 0.0, True), (0.0, 3.0, True)])
+@pytest.mark.parametrize(
+    ("pull", "speed", "slips"), [(0.2, 0.0, False), (2.0, 0.0, True), (0.0, 3.0, True)]
+)
 def test_acceleration_with_friction(pull: float, speed: float, slips: bool) -> None:
     """A resting point holds a small pull, slips under a large one, and friction brakes what slides already."""
     problem = column(1, v0=(speed, 0.0), friction=Coulomb(0.5), mass=CONSISTENT)
     system = problem.system
-    force = np.array([pull, -1.0, pull, -1.0])  # in the body's own frame: pulled along, pressed down
+    force = np.array(
+        [pull, -1.0, pull, -1.0]
+    )  # in the body's own frame: pulled along, pressed down
     problem = replace(problem, system=replace(system, load=replace(system.load, constant=force)))
     a, reaction = acceleration(problem, np.zeros(4), problem.equations.v0)
     r_t, r_n = reaction[0], reaction[1]
     assert r_n > 0.0 and not reaction[2:].any()
-    assert 0.0 < r_t <= 0.5 * r_n * (1.0 + 1e-12)  # the body's reaction on its support, along the pull
+    assert (
+        0.0 < r_t <= 0.5 * r_n * (1.0 + 1e-12)
+    )  # the body's reaction on its support, along the pull
     assert bool(r_t >= 0.5 * r_n * (1.0 - 1e-12)) == slips
     assert bool(abs(a[0]) <= 1e-13) != slips
 
@@ -140,7 +154,9 @@ def test_ledger_closes(given: Any, mass: Any, scheme: Any) -> None:
 
 @pytest.mark.slow
 @schemes
-@pytest.mark.parametrize("impact", [None, Inelastic(), Inelastic(ImpulseUpdate())], ids=["free", "reset", "project"])
+@pytest.mark.parametrize(
+    "impact", [None, Inelastic(), Inelastic(ImpulseUpdate())], ids=["free", "reset", "project"]
+)
 def test_ledger_closes_with_damping_and_base_motion(scheme: Any, impact: Any) -> None:
     """V9.7, also when impact laws change velocities and accelerations restart; on massless nodes the same loads."""
     reports = list(run(shaken(impact), scheme, dt=0.005, steps=300))
@@ -161,7 +177,10 @@ def momentum(problem: ContactProblem, state: State) -> float:
 def test_V98_impulse_of_an_impact(mass: Any, scheme: Any) -> None:
     """V9.8: from free flight to free flight the sum of dt r_n, with the weights of the balance, is the change of
     momentum to 1e-12; for Newmark in every step."""
-    problem, dt = bar(20, gap=0.1, v0=lambda x: np.full_like(x, -10.0), damping=1e-4, mass=mass), 1 / 60
+    problem, dt = (
+        bar(20, gap=0.1, v0=lambda x: np.full_like(x, -10.0), damping=1e-4, mass=mass),
+        1 / 60,
+    )
     impulse, worst, reports = 0.0, 0.0, list(run(problem, scheme, dt=dt, steps=90))
     for report in reports:
         impulse += dt * float(report.balance.r_n[0])
@@ -177,7 +196,11 @@ def test_V98_impulse_of_an_impact(mass: Any, scheme: Any) -> None:
 @schemes
 def test_contact_force_does_not_ring_without_mass(scheme: Any) -> None:
     """V1.1 on redistributed mass, Courant number one: from 0.1 s after the impact the force stays within 1 % of 300."""
-    force = [r.new.r_n[0] for r in run(thrown(100, mass=MASSLESS), scheme, dt=1 / 300, steps=320) if r.new.t > 0.6]
+    force = [
+        r.new.r_n[0]
+        for r in run(thrown(100, mass=MASSLESS), scheme, dt=1 / 300, steps=320)
+        if r.new.t > 0.6
+    ]
     assert len(force) > 100 and np.abs(np.array(force) / 300.0 - 1.0).max() <= 0.01
 
 
@@ -186,7 +209,9 @@ def test_massless_unknowns_have_the_mean_velocity_of_the_step(scheme: Any) -> No
     for report in run(thrown(20, mass=MASSLESS), scheme, dt=1 / 60, steps=80):
         mean = (report.new.u[0] - report.old.u[0]) * 60
         assert report.new.v[0] == pytest.approx(mean, abs=1e-12 * 10.0)
-        assert all(array[0] == 0.0 for name, array in report.new.memory.items() if name in ("a", "a_0"))
+        assert all(
+            array[0] == 0.0 for name, array in report.new.memory.items() if name in ("a", "a_0")
+        )
 
 
 @schemes
@@ -223,7 +248,9 @@ def test_restart_from_a_checkpoint(tmp_path: Path, mass: Any, scheme: Any) -> No
     write_checkpoint(tmp_path, problem, RestartPoint(states[80], states[80].t, states[80].k), of=of)
     state = read_checkpoint(tmp_path, problem, scheme=scheme, dt=1 / 60)[0].state
     again = [report.new for report in run(problem, scheme, dt=1 / 60, steps=39, state=state)]
-    assert all(np.array_equal(a, b) for a, b in zip(_numbers(again[-1]), _numbers(states[-1]), strict=True))
+    assert all(
+        np.array_equal(a, b) for a, b in zip(_numbers(again[-1]), _numbers(states[-1]), strict=True)
+    )
 
 
 def _numbers(state: State) -> Sequence[Array]:
@@ -238,7 +265,9 @@ def test_acceleration_restarts_after_an_impact_law(scheme: Any) -> None:
         if np.array_equal(report.new.v, report.v_minus):
             continue
         fresh = scheme.start(problem, replace(report.new, memory={}), 0.005)
-        assert all(np.array_equal(fresh.memory[name], report.new.memory[name]) for name in fresh.memory)
+        assert all(
+            np.array_equal(fresh.memory[name], report.new.memory[name]) for name in fresh.memory
+        )
         jumps += 1
     assert jumps > 1
 
@@ -252,13 +281,18 @@ def test_memory_of_another_time_or_scheme_is_not_used(scheme: Any) -> None:
         state = list(run(problem, other, dt=0.01, steps=5, state=state))[-1].new
         fresh = scheme.start(problem, replace(state, memory={}), 0.01).memory
         found = scheme.start(problem, state, 0.01).memory
-        assert found.keys() == fresh.keys() and all(np.array_equal(found[name], fresh[name]) for name in fresh)
+        assert found.keys() == fresh.keys() and all(
+            np.array_equal(found[name], fresh[name]) for name in fresh
+        )
 
 
 @schemes
 def test_V15_oblique_impact_with_friction(scheme: Any) -> None:
     """V1.5 on redistributed mass: slip speed, impulses and friction work of the exact solution, and a closed ledger."""
-    problem, dt = column(100, v0=(1.0, -1.0), friction=Coulomb(0.3), mass=MASSLESS), 0.01 / np.sqrt(2.0)
+    problem, dt = (
+        column(100, v0=(1.0, -1.0), friction=Coulomb(0.3), mass=MASSLESS),
+        0.01 / np.sqrt(2.0),
+    )
     exact = ObliqueImpact(1.0, problem_material(), 1.0, 1.0, 0.3)
     impulse, work, defect = np.zeros(2), 0.0, 0.0
     for report in run(problem, scheme, dt=dt, steps=350):
@@ -267,7 +301,9 @@ def test_V15_oblique_impact_with_friction(scheme: Any) -> None:
         impulse += dt * np.array([report.balance.r_n[0], -report.balance.r_t[0, 0]])
         work, defect = work + step.friction, max(defect, abs(step.defect))
         if 0.2 < report.new.t < 1.2:
-            assert (report.new.u[0] - report.old.u[0]) / dt == pytest.approx(exact.slip_speed, rel=2e-3)
+            assert (report.new.u[0] - report.old.u[0]) / dt == pytest.approx(
+                exact.slip_speed, rel=2e-3
+            )
     np.testing.assert_allclose(impulse, exact.impulses, rtol=0.02)
     np.testing.assert_allclose(impulse[1], -0.3 * impulse[0], rtol=1e-9)
     assert work == pytest.approx(exact.friction_work, rel=0.01)
@@ -283,7 +319,11 @@ def test_V15_friction_with_mass_at_the_contact() -> None:
     """Consistent mass and enough damping of high frequencies: the same impulses and friction work."""
     exact = ObliqueImpact(1.0, problem_material(), 1.0, 1.0, 0.3)
     for scheme in (HHT(-1 / 3), Houbolt()):
-        problem, dt, work = column(100, v0=(1.0, -1.0), friction=Coulomb(0.3), mass=CONSISTENT), 0.01 / np.sqrt(2), 0.0
+        problem, dt, work = (
+            column(100, v0=(1.0, -1.0), friction=Coulomb(0.3), mass=CONSISTENT),
+            0.01 / np.sqrt(2),
+            0.0,
+        )
         for report in run(problem, scheme, dt=dt, steps=350):
             step = energy_balance(problem, report.old, report.new, report.balance)
             work += step.friction

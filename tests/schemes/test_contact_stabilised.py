@@ -27,7 +27,11 @@ pytestmark = pytest.mark.serial
 STABILISED = ContactStabilisedNewmark()
 MASS: dict[str, Any] = {"mass": ConsistentMass()}
 # 25 elements: (bar, steps in a second at Courant number one, steps for a fall and an impact, energy)
-BARS = {"V1.1": (thrown, 75, 113, 500.0), "V1.2": (bouncing, 75, 160, 500.0), "V1.3": (period_three, 25, 75, 0.125)}
+BARS = {
+    "V1.1": (thrown, 75, 113, 500.0),
+    "V1.2": (bouncing, 75, 160, 500.0),
+    "V1.3": (period_three, 25, 75, 0.125),
+}
 
 
 def chain(n: int = 6, **more: Any) -> ContactProblem:
@@ -56,7 +60,9 @@ def test_kanes_form_is_the_midpoint_rule(other):
 
 def test_kanes_form_with_damping_base_motion_and_springs():
     """The same, every second step, with everything in the equations; springs are not projected: both forms agree."""
-    problem = chain(gap=0.01, damping=1e-3, constant=30.0, excitation=SHAKEN, v0=np.ones(6), consistent=True)
+    problem = chain(
+        gap=0.01, damping=1e-3, constant=30.0, excitation=SHAKEN, v0=np.ones(6), consistent=True
+    )
     soft = replace(problem, surface=problem.surface.on_springs(4.0e3))
     for body, projected in ((problem, False), (soft, False), (soft, True)):
         closed = 0
@@ -64,7 +70,9 @@ def test_kanes_form_with_damping_base_motion_and_springs():
             closed += int(report.new.active[0])
             if report.new.k % 2:
                 continue
-            other = next(run(body, ContactStabilisedNewmark(projected), dt=5e-3, steps=1, state=report.old))
+            other = next(
+                run(body, ContactStabilisedNewmark(projected), dt=5e-3, steps=1, state=report.old)
+            )
             assert np.abs(other.new.u - report.new.u).max() <= 1e-10 * np.abs(report.new.u).max()
             assert np.abs(other.new.v - report.new.v).max() <= 1e-10 * np.abs(report.new.v).max()
             assert abs(other.new.r_n[0] - report.new.r_n[0]) <= 1e-10 * max(report.new.r_n[0], 30.0)
@@ -75,7 +83,9 @@ def test_order_and_stability_without_contact():
     """Second order with damping, constant load and base motion; spectral radius one without damping."""
     assert observed_order(STABILISED) == pytest.approx(2.0, abs=0.06)
     for frequency in np.logspace(-2, 4, 13):
-        undamped, damped = (amplification(STABILISED, frequency=frequency, damping=xi) for xi in (0.0, 0.3))
+        undamped, damped = (
+            amplification(STABILISED, frequency=frequency, damping=xi) for xi in (0.0, 0.3)
+        )
         np.testing.assert_allclose(np.abs(np.linalg.eigvals(undamped)), 1.0, atol=1e-9)
         assert np.abs(np.linalg.eigvals(damped)).max() <= 1.0 + 1e-9
 
@@ -87,7 +97,9 @@ def test_V11_pressure_does_not_oscillate(courant, oscillation):
     reports = list(run(problem, STABILISED, dt=dt, steps=round(1.5 / dt)))
     t = np.array([report.new.t for report in reports])
     p = np.array([report.new.r_n[0] for report in reports])
-    assert np.abs(p[(t > 0.6) & (t < 1.067)] / 300.0 - 1.0).max() == pytest.approx(oscillation, abs=5e-4)
+    assert np.abs(p[(t > 0.6) & (t < 1.067)] / 300.0 - 1.0).max() == pytest.approx(
+        oscillation, abs=5e-4
+    )
     closed = t[[bool(report.new.active[0]) for report in reports]]
     assert abs(closed[0] - 0.5) <= 2 * dt and abs(closed[-1] - 7 / 6) <= 2 * dt
     assert dt * p.sum() == pytest.approx(200.0, rel=0.01 * max(courant, 1.0))  # impulse 2 rho L v0
@@ -132,7 +144,9 @@ def test_V95_identity():
         gap0, gap1 = (surface.gap0 - surface.normal_values(state.u) for state in (old, new))
         release = float(2.0 / dt**2 * q @ gap1)
         loss = float(new.r_n @ gap0) + release
-        assert energy(problem, new) - energy(problem, old) == pytest.approx(-loss, abs=1e-11 * 500.0)
+        assert energy(problem, new) - energy(problem, old) == pytest.approx(
+            -loss, abs=1e-11 * 500.0
+        )
         opened += release
     assert opened > 0.1
 
@@ -143,14 +157,22 @@ def test_V97_ledger_with_damping_and_base_motion(name):
     body, rate, steps, E0 = BARS[name]
     shake = Harmonic(amplitude=5.0, frequency=3.0, direction=(1.0,))
     for damping in (0.0, 1e-3):
-        found = course(body(25, damping=damping, excitation=shake, **MASS), STABILISED, dt=1 / rate, steps=steps)
+        found = course(
+            body(25, damping=damping, excitation=shake, **MASS),
+            STABILISED,
+            dt=1 / rate,
+            steps=steps,
+        )
         assert abs(found.defect) <= 1e-10 * found.largest
         assert min(found.contact, found.algorithmic) >= -1e-12 * E0
 
 
 def test_damping_never_gains_energy_in_impacts():
     """V9.5: heavy damping with C (u1 - u0)/dt keeps the energy non-increasing where the projection moves points."""
-    assert course(bouncing(50, damping=0.02, **MASS), STABILISED, dt=1 / 150, steps=1600).rise <= 1e-11 * 500.0
+    assert (
+        course(bouncing(50, damping=0.02, **MASS), STABILISED, dt=1 / 150, steps=1600).rise
+        <= 1e-11 * 500.0
+    )
 
 
 def test_V98_contact_impulse_is_the_change_of_momentum():
@@ -163,7 +185,9 @@ def test_V98_contact_impulse_is_the_change_of_momentum():
         impulse += dt * (report.new.r_n[0] - weight)
         touched += int(report.new.active[0])
     assert touched > 10 and not report.new.active[0]
-    assert rigid @ (report.new.v - start.v) == pytest.approx(impulse, abs=1e-12 * np.abs(rigid @ start.v))
+    assert rigid @ (report.new.v - start.v) == pytest.approx(
+        impulse, abs=1e-12 * np.abs(rigid @ start.v)
+    )
 
 
 def test_V13_foot_converges_with_the_published_rate():
@@ -203,16 +227,22 @@ def test_nan_stops_the_step(held):
         replace(problem, system=problem.system.changed(v0=np.full(6, np.nan)))
     surface = problem.surface.moving(lambda t: np.nan if t else 0.0)
     problem = replace(problem, surface=surface.bilateral_everywhere() if held else surface)
-    with pytest.raises(InputError, match=r"moving obstacle: towards\(0.01 s\) is nan; return finite metres"):
+    with pytest.raises(
+        InputError, match=r"moving obstacle: towards\(0.01 s\) is nan; return finite metres"
+    ):
         list(run(problem, STABILISED, dt=0.01, steps=1))
 
 
 def test_massless_contact_nodes_are_refused():
-    with pytest.raises(InputError, match="ContactStabilisedNewmark needs mass at the contact nodes"):
+    with pytest.raises(
+        InputError, match="ContactStabilisedNewmark needs mass at the contact nodes"
+    ):
         STABILISED.check(thrown(mass=Redistributed()))
 
 
 def test_a_projection_that_cannot_be_certified_is_a_failure_with_a_sentence(monkeypatch):
     monkeypatch.setattr(contact_stabilised, "TOLERANCE", -1.0)
-    with pytest.raises(StepFailure, match="predictor could not be brought out .* step 151 .* certificate tolerance"):
+    with pytest.raises(
+        StepFailure, match="predictor could not be brought out .* step 151 .* certificate tolerance"
+    ):
         list(run(thrown(**MASS), STABILISED, dt=1 / 300, steps=200))

@@ -49,8 +49,13 @@ def test_radii_outside_the_range_are_refused(rho: float) -> None:
 @pytest.mark.parametrize("damping", [0.0, 0.02, 0.5])
 @pytest.mark.parametrize(
     "scheme",
-    [*(of(rho) for rho in RADII), GeneralisedAlpha(0.5, 0.5, 0.25, 0.5), GeneralisedAlpha(-0.2, 0.5, 0.6, 1.2),
-     GeneralisedAlpha(0.0, 0.5, 0.5, 1.0), GeneralisedAlpha(0.0, 0.0, 0.5, 1.0)],
+    [
+        *(of(rho) for rho in RADII),
+        GeneralisedAlpha(0.5, 0.5, 0.25, 0.5),
+        GeneralisedAlpha(-0.2, 0.5, 0.6, 1.2),
+        GeneralisedAlpha(0.0, 0.5, 0.5, 1.0),
+        GeneralisedAlpha(0.0, 0.0, 0.5, 1.0),
+    ],
     ids=repr,
 )
 def test_unconditionally_stable(scheme: GeneralisedAlpha, damping: float) -> None:
@@ -99,7 +104,9 @@ def test_the_printed_equations() -> None:
         u_free = u + dt * v + dt**2 * (0.5 - w.beta) * a
         v_free = v + dt * (1.0 - w.gamma) * a
         late, early = 1.0 - w.alpha_f, w.alpha_f
-        force = late * (f(report.new.t) - C @ v_free - K @ u_free) + early * (f(report.old.t) - C @ v - K @ u)
+        force = late * (f(report.new.t) - C @ v_free - K @ u_free) + early * (
+            f(report.old.t) - C @ v - K @ u
+        )
         A = (1.0 - w.alpha_m) * M + late * (w.gamma * dt * C + w.beta * dt**2 * K)
         a = np.linalg.solve(A, force - w.alpha_m * (M @ a))
         u, v = u_free + w.beta * dt**2 * a, v_free + w.gamma * dt * a
@@ -115,7 +122,10 @@ def test_zero_alphas_are_newmark() -> None:
         run(period_three(20, mass=Redistributed()), theirs, dt=0.05, steps=80),
         strict=True,
     )
-    assert all(np.array_equal(one.new.u, two.new.u) and np.array_equal(one.new.r_n, two.new.r_n) for one, two in pairs)
+    assert all(
+        np.array_equal(one.new.u, two.new.u) and np.array_equal(one.new.r_n, two.new.r_n)
+        for one, two in pairs
+    )
 
 
 @cache
@@ -126,7 +136,9 @@ def four_bounces(scheme: Any, mass: Any, courant: float) -> float:
     return energy(problem, last.new) / 0.125
 
 
-@pytest.mark.parametrize(("rho", "courant", "ends"), [(0.8, 1.0, 0.980), (0.8, 0.5, 0.988), (0.0, 1.0, 0.887)])
+@pytest.mark.parametrize(
+    ("rho", "courant", "ends"), [(0.8, 1.0, 0.980), (0.8, 0.5, 0.988), (0.0, 1.0, 0.887)]
+)
 def test_V92_no_energy_from_contact_without_mass(rho: float, courant: float, ends: float) -> None:
     """V1.3 after four bounces on redistributed mass; 0.99 is what the relaxed start leaves."""
     assert four_bounces(of(rho), Redistributed(), courant) == pytest.approx(ends, abs=2e-3)

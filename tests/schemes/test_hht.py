@@ -28,7 +28,10 @@ def test_order_and_spectrum(alpha: float) -> None:
     assert observed_order(HHT(alpha)) == pytest.approx(2.0, abs=0.1)
     for frequency in np.logspace(-2, 4, 13):
         for damping in (0.0, 0.1):
-            assert np.abs(np.linalg.eigvals(amplification(HHT(alpha), frequency, damping))).max() <= 1.0 + 2e-6
+            assert (
+                np.abs(np.linalg.eigvals(amplification(HHT(alpha), frequency, damping))).max()
+                <= 1.0 + 2e-6
+            )
     at_infinity = np.abs(np.linalg.eigvals(amplification(HHT(alpha), 1e7))).max()
     assert at_infinity == pytest.approx((1.0 + alpha) / (1.0 - alpha), abs=1e-3)
 
@@ -46,7 +49,9 @@ def test_V92_mass_at_the_contact() -> None:
     """V1.3, four bounces at Courant number one: no gain on consistent mass; two with a dt that resolves the highest
     frequency (Courant number 0.1): the energy multiplies. On redistributed mass neither (V9.4)."""
     for mass, courant, low, high in (
-        (ConsistentMass(), 1.0, 0.94, 0.96), (Redistributed(), 1.0, 0.95, 0.965), (ConsistentMass(), 0.1, 2.0, 30.0),
+        (ConsistentMass(), 1.0, 0.94, 0.96),
+        (Redistributed(), 1.0, 0.95, 0.965),
+        (ConsistentMass(), 0.1, 2.0, 30.0),
         (Redistributed(), 0.1, 0.977, 0.983),
     ):
         problem = period_three(50, mass=mass) if courant < 1.0 else period_three(100, mass=mass)

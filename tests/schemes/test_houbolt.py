@@ -62,17 +62,22 @@ def test_amplitude_loss(steps: int, loss: float) -> None:
     def size(state: Any) -> float:
         return float(np.hypot(w * state.u[0], state.v[0]))
 
-    early, late = (size(last_state(problem, SCHEME, dt=1 / steps, steps=n * steps)) for n in (5, 10))
+    early, late = (
+        size(last_state(problem, SCHEME, dt=1 / steps, steps=n * steps)) for n in (5, 10)
+    )
     assert 1.0 - (late / early) ** 0.2 == pytest.approx(loss, rel=0.02)
 
 
-@pytest.mark.parametrize("mass", [ConsistentMass(), Redistributed()], ids=["consistent", "massless"])
+@pytest.mark.parametrize(
+    "mass", [ConsistentMass(), Redistributed()], ids=["consistent", "massless"]
+)
 @pytest.mark.parametrize(("courant", "ends"), [(1.0, 0.886), (0.5, 0.933)])
 def test_V92_no_energy_from_contact_on_either_mass(courant: float, ends: float, mass: Any) -> None:
     """V1.3: four bounces end with 0.89 and 0.93 of the energy, which is never exceeded."""
     problem = period_three(100, mass=mass)
     energies = [
-        energy(problem, r.new) / 0.125 for r in run(problem, SCHEME, dt=courant / 100, steps=round(1200 / courant))
+        energy(problem, r.new) / 0.125
+        for r in run(problem, SCHEME, dt=courant / 100, steps=round(1200 / courant))
     ]
     assert energies[-1] == pytest.approx(ends, abs=3e-3) and max(energies) <= 1.0 + 1e-9
 
@@ -80,5 +85,7 @@ def test_V92_no_energy_from_contact_on_either_mass(courant: float, ends: float, 
 def test_V92_falling_bar_with_a_small_step() -> None:
     """V1.2 on consistent mass at Courant number 0.1, where Newmark reaches 37 E0: energy is never exceeded."""
     problem = bouncing(50, mass=ConsistentMass())
-    energies = [energy(problem, r.new) / 500.0 + 1.0 for r in run(problem, SCHEME, dt=0.1 / 150, steps=4000)]
+    energies = [
+        energy(problem, r.new) / 500.0 + 1.0 for r in run(problem, SCHEME, dt=0.1 / 150, steps=4000)
+    ]
     assert energies[-1] > 0.97 and max(energies) <= 1.0 + 1e-9

@@ -26,7 +26,9 @@ DISSIPATIVE = LinearMultistep.newmark(0.3025, 0.6)
 
 def test_V41_trapezoidal_rule():
     """V4.1: a = (½, 0, -½), b = (¼, ½, ¼), gamma = (1, -2, 1), mu = 1."""
-    written = LinearMultistep(a=(0.5, 0.0, -0.5), b=(0.25, 0.5, 0.25), gamma=(1.0, -2.0, 1.0), mu=1.0)
+    written = LinearMultistep(
+        a=(0.5, 0.0, -0.5), b=(0.25, 0.5, 0.25), gamma=(1.0, -2.0, 1.0), mu=1.0
+    )
     assert LinearMultistep.newmark() == LinearMultistep.newmark(0.25, 0.5) == written
 
 
@@ -38,7 +40,9 @@ def test_V41_effective_matrix():
         (NEWMARK, 4.0 * rho / dt**2 + 2.0 * 3.0 / dt + 7.0),
         (HOUBOLT, 2.0 * rho / dt**2 + 11.0 / 6.0 * 3.0 / dt + 7.0),
     ):
-        assert scheme.effective_matrix(problem, dt).matrix.diagonal()[0] == pytest.approx(expected, rel=1e-14)
+        assert scheme.effective_matrix(problem, dt).matrix.diagonal()[0] == pytest.approx(
+            expected, rel=1e-14
+        )
 
 
 @pytest.mark.parametrize(
@@ -68,7 +72,9 @@ def test_scaled_coefficients_are_the_same_member():
     np.testing.assert_allclose(u, v, rtol=1e-12)
 
 
-@pytest.mark.parametrize(("beta", "gamma"), [(0.0, 0.5), (0.2, 0.5), (1 / 6, 0.5), (0.25, 0.6), (0.25, 0.4)])
+@pytest.mark.parametrize(
+    ("beta", "gamma"), [(0.0, 0.5), (0.2, 0.5), (1 / 6, 0.5), (0.25, 0.6), (0.25, 0.4)]
+)
 def test_unstable_members_are_refused(beta, gamma):
     """2 beta >= gamma >= ½ or an error: explicit, conditionally stable and growing members."""
     with pytest.raises(InputError, match="implicit|not unconditionally stable|explicit"):
@@ -158,7 +164,9 @@ def test_V92_krenks_energy_identity_with_contact(beta, gamma):
         most = max(most, energy(problem, new))
         change += extra * (system.kinetic_energy(a1) - system.kinetic_energy(a0))
         contact = -surface.normal_values(du)[0] * (0.5 * (r0 + r1) + (gamma - 0.5) * (r1 - r0))
-        weights = -(gamma - 0.5) * 2.0 * (system.strain_energy(du) + extra * system.kinetic_energy(da))
+        weights = (
+            -(gamma - 0.5) * 2.0 * (system.strain_energy(du) + extra * system.kinetic_energy(da))
+        )
         assert change == pytest.approx(contact + weights, abs=1e-12 * most)
         contacts += r1 > 0.0
     assert contacts > 20

@@ -54,14 +54,17 @@ def factorised(monkeypatch: pytest.MonkeyPatch) -> Iterator[Rows]:
 def pair(*, rubbing: bool) -> ContactProblem:
     """Two blocks, pressed and sheared; nodes of both lose their mass."""
     mesh = TwoBlocks(
-        lower=BlockMesh(lengths=(1.5, 1.0), divisions=(6, 4)), upper=BlockMesh(lengths=(1.5, 1.0), divisions=(6, 4))
+        lower=BlockMesh(lengths=(1.5, 1.0), divisions=(6, 4)),
+        upper=BlockMesh(lengths=(1.5, 1.0), divisions=(6, 4)),
     )
     system, tags = two_blocks(
         COMM, mesh, clamped=lambda tags: tags["lower_bottom"],
         loads=lambda tags: [BodyForce((0.0, -1.0e4)), Traction(tags["upper_top"], (3.0e3, 0.0))],
     )  # fmt: skip
     surface = contact_pair(system, tags["upper_bottom"], tags["lower_top"])
-    return ContactProblem(system, surface, mass=Redistributed(), **({"friction": Coulomb(0.2)} if rubbing else {}))
+    return ContactProblem(
+        system, surface, mass=Redistributed(), **({"friction": Coulomb(0.2)} if rubbing else {})
+    )
 
 
 def wall(**data: Any) -> ContactProblem:
@@ -83,7 +86,9 @@ def disturbed(problem: ContactProblem) -> State:
     size = 1e-4 * surface.whole().weights.mean()
     u = size * np.sin(1.0 + 7.0 * system.space.coordinates.sum(axis=1))
     u[surface.owned] = np.minimum(u[surface.owned], surface.gap0)
-    return State(0.0, 0, u, np.zeros_like(u), np.zeros(surface.count), np.zeros(surface.count, dtype=bool))
+    return State(
+        0.0, 0, u, np.zeros_like(u), np.zeros(surface.count), np.zeros(surface.count, dtype=bool)
+    )
 
 
 def with_the_whole_matrix(problem: ContactProblem, state: State) -> tuple[Array, Array]:
@@ -111,7 +116,10 @@ def test_only_contact_rows_are_factorised(name: str, factorised: Rows) -> None:
     found = equilibrated(problem, state)
     massless = problem.equations.massless
     assert massless is not None
-    assert factorised == [COMM.allreduce(float(massless.sum()))] and factorised[0] < problem.system.space.unknowns / 2
+    assert (
+        factorised == [COMM.allreduce(float(massless.sum()))]
+        and factorised[0] < problem.system.space.unknowns / 2
+    )
     assert max_over_ranks(COMM, found.u - u) < 1e-11 * max_over_ranks(COMM, u)
     assert max_over_ranks(COMM, found.r_n - r_n) < 1e-11 * max_over_ranks(COMM, r_n)
     assert problem.surface.some(found.active)
@@ -119,7 +127,9 @@ def test_only_contact_rows_are_factorised(name: str, factorised: Rows) -> None:
 
 
 @pytest.mark.parametrize("name", PROBLEMS)
-def test_a_large_layer_is_not_factorised(name: str, factorised: Rows, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_large_layer_is_not_factorised(
+    name: str, factorised: Rows, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The same equilibrium by conjugate gradients, to 1e-11."""
     problem = PROBLEMS[name]()
     state = disturbed(problem)
@@ -134,9 +144,15 @@ def test_a_large_layer_is_not_factorised(name: str, factorised: Rows, monkeypatc
 
 def test_an_iterative_run_factorises_no_whole_matrix(factorised: Rows) -> None:
     """The default scheme with conjugate gradients, from the start of a run to its summary."""
-    solver = Volume(ReducedNewton(), petsc_options={"ksp_type": "cg", "pc_type": "jacobi", "ksp_rtol": 1e-12})
+    solver = Volume(
+        ReducedNewton(), petsc_options={"ksp_type": "cg", "pc_type": "jacobi", "ksp_rtol": 1e-12}
+    )
     problem = wall()
     solution = simulate(problem, solver=solver, dt=1e-3, steps=3, progress=False)
     assert isinstance(solution.facts["scheme"], str) and "Trapezoidal" in solution.facts["scheme"]
-    assert solution.facts["steps"] == 3 and np.isnan(solution.facts["seconds_per_linear_step"]) and factorised
+    assert (
+        solution.facts["steps"] == 3
+        and np.isnan(solution.facts["seconds_per_linear_step"])
+        and factorised
+    )
     assert max(factorised) < problem.system.space.unknowns / 2

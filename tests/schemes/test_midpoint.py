@@ -30,7 +30,9 @@ def test_17_same_as_its_other_names_over_the_thrown_bar(other: object) -> None:
     closed = 0
     problem = bar(100, gap=0.05, v0=lambda x: np.full_like(x, -10.0), mass=CONSISTENT)
     for one, two in zip(
-        run(problem, SCHEME, dt=1 / 301, steps=300), run(problem, other, dt=1 / 301, steps=300), strict=True
+        run(problem, SCHEME, dt=1 / 301, steps=300),
+        run(problem, other, dt=1 / 301, steps=300),
+        strict=True,
     ):
         assert np.abs(one.new.u - two.new.u).max() <= 1e-10 * np.abs(two.new.u).max()
         assert np.abs(one.new.v - two.new.v).max() <= 1e-10 * np.abs(two.new.v).max()
@@ -74,7 +76,10 @@ def test_V91_contact_never_creates_energy_and_the_ledger_closes(given: object) -
 
 def test_V91_friction_takes_energy_and_the_ledger_closes() -> None:
     """V9.1: D_fric = r_t·du_t >= 0 in every step of the oblique impact (V1.5); impulses change momentum (V9.8)."""
-    problem, dt = column(50, v0=(1.0, -1.0), friction=Coulomb(0.3), mass=CONSISTENT), 0.02 / np.sqrt(2.0)
+    problem, dt = (
+        column(50, v0=(1.0, -1.0), friction=Coulomb(0.3), mass=CONSISTENT),
+        0.02 / np.sqrt(2.0),
+    )
     system, work = problem.equations, 0.0
     for report in run(problem, SCHEME, dt=dt, steps=120):
         step = energy_balance(problem, report.old, report.new, report.balance)
@@ -82,13 +87,18 @@ def test_V91_friction_takes_energy_and_the_ledger_closes() -> None:
         change = system.influence.T @ (system.M @ (report.new.v - report.old.v))
         r_t = report.balance.r_t
         assert r_t is not None
-        np.testing.assert_allclose(change, -dt * np.array([r_t[0, 0], -report.balance.r_n[0]]), atol=1e-12)
+        np.testing.assert_allclose(
+            change, -dt * np.array([r_t[0, 0], -report.balance.r_n[0]]), atol=1e-12
+        )
         work += step.friction
     assert work == pytest.approx(0.345442, rel=0.01)
 
 
 def test_V97_ledger_with_damping_base_motion_and_impacts() -> None:
-    for problem in (shaken(Inelastic()), thrown(30, damping=1e-3, excitation=SHAKEN, mass=CONSISTENT)):
+    for problem in (
+        shaken(Inelastic()),
+        thrown(30, damping=1e-3, excitation=SHAKEN, mass=CONSISTENT),
+    ):
         largest = 0.0
         for report in run(problem, SCHEME, dt=0.005, steps=300):
             step = energy_balance(problem, report.old, before_impact(report), report.balance)

@@ -28,9 +28,20 @@ pytestmark = pytest.mark.serial
 MASS: dict[str, Any] = {"mass": ConsistentMass()}
 INELASTIC, ELASTIC = MoreauJean(), MoreauJean(e=1.0)
 LITERAL = MoreauJean(allow_energy_gain=True)
-DISSIPATIVE = [INELASTIC, ELASTIC, MoreauJean(e=0.5), MoreauJean(0.6), MoreauJean(2.0 / 3.0, 0.5), MoreauJean(1.0)]
+DISSIPATIVE = [
+    INELASTIC,
+    ELASTIC,
+    MoreauJean(e=0.5),
+    MoreauJean(0.6),
+    MoreauJean(2.0 / 3.0, 0.5),
+    MoreauJean(1.0),
+]
 # 25 elements: (bar, steps in a second at Courant number one, steps for a fall and an impact, energy)
-BARS = {"V1.1": (thrown, 75, 113, 500.0), "V1.2": (bouncing, 75, 160, 500.0), "V1.3": (period_three, 25, 75, 0.125)}
+BARS = {
+    "V1.1": (thrown, 75, 113, 500.0),
+    "V1.2": (bouncing, 75, 160, 500.0),
+    "V1.3": (period_three, 25, 75, 0.125),
+}
 
 
 def chain(n: int = 6, **more: Any) -> ContactProblem:
@@ -61,7 +72,9 @@ def test_unstable_weights_are_refused(theta):
 @pytest.mark.parametrize(("theta", "e"), [(0.6, 1.0), (0.51, 1.0), (0.67, 0.5), (1.0, 0.1)])
 def test_V93_weights_that_create_energy_are_refused(theta, e):
     """V9.3: dissipative only for ½ <= theta <= 1/(1 + e)."""
-    with pytest.raises(InputError, match=r"creates energy in impacts: give theta from 0.5 to 1/\(1 \+ e\)"):
+    with pytest.raises(
+        InputError, match=r"creates energy in impacts: give theta from 0.5 to 1/\(1 \+ e\)"
+    ):
         MoreauJean(theta, e)
     assert MoreauJean(theta, e, allow_energy_gain=True).theta == theta
     assert MoreauJean(1.0 / (1.0 + e), e).e == e
@@ -93,7 +106,9 @@ def test_order_and_stability_without_contact(theta, order):
     assert observed_order(scheme, steps=200 if order > 1 else 400) == pytest.approx(order, abs=0.06)
     for frequency in np.logspace(-2, 4, 13):
         for damping in (0.0, 0.3):
-            radius = np.abs(np.linalg.eigvals(amplification(scheme, frequency=frequency, damping=damping)))
+            radius = np.abs(
+                np.linalg.eigvals(amplification(scheme, frequency=frequency, damping=damping))
+            )
             assert radius.max() <= 1.0 + 1e-9
             if theta == 0.5 and damping == 0.0:
                 np.testing.assert_allclose(radius, 1.0, atol=1e-9)
@@ -112,7 +127,9 @@ def test_V11_pressure_does_not_oscillate_without_restitution(courant, oscillatio
     """Table 1.7, e = 0: error of the contact pressure, E_end/E0 = 0.9942, the mean force of the step is 300; the gap
     closes late, by ½ dt v0 = 1.67e-2 at Courant number one."""
     t, p, share, gap = pressures(INELASTIC, courant)
-    assert np.abs(p[(t > 0.6) & (t < 1.067)] / 300.0 - 1.0).max() == pytest.approx(oscillation, abs=6e-4)
+    assert np.abs(p[(t > 0.6) & (t < 1.067)] / 300.0 - 1.0).max() == pytest.approx(
+        oscillation, abs=6e-4
+    )
     assert gap == pytest.approx(-0.5 * courant / 300.0 * 10.0, rel=1e-6)
     assert p.sum() * courant / 300.0 == pytest.approx(200.0, rel=0.015)  # impulse 2 rho L v0
     if courant == 1.0:
@@ -123,7 +140,9 @@ def test_V11_pressure_does_not_oscillate_without_restitution(courant, oscillatio
 def test_V11_restitution_of_nodes_chatters(courant, oscillation):
     """Table 1.7, e = 1: the contact node hammers, the energy stays as it is."""
     t, p, share, _ = pressures(ELASTIC, courant)
-    assert np.abs(p[(t > 0.6) & (t < 1.067)] / 300.0 - 1.0).max() == pytest.approx(oscillation, abs=0.005)
+    assert np.abs(p[(t > 0.6) & (t < 1.067)] / 300.0 - 1.0).max() == pytest.approx(
+        oscillation, abs=0.005
+    )
     assert share == pytest.approx(1.0, abs=1e-10)
 
 
@@ -168,7 +187,9 @@ def test_V93_energy_never_rises_where_points_separate(scheme):
         last = E0 = energy(problem, initial_state(problem))
         for report in run(problem, scheme, dt=5e-3, steps=200):
             rise, last = energy(problem, report.new) - last, energy(problem, report.new)
-            taken = energy_balance(problem, report.old, before_impact(report), report.balance).contact
+            taken = energy_balance(
+                problem, report.old, before_impact(report), report.balance
+            ).contact
             assert rise <= 1e-11 * E0 and taken >= -1e-12 * E0
             separating = problem.surface.normal_values(report.old.v) < 0.0
             caught += int(np.sum(separating & (report.new.r_n > 0.0)))
@@ -184,7 +205,9 @@ def test_V93_newtons_law_on_separating_points_gains_energy():
 
 def test_V93_negative_test():
     """V9.3: theta = 0.6, e = 1 gains energy in impacts: more than 0.5 % of all there is in a single step of V1.1."""
-    found = course(thrown(**MASS), MoreauJean(0.6, 1.0, allow_energy_gain=True), dt=1 / 300, steps=450)
+    found = course(
+        thrown(**MASS), MoreauJean(0.6, 1.0, allow_energy_gain=True), dt=1 / 300, steps=450
+    )
     assert found.rise > 5e-3 * 500.0 and found.contact < -5e-3 * 500.0
     assert abs(found.defect) <= 1e-10 * found.largest
 
@@ -202,10 +225,14 @@ def test_V93_identity(scheme):
         np.testing.assert_allclose(new.u, old.u + dt * mean, atol=1e-15)
         du, dv = new.u - old.u, new.v - old.v
         work = impulse * surface.normal_values(mean)
-        loss = work.sum() + (theta - 0.5) * 2.0 * (system.kinetic_energy(dv) + system.strain_energy(du))
+        loss = work.sum() + (theta - 0.5) * 2.0 * (
+            system.kinetic_energy(dv) + system.strain_energy(du)
+        )
         assert energy(problem, new) - energy(problem, old) == pytest.approx(-loss, abs=1e-12 * E0)
         approach = (v_n > 0.0) & (impulse > 0.0)
-        np.testing.assert_allclose(surface.normal_values(new.v)[approach], -scheme.e * v_n[approach], atol=1e-15)
+        np.testing.assert_allclose(
+            surface.normal_values(new.v)[approach], -scheme.e * v_n[approach], atol=1e-15
+        )
         newton = (1.0 - theta - theta * scheme.e) * impulse * v_n
         np.testing.assert_allclose(work[approach], newton[approach], atol=1e-12 * E0)
         impacts += int(approach.sum())
@@ -219,7 +246,9 @@ def test_V97_ledger_with_damping_and_base_motion(name, scheme):
     body, rate, steps, E0 = BARS[name]
     shake = Harmonic(amplitude=5.0, frequency=3.0, direction=(1.0,))
     for damping in (0.0, 1e-3):
-        found = course(body(25, damping=damping, excitation=shake, **MASS), scheme, dt=1 / rate, steps=steps)
+        found = course(
+            body(25, damping=damping, excitation=shake, **MASS), scheme, dt=1 / rate, steps=steps
+        )
         assert abs(found.defect) <= 1e-10 * found.largest
         assert min(found.contact, found.algorithmic) >= -1e-12 * E0
 
@@ -235,7 +264,9 @@ def test_V98_contact_impulse_is_the_change_of_momentum(scheme):
         impulse += dt * (report.new.r_n[0] - weight)
         touched += int(report.new.active[0])
     assert touched > 10 and not report.new.active[0]
-    assert rigid @ (report.new.v - start.v) == pytest.approx(impulse, abs=1e-12 * np.abs(rigid @ start.v))
+    assert rigid @ (report.new.v - start.v) == pytest.approx(
+        impulse, abs=1e-12 * np.abs(rigid @ start.v)
+    )
 
 
 @pytest.mark.parametrize("e", [0.0, 0.3, 1.0])
@@ -288,7 +319,9 @@ def test_a_weight_at_rest_stays_at_rest():
 
 def test_held_points_stay_and_open_points_are_free():
     """Bilateral points keep their place, pulled or pushed; with a wall out of reach nothing happens at all."""
-    problem = chain(gap=0.0, v0=np.linspace(0.0, 1.0, 6) * np.array([1, 1, 1, 1, 1, 0]), consistent=True)
+    problem = chain(
+        gap=0.0, v0=np.linspace(0.0, 1.0, 6) * np.array([1, 1, 1, 1, 1, 0]), consistent=True
+    )
     held = replace(problem, surface=problem.surface.bilateral_everywhere())
     signs = set()
     for report in run(held, INELASTIC, dt=5e-3, steps=100):
@@ -296,4 +329,8 @@ def test_held_points_stay_and_open_points_are_free():
         signs.add(np.sign(report.new.r_n[0]))
     assert signs == {-1.0, 1.0}
     for report in run(chain(gap=FAR, v0=np.ones(6)), INELASTIC, dt=5e-3, steps=20):
-        assert np.isinf(report.step.bound).all() and not report.new.active.any() and not report.new.r_n.any()
+        assert (
+            np.isinf(report.step.bound).all()
+            and not report.new.active.any()
+            and not report.new.r_n.any()
+        )

@@ -31,17 +31,23 @@ def largest_difference(one: Any, two: Any) -> float:
     worst = 0.0
     for a, b in zip(one, two, strict=True):
         for x, y in ((a.new.u, b.new.u), (a.new.v, b.new.v), (a.new.r_n, b.new.r_n)):
-            worst = max(worst, np.abs(x - y).max() / max(np.abs(y).max(), 300.0 if x is a.new.r_n else 0.0))
+            worst = max(
+                worst, np.abs(x - y).max() / max(np.abs(y).max(), 300.0 if x is a.new.r_n else 0.0)
+            )
     return worst
 
 
-@pytest.mark.parametrize(("beta", "gamma"), [(0.0, 0.5), (0.2, 0.5), (0.25, 0.6), (0.25, 0.4), (np.nan, 0.5)])
+@pytest.mark.parametrize(
+    ("beta", "gamma"), [(0.0, 0.5), (0.2, 0.5), (0.25, 0.6), (0.25, 0.4), (np.nan, 0.5)]
+)
 def test_unstable_members_are_refused(beta: float, gamma: float) -> None:
     with pytest.raises(InputError, match="beta >= gamma/2"):
         Newmark(beta, gamma)
 
 
-@pytest.mark.parametrize(("beta", "gamma", "order"), [(0.25, 0.5, 2.0), (0.4, 0.5, 2.0), (0.3025, 0.6, 1.0)])
+@pytest.mark.parametrize(
+    ("beta", "gamma", "order"), [(0.25, 0.5, 2.0), (0.4, 0.5, 2.0), (0.3025, 0.6, 1.0)]
+)
 def test_order(beta: float, gamma: float, order: float) -> None:
     assert observed_order(Newmark(beta, gamma)) == pytest.approx(order, abs=0.1)
 
@@ -63,9 +69,12 @@ def test_same_as_the_multistep_form(beta: float, gamma: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("height", "damping", "per_second"), [(5.0, 0.0, 301), (0.05, 0.0, 601), (0.05, 1e-3, 301), (0.05, 1e-3, 601)]
+    ("height", "damping", "per_second"),
+    [(5.0, 0.0, 301), (0.05, 0.0, 601), (0.05, 1e-3, 301), (0.05, 1e-3, 601)],
 )
-def test_quarter_half_is_the_trapezoidal_rule(height: float, damping: float, per_second: int) -> None:
+def test_quarter_half_is_the_trapezoidal_rule(
+    height: float, damping: float, per_second: int
+) -> None:
     """V1.1 on redistributed mass, every step to 1e-9: displacements, velocities, contact force; the same ledger. No
     step ends at touch-down, a tie that round-off decides; it also starts from 5 cm, for less round-off."""
     v0 = lambda x: np.full_like(x, -10.0)  # noqa: E731
@@ -79,7 +88,9 @@ def test_quarter_half_is_the_trapezoidal_rule(height: float, damping: float, per
         assert ours.algorithmic == pytest.approx(0.0, abs=1e-9 * 500.0)
 
 
-@pytest.mark.parametrize("mass", [ConsistentMass(), Redistributed()], ids=["consistent", "massless"])
+@pytest.mark.parametrize(
+    "mass", [ConsistentMass(), Redistributed()], ids=["consistent", "massless"]
+)
 @MEMBERS
 def test_V92_krenks_identity_is_the_ledger(beta: float, gamma: float, mass: Any) -> None:
     """V9.2, undamped: E + ½(beta-gamma/2)dt² aᵀMa changes by the work of the contact, which the ledger books, and by
@@ -98,7 +109,9 @@ def test_V92_krenks_identity_is_the_ledger(beta: float, gamma: float, mass: Any)
         shift = extra * (system.kinetic_energy(a1) - system.kinetic_energy(a0))
         change = energy(problem, new) - energy(problem, old) + shift
         contact = -surface.normal_values(du)[0] * ((1.0 - gamma) * r0 + gamma * r1)
-        weights = -(gamma - 0.5) * 2.0 * (system.strain_energy(du) + extra * system.kinetic_energy(da))
+        weights = (
+            -(gamma - 0.5) * 2.0 * (system.strain_energy(du) + extra * system.kinetic_energy(da))
+        )
         assert change == pytest.approx(contact + weights, abs=1e-11 * most)
         step = energy_balance(problem, old, new, report.balance)
         assert step.contact == pytest.approx(-contact, abs=1e-12 * most)
@@ -120,7 +133,9 @@ def test_V94_contact_work_without_mass() -> None:
 
 
 @pytest.mark.parametrize("courant", [1.0, 0.5])
-def test_V92_negative_mass_at_the_contact_multiplies_energy(courant: float, caplog: pytest.LogCaptureFixture) -> None:
+def test_V92_negative_mass_at_the_contact_multiplies_energy(
+    courant: float, caplog: pytest.LogCaptureFixture
+) -> None:
     """V1.3 on consistent mass: more than tenfold energy within four bounces, and one warning that says so. A limitation
     of the method, not to be repaired silently."""
     problem = period_three(100, mass=ConsistentMass())
@@ -135,5 +150,7 @@ def test_V92_positive_without_mass_energy_stays(caplog: pytest.LogCaptureFixture
     """The same run on redistributed mass: within 0.2 % of the relaxed start, and no warning."""
     problem = period_three(100, mass=Redistributed())
     with caplog.at_level(logging.WARNING):
-        energies = [energy(problem, r.new) / 0.125 for r in run(problem, Newmark(), dt=0.01, steps=1200)]
+        energies = [
+            energy(problem, r.new) / 0.125 for r in run(problem, Newmark(), dt=0.01, steps=1200)
+        ]
     assert max(abs(e / 0.99 - 1.0) for e in energies) <= 2e-3 and not caplog.records

@@ -41,7 +41,12 @@ SCHEMES = {
 
 def wall(comm: Any, **law: Any) -> ContactProblem:
     """The oblique wall, a fiftieth of a millimetre from the ground that will hit it."""
-    return replace(shaken_wall(comm, angle=0.3, gap=2e-5, divisions=(5, 8)), impact=None, mass=ConsistentMass(), **law)
+    return replace(
+        shaken_wall(comm, angle=0.3, gap=2e-5, divisions=(5, 8)),
+        impact=None,
+        mass=ConsistentMass(),
+        **law,
+    )
 
 
 @pytest.fixture(params=SCHEMES.values(), ids=SCHEMES.keys())
@@ -53,19 +58,26 @@ def scheme(request: pytest.FixtureRequest) -> Any:
 def test_volume_and_condensed_routes_take_the_same_steps(scheme: Any) -> None:
     """V4.0, step by step: bounds on displacements and, where contact is predicted, on velocities (+inf elsewhere)."""
     solvers = (Condensed(), Volume(method=ReducedNewton()))
-    checked = cross_check(wall(MPI.COMM_WORLD), scheme=scheme, solvers=solvers, dt=WALL_DT, steps=STEPS)
+    checked = cross_check(
+        wall(MPI.COMM_WORLD), scheme=scheme, solvers=solvers, dt=WALL_DT, steps=STEPS
+    )
     assert len(checked.report()) == 1
     assert checked.worst <= 1e-9
 
 
-@pytest.mark.parametrize("dt", [WALL_DT, HalvedAtImpact(WALL_DT, halvings=2)], ids=["whole", "halved"])
+@pytest.mark.parametrize(
+    "dt", [WALL_DT, HalvedAtImpact(WALL_DT, halvings=2)], ids=["whole", "halved"]
+)
 def test_default_scheme_takes_the_same_steps(dt: Any) -> None:
     """V4.0: no scheme and no mass named, so redistributed mass and the trapezoidal rule; steps may be halved."""
     problem = replace(wall(MPI.COMM_WORLD), mass=None)
     solvers = (Condensed(), Volume(method=ReducedNewton()))
     checked = cross_check(problem, solvers=solvers, dt=dt, steps=STEPS)
     accepted = [report for _, report in march(problem, dt=dt, steps=STEPS)]
-    assert accepted[0].problem.mass == Redistributed() and accepted[0].problem.equations.massless is not None
+    assert (
+        accepted[0].problem.mass == Redistributed()
+        and accepted[0].problem.equations.massless is not None
+    )
     closed = {MPI.COMM_WORLD.allreduce(int(report.new.active.sum())) for report in accepted}
     assert len(closed) > 3  # contact opens and closes
     assert [one.steps for one in checked.found] == [len(accepted)] and len(accepted) >= STEPS
@@ -73,12 +85,15 @@ def test_default_scheme_takes_the_same_steps(dt: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    "law", [{}, pytest.param({"friction": Coulomb(0.4)}, marks=pytest.mark.slow)], ids=["frictionless", "Coulomb"]
+    "law",
+    [{}, pytest.param({"friction": Coulomb(0.4)}, marks=pytest.mark.slow)],
+    ids=["frictionless", "Coulomb"],
 )
 def test_ranks_agree_and_contact_opens_and_closes(scheme: Any, law: dict[str, Any]) -> None:
     """Rank independence, certified steps, several points in contact at a time."""
     together, alone = (
-        run(wall(comm, **law), dt=WALL_DT, steps=STEPS, scheme=scheme) for comm in (MPI.COMM_WORLD, MPI.COMM_SELF)
+        run(wall(comm, **law), dt=WALL_DT, steps=STEPS, scheme=scheme)
+        for comm in (MPI.COMM_WORLD, MPI.COMM_SELF)
     )
     assert np.abs(together.u - alone.u).max() <= 1e-9 * np.abs(alone.u).max()
     assert np.abs(together.r_n - alone.r_n).max() <= 1e-8 * alone.r_n.max()

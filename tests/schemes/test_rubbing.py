@@ -24,12 +24,17 @@ STABILISED, INELASTIC, ELASTIC = ContactStabilisedNewmark(), MoreauJean(), Morea
 def test_V15_oblique_impact(scheme: Any) -> None:
     """V1.5: slip speed 0.575736 during the contact, impulses (2.0, 0.6) on the base, energy 1 - 0.345442; reactions
     are means of the steps, whether forces or impulses are what is solved for. Courant number one, 100 elements."""
-    problem, dt = column(100, v0=(1.0, -1.0), friction=Coulomb(0.3), mass=ConsistentMass()), 0.01 / np.sqrt(2.0)
+    problem, dt = (
+        column(100, v0=(1.0, -1.0), friction=Coulomb(0.3), mass=ConsistentMass()),
+        0.01 / np.sqrt(2.0),
+    )
     steps = round(1.6 / dt)
     reports = list(run(problem, scheme, dt=dt, steps=steps))
     r_n, r_t = dt * sum(r.new.r_n for r in reports), dt * sum(r.new.r_t for r in reports)
     assert r_n[0] == pytest.approx(2.0, rel=0.01) and r_t[0, 0] == pytest.approx(0.6, rel=0.01)
-    base = [(report.new.u[0] - report.old.u[0]) / dt for report in reports if 0.2 < report.new.t < 1.2]
+    base = [
+        (report.new.u[0] - report.old.u[0]) / dt for report in reports if 0.2 < report.new.t < 1.2
+    ]
     assert np.mean(base) == pytest.approx(0.575736, rel=0.002)
     found = course(problem, scheme, dt=dt, steps=steps)
     assert found.last == pytest.approx(1.0 - 0.345442, rel=0.005)

@@ -18,7 +18,9 @@ pytestmark = pytest.mark.serial
 WEIGHTS = [(0.5, 0.5), (0.5, 0.8), (0.6, 0.6), (0.7, 1.1), (1.0, 1.0)]
 
 
-@pytest.mark.parametrize("weights", [(0.4, 0.5), (0.5, 0.49), (0.6, 0.5), (0.5, np.inf), (np.nan, 1.0)])
+@pytest.mark.parametrize(
+    "weights", [(0.4, 0.5), (0.5, 0.49), (0.6, 0.5), (0.5, np.inf), (np.nan, 1.0)]
+)
 def test_weights_outside_the_stable_range_are_refused(weights):
     with pytest.raises(InputError, match="unconditionally stable range"):
         SS22(*weights)
@@ -72,10 +74,14 @@ def test_V41_the_printed_formulas():
         np.testing.assert_allclose(report.new.v, v, atol=1e-10 * np.abs(v).max())
 
 
-@pytest.mark.parametrize(("theta1", "theta2", "order"), [(0.5, 0.5, 2), (0.5, 0.8, 2), (0.6, 0.7, 1), (1.0, 1.0, 1)])
+@pytest.mark.parametrize(
+    ("theta1", "theta2", "order"), [(0.5, 0.5, 2), (0.5, 0.8, 2), (0.6, 0.7, 1), (1.0, 1.0, 1)]
+)
 def test_order(theta1, theta2, order):
     """Second order at theta1 = ½, whatever theta2; first otherwise."""
-    assert observed_order(SS22(theta1, theta2), steps=200 if order > 1 else 400) == pytest.approx(order, abs=0.06)
+    assert observed_order(SS22(theta1, theta2), steps=200 if order > 1 else 400) == pytest.approx(
+        order, abs=0.06
+    )
 
 
 @pytest.mark.parametrize("body", [thrown, bouncing], ids=["V1.1", "V1.2"])

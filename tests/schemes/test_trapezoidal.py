@@ -32,10 +32,16 @@ def ledger(problem: ContactProblem, **marching: Any) -> dict[str, float]:
     for report in run(problem, DEFAULT, **marching):
         step = energy_balance(problem, report.old, before_impact(report), report.balance)
         system = problem.equations
-        largest = max(largest, system.kinetic_energy(report.new.v) + system.strain_energy(report.new.u))
+        largest = max(
+            largest, system.kinetic_energy(report.new.v) + system.strain_energy(report.new.u)
+        )
         defect, algorithmic = max(defect, abs(step.defect)), algorithmic + abs(step.algorithmic)
         contact, change = contact + step.contact, change + step.change
-    return {"defect": defect / largest, "contact": contact / largest, "algorithmic": algorithmic / largest}
+    return {
+        "defect": defect / largest,
+        "contact": contact / largest,
+        "algorithmic": algorithmic / largest,
+    }
 
 
 def test_second_order_without_contact() -> None:
@@ -46,7 +52,9 @@ def test_second_order_without_contact() -> None:
 def test_without_contact_it_is_the_midpoint_rule_but_for_the_load() -> None:
     """Same (u, v) as the midpoint rule under constant loads, to round-off."""
     problem = oscillators(damping=0.01, constant=4.0)
-    ours, theirs = (last_state(problem, s, dt=0.01, steps=200) for s in (DEFAULT, ZienkiewiczWoodTaylor()))
+    ours, theirs = (
+        last_state(problem, s, dt=0.01, steps=200) for s in (DEFAULT, ZienkiewiczWoodTaylor())
+    )
     assert np.allclose(ours.u, theirs.u, rtol=0.0, atol=1e-12 * np.abs(theirs.u).max())
     assert np.allclose(ours.v, theirs.v, rtol=0.0, atol=1e-12 * np.abs(theirs.v).max())
 
@@ -66,7 +74,10 @@ def test_ledger_closes(given: Any, courant: float) -> None:
 
 def test_ledger_closes_with_damping_base_motion_and_springs() -> None:
     """The chain of shaken.py has both; its lumped masses stay (consistent mass asked for by name)."""
-    assert ledger(replace(shaken(), mass=ConsistentMass(), impact=None), dt=0.004, steps=300)["defect"] <= 1e-12
+    assert (
+        ledger(replace(shaken(), mass=ConsistentMass(), impact=None), dt=0.004, steps=300)["defect"]
+        <= 1e-12
+    )
     damped = bar(40, gap=5.0, v0=lambda x: np.full_like(x, -10.0), damping=1e-3, mass=MASSLESS)
     assert ledger(damped, dt=0.25 / 30, steps=200)["defect"] <= 1e-12
 
@@ -76,7 +87,10 @@ def test_contact_work_is_the_one_of_the_trapezium() -> None:
     problem = thrown(40, mass=MASSLESS)
     worst, seen = 0.0, 0.0
     for report in run(problem, DEFAULT, dt=0.25 / 30, steps=200):
-        g0, g1 = (problem.surface.gap0 - problem.surface.normal_values(s.u) for s in (report.old, report.new))
+        g0, g1 = (
+            problem.surface.gap0 - problem.surface.normal_values(s.u)
+            for s in (report.old, report.new)
+        )
         wanted = 0.5 * float(report.new.r_n @ g0 - report.old.r_n @ g1)
         lost = energy_balance(problem, report.old, report.new, report.balance).contact
         worst, seen = max(worst, abs(lost - wanted)), max(seen, abs(wanted))
@@ -108,7 +122,9 @@ def test_initial_data_are_put_into_equilibrium_once() -> None:
 
 def test_gravity_stage_stays_still() -> None:
     """A bar that stands on the ground in equilibrium does not move when the dynamics begin."""
-    problem = bar(40, clamped=True, gravity=10.0, mass=MASSLESS)  # hangs from its clamped top and touches below
+    problem = bar(
+        40, clamped=True, gravity=10.0, mass=MASSLESS
+    )  # hangs from its clamped top and touches below
     rest = static_equilibrium(problem, solver=Condensed())
     for report in run(problem, DEFAULT, dt=0.01, steps=50, state=rest):
         assert np.abs(report.new.u - rest.u).max() <= 1e-12 * np.abs(rest.u).max()
@@ -127,7 +143,9 @@ def test_damping_does_not_ring_in_the_contact_layer(damping: float) -> None:
     """Stiffness-proportional damping of the massless nodes goes inwards with their mass: the force stays smooth, and
     near 300 (strong damping smears the front, but 0.1 s after the impact it is within 5 %)."""
     problem = thrown(50, damping=damping, mass=MASSLESS)
-    force = np.array([report.new.r_n[0] for report in run(problem, DEFAULT, dt=1 / 300, steps=300)])[180:]
+    force = np.array(
+        [report.new.r_n[0] for report in run(problem, DEFAULT, dt=1 / 300, steps=300)]
+    )[180:]
     assert np.abs(force / 300.0 - 1.0).max() <= 0.05
     assert np.abs(np.diff(force)).max() <= 1.0
 

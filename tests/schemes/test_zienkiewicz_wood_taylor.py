@@ -29,7 +29,9 @@ def test_unconditionally_stable(phi, damping):
     """Spectral radius <= 1 at every frequency; exactly 1 at phi = ½ without damping (no algorithmic damping)."""
     scheme = ZienkiewiczWoodTaylor(phi)
     for frequency in np.logspace(-2, 4, 13):
-        radius = np.abs(np.linalg.eigvals(amplification(scheme, frequency=frequency, damping=damping)))
+        radius = np.abs(
+            np.linalg.eigvals(amplification(scheme, frequency=frequency, damping=damping))
+        )
         assert radius.max() <= 1.0 + 1e-9
         if phi == 0.5 and damping == 0.0:
             np.testing.assert_allclose(radius, 1.0, atol=1e-9)
@@ -38,7 +40,9 @@ def test_unconditionally_stable(phi, damping):
 @pytest.mark.parametrize(("phi", "order"), [(0.5, 2.0), (0.6, 1.0), (1.0, 1.0)])
 def test_order(phi, order):
     """Second order at phi = ½, else first, with damping, constant load and base motion."""
-    assert observed_order(ZienkiewiczWoodTaylor(phi), steps=200 if order > 1 else 400) == pytest.approx(order, abs=0.06)
+    assert observed_order(
+        ZienkiewiczWoodTaylor(phi), steps=200 if order > 1 else 400
+    ) == pytest.approx(order, abs=0.06)
 
 
 def test_exact_motion_is_what_it_converges_to():
@@ -51,7 +55,11 @@ def test_exact_motion_is_what_it_converges_to():
 
 def test_V41_half_is_kanes_implicit_contact_rule():
     """1.7 (ii): g(n+1) >= 0 at phi = ½ is Kane's implicit-contact Newmark, to 1e-10, step by step, open and closed."""
-    problem, dt, closed = chain_problem(6, gap=0.01, consistent=True, v0=np.ones(6), constant=20.0), 5e-3, 0
+    problem, dt, closed = (
+        chain_problem(6, gap=0.01, consistent=True, v0=np.ones(6), constant=20.0),
+        5e-3,
+        0,
+    )
     for report in run(problem, HALF, dt=dt, steps=300):
         u, v, r = kane(problem, report.old.u, report.old.v, dt)
         assert np.abs(report.new.u - u).max() <= 1e-10 * np.abs(u).max()

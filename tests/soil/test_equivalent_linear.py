@@ -21,15 +21,24 @@ TIGHT = {"ratio": 0.5, "tolerance": 1e-6}
 
 def differences(found, shear, damping, strain, peak):
     surface = np.abs(found.surface.acceleration).max()
-    pairs = ((found.shear, shear), (found.damping, damping), (found.strain, strain), (surface, peak))
+    pairs = (
+        (found.shear, shear),
+        (found.damping, damping),
+        (found.strain, strain),
+        (surface, peak),
+    )
     return [float(np.abs(ours / theirs - 1.0).max()) for ours, theirs in pairs]
 
 
 @pytest.mark.parametrize("rock", [None, ROCK])
 def test_one_linear_layer_is_the_closed_form(rock):
     """Four equal layers of linear soil amplify as one does, on a base that moves and on rock."""
-    record = Record(np.eye(1, 8192, 4096)[0], 0.01)  # all frequencies; the response lies well inside of it
-    found = equivalent_linear([(5.0, SOIL, SoilCurves.linear(0.1))] * 4, record, rock=rock, rock_damping=0.0)
+    record = Record(
+        np.eye(1, 8192, 4096)[0], 0.01
+    )  # all frequencies; the response lies well inside of it
+    found = equivalent_linear(
+        [(5.0, SOIL, SoilCurves.linear(0.1))] * 4, record, rock=rock, rock_damping=0.0
+    )
     f = np.fft.rfftfreq(8192, 0.01)[20:3600:200]
     amplified = np.abs(np.fft.rfft(found.surface.acceleration))[20:3600:200]
     closed = SoilLayer(20.0, SOIL, 0.1)
@@ -39,7 +48,12 @@ def test_one_linear_layer_is_the_closed_form(rock):
 
 def test_the_sample_of_shake91_is_that_of_pystrata():
     """G, damping, strains and the peak of 16 layers, of numbers that were kept; 1 % as usual is 1 % off at most."""
-    expected = (shake91.EXPECTED_SHEAR, shake91.EXPECTED_DAMPING, shake91.EXPECTED_STRAIN, shake91.EXPECTED_PEAK)
+    expected = (
+        shake91.EXPECTED_SHEAR,
+        shake91.EXPECTED_DAMPING,
+        shake91.EXPECTED_STRAIN,
+        shake91.EXPECTED_PEAK,
+    )
     found = equivalent_linear(shake91.layers(), shake91.motion(), rock=shake91.ROCK, **TIGHT)
     assert max(differences(found, *expected)) < 1.5e-6
     usual = equivalent_linear(shake91.layers(), shake91.motion(), rock=shake91.ROCK, ratio=0.5)
@@ -75,15 +89,23 @@ def test_its_column_moves_alike_in_time():
     assert np.abs(middle / found.strain - 1.0).max() < 8e-3
 
 
-@pytest.mark.parametrize(("wrong", "words"), [
-    ({"layers": []}, "layers is"), ({"layers": 3}, "give .thickness, LinearElastic"),
-    ({"layers": [(1.0, SOIL)]}, "from the top"), ({"layers": [(0.0, SOIL, SOIL)]}, "thickness .m. is 0.0"),
-    ({"layers": [(1.0, SOIL, 0.05)]}, "the curves is 0.05"),
-    ({"record": [1.0]}, "give a Record"),
-    ({"rock": 3.0}, "give a LinearElastic"), ({"rock_damping": -0.1}, "rock_damping is -0.1"),
-    ({"ratio": 0.0}, "ratio is 0.0"), ({"tolerance": -1}, "tolerance is -1"),
-    ({"frequency": 0.0}, "frequency is 0.0"), ({"most": 0}, "most is 0"),
-])
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"layers": []}, "layers is"),
+        ({"layers": 3}, "give .thickness, LinearElastic"),
+        ({"layers": [(1.0, SOIL)]}, "from the top"),
+        ({"layers": [(0.0, SOIL, SOIL)]}, "thickness .m. is 0.0"),
+        ({"layers": [(1.0, SOIL, 0.05)]}, "the curves is 0.05"),
+        ({"record": [1.0]}, "give a Record"),
+        ({"rock": 3.0}, "give a LinearElastic"),
+        ({"rock_damping": -0.1}, "rock_damping is -0.1"),
+        ({"ratio": 0.0}, "ratio is 0.0"),
+        ({"tolerance": -1}, "tolerance is -1"),
+        ({"frequency": 0.0}, "frequency is 0.0"),
+        ({"most": 0}, "most is 0"),
+    ],
+)
 def test_wrong_input(wrong, words):
     given = {"layers": shake91.layers(), "record": shake91.motion()} | wrong
     with pytest.raises(InputError, match=words):
@@ -93,7 +115,9 @@ def test_wrong_input(wrong, words):
 def test_strains_beyond_the_curves_are_refused():
     soft = SoilCurves([1e-6, 1e-4], [1.0, 0.8], [0.02, 0.05], "short")
     layers = [*shake91.layers()[:3], (5.0, SOIL, soft)]
-    with pytest.raises(InputError, match=r"strain is 0\.\d+ % in layer 4 from the top, and 'short' ends at"):
+    with pytest.raises(
+        InputError, match=r"strain is 0\.\d+ % in layer 4 from the top, and 'short' ends at"
+    ):
         equivalent_linear(layers, shake91.motion(peak=3.0))
 
 

@@ -24,17 +24,32 @@ def layered(comm, kind, *, simplices=False, n=1):
     """A wide strip of two layers with free-field sides on one of the three bases, and the same with tied sides."""
     mesh, tags = strip(comm, 6.0, 8.0, (4 * n, 8 * n), simplices=simplices)
     upper = middles(mesh)[:, 1] > 4.0
-    soft, stiff = (fem.Cells(n, np.flatnonzero(m).astype(np.int32), mesh) for n, m in (("a", upper), ("b", ~upper)))
+    soft, stiff = (
+        fem.Cells(n, np.flatnonzero(m).astype(np.int32), mesh)
+        for n, m in (("a", upper), ("b", ~upper))
+    )
     ground = soil.base_motion(SHAKE)
-    base = {"relative": SHAKE, "moved": ground, "compliant": fem.CompliantBase(tags["bottom"], motion=UP)}[kind]
-    moved = fem.Prescribed(tags["bottom"], ground.displacement, ground.velocity, ground.acceleration)
-    data = {"clamped": tags["bottom"] if kind == "relative" else (), "prescribed": moved if kind == "moved" else (),
-            "damping": vc.Rayleigh(0.8, 1e-3), "section": vc.PlaneStrain(0.5)}
+    base = {
+        "relative": SHAKE,
+        "moved": ground,
+        "compliant": fem.CompliantBase(tags["bottom"], motion=UP),
+    }[kind]
+    moved = fem.Prescribed(
+        tags["bottom"], ground.displacement, ground.velocity, ground.acceleration
+    )
+    data = {
+        "clamped": tags["bottom"] if kind == "relative" else (),
+        "prescribed": moved if kind == "moved" else (),
+        "damping": vc.Rayleigh(0.8, 1e-3),
+        "section": vc.PlaneStrain(0.5),
+    }
     foot = [base] if kind == "compliant" else []
     sides = [soil.FreeField(tags[name], base=base) for name in ("left", "right")]
     material = [(stiff, STIFF), (soft, SOIL)]
     free = fem.assemble(mesh, material, dashpots=[*sides, *foot], **data)
-    tied = fem.assemble(mesh, material, dashpots=foot, tied=fem.Tied(tags["left"], tags["right"]), **data)
+    tied = fem.assemble(
+        mesh, material, dashpots=foot, tied=fem.Tied(tags["left"], tags["right"]), **data
+    )
     shaken = {"excitation": SHAKE} if kind == "relative" else {}
     return linear(free, **shaken), linear(tied, **shaken)
 
@@ -44,14 +59,20 @@ def layered(comm, kind, *, simplices=False, n=1):
 def test_level_ground_does_not_notice_them(comm, kind, name):
     """Both directions, two layers, damping, three bases: equal to tied sides to round-off."""
     scheme = SCHEMES[name]
-    free, tied = (history(p, POINTS, dt=DT, steps=STEPS, scheme=scheme) for p in layered(comm, kind))
+    free, tied = (
+        history(p, POINTS, dt=DT, steps=STEPS, scheme=scheme) for p in layered(comm, kind)
+    )
     assert np.abs(free - tied).max() < 1e-10 * np.abs(tied).max()
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("scheme", [vc.HHT(-0.1), vc.Newmark(0.3025, 0.6), vc.Houbolt(), vc.MoreauJean()])
+@pytest.mark.parametrize(
+    "scheme", [vc.HHT(-0.1), vc.Newmark(0.3025, 0.6), vc.Houbolt(), vc.MoreauJean()]
+)
 def test_with_other_schemes(comm, scheme):
-    free, tied = (history(p, POINTS, dt=DT, steps=40, scheme=scheme) for p in layered(comm, "relative"))
+    free, tied = (
+        history(p, POINTS, dt=DT, steps=40, scheme=scheme) for p in layered(comm, "relative")
+    )
     assert np.abs(free - tied).max() < 1e-10 * np.abs(tied).max()
 
 
@@ -70,13 +91,17 @@ def test_on_triangles_to_second_order(comm):
 def test_waves_of_a_structure_leave(comm):
     """A pulse on the surface between the sides: most of its energy has left when the sides are absorbing."""
     mesh, tags = strip(comm, 6.0, 8.0, (12, 16))
-    push = fem.Traction(tags["top"], lambda x, t: np.outer(np.abs(x[:, 0] - 3.0) < 1.0, [0.0, 1e4 * (t < 0.01)]))
+    push = fem.Traction(
+        tags["top"], lambda x, t: np.outer(np.abs(x[:, 0] - 3.0) < 1.0, [0.0, 1e4 * (t < 0.01)])
+    )
     quiet = vc.Ricker(1e-12, 4.0)
     left = []
     for sides in (True, False):
         dashpots = [soil.FreeField(tags[n], base=quiet) for n in ("left", "right")] if sides else []
         tied = () if sides else fem.Tied(tags["left"], tags["right"])
-        system = fem.assemble(mesh, SOIL, clamped=tags["bottom"], dashpots=dashpots, tied=tied, loads=push)
+        system = fem.assemble(
+            mesh, SOIL, clamped=tags["bottom"], dashpots=dashpots, tied=tied, loads=push
+        )
         ((state, _),) = deque(vc.march(linear(system), dt=DT, steps=60), maxlen=1)
         left.append(system.kinetic_energy(state.v) + system.strain_energy(state.u))
     assert left[0] < 0.1 * left[1]
@@ -89,10 +114,18 @@ def test_sides_that_cannot_be_are_refused(comm):
     with pytest.raises(InputError, match="is not held"):
         fem.assemble(mesh, SOIL, dashpots=side)
     with pytest.raises(InputError, match="not one vertical line"):
-        fem.assemble(mesh, SOIL, clamped=tags["bottom"], dashpots=soil.FreeField(tags["top"], base=SHAKE))
+        fem.assemble(
+            mesh, SOIL, clamped=tags["bottom"], dashpots=soil.FreeField(tags["top"], base=SHAKE)
+        )
     base = fem.CompliantBase(tags["bottom"], motion=UP)
     with pytest.raises(InputError, match="held, but its base is compliant"):
-        fem.assemble(mesh, SOIL, clamped=tags["bottom"], dashpots=soil.FreeField(tags["left"], base=base))
+        fem.assemble(
+            mesh, SOIL, clamped=tags["bottom"], dashpots=soil.FreeField(tags["left"], base=base)
+        )
     mesh, tags = block(comm, lengths=(1.0, 1.0, 1.0), divisions=(1, 1, 1))
-    with pytest.raises(InputError, match="FreeField is for plane bodies: tie the sides of this one"):
-        fem.assemble(mesh, SOIL, clamped=tags["bottom"], dashpots=soil.FreeField(tags["left"], base=SHAKE))
+    with pytest.raises(
+        InputError, match="FreeField is for plane bodies: tie the sides of this one"
+    ):
+        fem.assemble(
+            mesh, SOIL, clamped=tags["bottom"], dashpots=soil.FreeField(tags["left"], base=SHAKE)
+        )

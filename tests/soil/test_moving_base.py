@@ -42,15 +42,22 @@ def test_the_base_is_integrated_as_the_schemes_do():
     t = DT * np.arange(40)
     a = np.array([shake.acceleration(s) for s in t])
     middle = np.array([shake.acceleration(s + 0.5 * DT) for s in t])
-    for scheme, mean in ((vc.Trapezoidal(), 0.5 * (a[:-1] + a[1:])), (vc.ZienkiewiczWoodTaylor(), middle[:-1])):
+    for scheme, mean in (
+        (vc.Trapezoidal(), 0.5 * (a[:-1] + a[1:])),
+        (vc.ZienkiewiczWoodTaylor(), middle[:-1]),
+    ):
         v = np.append(0.0, np.cumsum(DT * mean))
         u = np.append(0.0, np.cumsum(0.5 * DT * (v[:-1] + v[1:])))
         ground = base_motion(shake)
         ground.path.bind(scheme, DT)
         for k in (39, 0, 7):  # not in order
             found = ground.at(t[k])
-            np.testing.assert_allclose(found[0], u[k] * np.array([1.0, -0.5]), rtol=1e-12, atol=1e-16)
-            np.testing.assert_allclose(found[1], v[k] * np.array([1.0, -0.5]), rtol=1e-12, atol=1e-15)
+            np.testing.assert_allclose(
+                found[0], u[k] * np.array([1.0, -0.5]), rtol=1e-12, atol=1e-16
+            )
+            np.testing.assert_allclose(
+                found[1], v[k] * np.array([1.0, -0.5]), rtol=1e-12, atol=1e-15
+            )
             np.testing.assert_array_equal(found[2], a[k] * np.array([1.0, -0.5]))
         half = ground.at(0.5 * (t[7] + t[8]))[0][0]
         assert math.isclose(half, 0.5 * (u[7] + u[8]), rel_tol=1e-9)
@@ -74,9 +81,14 @@ def test_a_schedule_may_end_with_the_run():
 def test_time_steps_that_nobody_knows_and_motions_that_nobody_binds_are_refused():
     ground = base_motion(WAVES)
     np.testing.assert_array_equal(ground.at(0.0)[0], [0.0, 0.0])
-    with pytest.raises(InputError, match="base_motion is asked for its motion at t = 0.5 s, but no run has bound it"):
+    with pytest.raises(
+        InputError,
+        match="base_motion is asked for its motion at t = 0.5 s, but no run has bound it",
+    ):
         ground.at(0.5)
-    with pytest.raises(InputError, match=r"needs its time steps beforehand, but the run has HalvedAtImpact"):
+    with pytest.raises(
+        InputError, match=r"needs its time steps beforehand, but the run has HalvedAtImpact"
+    ):
         ground.path.bind(vc.Trapezoidal(), vc.HalvedAtImpact(DT))
     with pytest.raises(InputError, match="same number of components"):
         base_motion(())
@@ -87,20 +99,28 @@ def two_frames(
 ) -> tuple[Any, Any]:
     """A panel beside a rigid wall, shaken both ways: (problem in the ground's frame, with a moved base)."""
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(1.0, 2.0), divisions=(3, 6)), comm)
-    data = {"section": vc.PlaneStress(0.2), "damping": damping, "loads": fem.BodyForce((0.0, -2.4e4))}
+    data = {
+        "section": vc.PlaneStress(0.2),
+        "damping": damping,
+        "loads": fem.BodyForce((0.0, -2.4e4)),
+    }
     soft = vc.LinearElastic(E=2e7, nu=0.2, rho=2400.0)
     wall = vc.HalfSpace(point=(1.001, 0.0), normal=(-1.0, 0.0))
     ground = base_motion(waves)
     held = fem.assemble(mesh, soft, clamped=tags["bottom"], **data)
     base = fem.Prescribed(tags["bottom"], ground.displacement, ground.velocity, ground.acceleration)
     moved = fem.assemble(mesh, soft, prescribed=base, **data)
-    surfaces = [fem.contact_surface(system, tags["right"], obstacle=wall) for system in (held, moved)]
+    surfaces = [
+        fem.contact_surface(system, tags["right"], obstacle=wall) for system in (held, moved)
+    ]
     settings = {} if friction is None else {"friction": friction}
     relative = vc.ContactProblem(held, surfaces[0], excitation=waves, **settings)
     return relative, vc.ContactProblem(moved, ground.carrying(surfaces[1], moved), **settings)
 
 
-def difference(pair: tuple[Any, Any], scheme: Any, steps: int = 220, *, rest: bool = False, changes: int = 4) -> float:
+def difference(
+    pair: tuple[Any, Any], scheme: Any, steps: int = 220, *, rest: bool = False, changes: int = 4
+) -> float:
     """Largest difference of the reactions of two problems over the largest reaction; contact opens and closes.
 
     ``rest``: both start from their static stage.
@@ -121,7 +141,9 @@ def difference(pair: tuple[Any, Any], scheme: Any, steps: int = 220, *, rest: bo
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "name", ["trapezoidal", *(pytest.param(name, marks=pytest.mark.serial) for name in ("zwt", "newmark"))])
+    "name",
+    ["trapezoidal", *(pytest.param(name, marks=pytest.mark.serial) for name in ("zwt", "newmark"))],
+)
 def test_both_frames_give_the_same_contact_forces(comm, name):
     """Horizontal and vertical motion together, with stiffness damping; measured 1e-12."""
     pair = two_frames(comm, damping=vc.Rayleigh(0.0, 1e-4))
@@ -130,7 +152,9 @@ def test_both_frames_give_the_same_contact_forces(comm, name):
 
 @pytest.mark.slow
 @pytest.mark.serial
-@pytest.mark.parametrize("name", [name for name in SCHEMES if name not in ("trapezoidal", "zwt", "newmark")])
+@pytest.mark.parametrize(
+    "name", [name for name in SCHEMES if name not in ("trapezoidal", "zwt", "newmark")]
+)
 def test_other_schemes_too(comm, name):
     """The scheme integrates the base, so every scheme without velocity jumps agrees with itself."""
     pair = two_frames(comm, damping=vc.Rayleigh(0.0, 1e-4))
@@ -148,17 +172,33 @@ def test_with_friction_on_an_obstacle_that_goes_along(comm):
 @pytest.mark.slow
 def test_a_block_on_a_box_of_soil_whose_base_moves(comm):
     """In space, three components, sides tied both ways: a block rubs on the soil, is thrown off and comes down."""
-    waves = [vc.Ricker(a, f, direction=tuple(e)) for a, f, e in zip((9.0, 40.0, 7.0), (16.0, 19.0, 15.0), np.eye(3),
-                                                                    strict=True)]
-    boxes = {"lower": BlockMesh(lengths=(3.0, 2.0, 3.0), divisions=(3, 3, 3)),
-             "upper": BlockMesh(lengths=(1.5, 1.5, 1.5), divisions=(2, 3, 2))}
+    waves = [
+        vc.Ricker(a, f, direction=tuple(e))
+        for a, f, e in zip((9.0, 40.0, 7.0), (16.0, 19.0, 15.0), np.eye(3), strict=True)
+    ]
+    boxes = {
+        "lower": BlockMesh(lengths=(3.0, 2.0, 3.0), divisions=(3, 3, 3)),
+        "upper": BlockMesh(lengths=(1.5, 1.5, 1.5), divisions=(2, 3, 2)),
+    }
     mesh, tags = fem.build_mesh(TwoBlocks(**boxes, offset=(0.6, 0.7)), comm)
-    tied = [fem.Tied(tags[f"lower_{a}"], tags[f"lower_{b}"]) for a, b in (("left", "right"), ("back", "front"))]
+    tied = [
+        fem.Tied(tags[f"lower_{a}"], tags[f"lower_{b}"])
+        for a, b in (("left", "right"), ("back", "front"))
+    ]
     ground, pair = base_motion(waves), []
-    base = fem.Prescribed(tags["lower_bottom"], ground.displacement, ground.velocity, ground.acceleration)
-    for held, shaken in (({"clamped": tags["lower_bottom"]}, {"excitation": waves}), ({"prescribed": base}, {})):
-        system = vc.with_weight(fem.assemble(mesh, SOIL, tied=tied, **held), direction=(0.0, -1.0, 0.0))
-        surface = fem.contact_pair(system, tags["upper_bottom"], tags["lower_top"], matching=fem.DualMortar())
+    base = fem.Prescribed(
+        tags["lower_bottom"], ground.displacement, ground.velocity, ground.acceleration
+    )
+    for held, shaken in (
+        ({"clamped": tags["lower_bottom"]}, {"excitation": waves}),
+        ({"prescribed": base}, {}),
+    ):
+        system = vc.with_weight(
+            fem.assemble(mesh, SOIL, tied=tied, **held), direction=(0.0, -1.0, 0.0)
+        )
+        surface = fem.contact_pair(
+            system, tags["upper_bottom"], tags["lower_top"], matching=fem.DualMortar()
+        )
         pair.append(vc.ContactProblem(system, surface, friction=vc.Coulomb(0.3), **shaken))
     assert difference((pair[0], pair[1]), vc.Trapezoidal(), 60, rest=True, changes=2) <= 1e-10
 

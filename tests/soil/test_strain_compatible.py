@@ -43,8 +43,15 @@ def from_top(function: Any) -> Any:
     return rows[np.argsort(-rows[:, 0]), 1]
 
 
-def level_ground(comm: Any, base: str, sides: str, n: int = 12, dt: float = DT, t_end: float = 1.99,
-                 **options: Any) -> Any:
+def level_ground(
+    comm: Any,
+    base: str,
+    sides: str,
+    n: int = 12,
+    dt: float = DT,
+    t_end: float = 1.99,
+    **options: Any,
+) -> Any:
     """Level ground on a base that is shaken, or on rock, between tied or free-field sides."""
     mesh, tags = strip(comm, 2.0, DEPTH, (1, n))
     shakes = vc.GroundMotion(record(dt=dt))
@@ -53,13 +60,27 @@ def level_ground(comm: Any, base: str, sides: str, n: int = 12, dt: float = DT, 
     def run(material: Any, strain: Any) -> Any:
         foot = {"clamped": tags["bottom"]} if base == "rigid" else {}
         below = [] if base == "rigid" else [rock]
-        free = [soil.FreeField(tags[side], base=shakes if base == "rigid" else rock) for side in ("left", "right")]
+        free = [
+            soil.FreeField(tags[side], base=shakes if base == "rigid" else rock)
+            for side in ("left", "right")
+        ]
         ends = {"tied": fem.Tied(tags["left"], tags["right"])} if sides == "tied" else {}
-        system = fem.assemble(mesh, material, damping=vc.DampingRatio(SITE), **foot, **ends,
-                              dashpots=below + (free if sides == "free" else []))
+        system = fem.assemble(
+            mesh,
+            material,
+            damping=vc.DampingRatio(SITE),
+            **foot,
+            **ends,
+            dashpots=below + (free if sides == "free" else []),
+        )
         problem = linear(system, **({"excitation": shakes} if base == "rigid" else {}))
-        return vc.simulate(problem, dt=dt, t_end=t_end, progress=False,
-                           record=(strain, vc.Probe({"top": (0.0, DEPTH)}, acceleration=True)))
+        return vc.simulate(
+            problem,
+            dt=dt,
+            t_end=t_end,
+            progress=False,
+            record=(strain, vc.Probe({"top": (0.0, DEPTH)}, acceleration=True)),
+        )
 
     return soil.strain_compatible(mesh, SOIL, [(everywhere(mesh), CURVES)], run, **options)
 
@@ -67,23 +88,39 @@ def level_ground(comm: Any, base: str, sides: str, n: int = 12, dt: float = DT, 
 def beside_column(comm: Any, base: str, n: int, dt: float) -> tuple[Any, Any, list[float]]:
     """The strip, the column of waves, and how far G, damping, strain and the peak of the surface are from it."""
     found = level_ground(comm, base, "tied", n, dt, tolerance=1e-3)
-    column = soil.equivalent_linear([(DEPTH / n, SOIL, CURVES)] * n, record(dt=dt), rock_damping=0.0,
-                                    rock=ROCK if base == "rock" else None, frequency=SITE, tolerance=1e-3)
-    pairs = [(from_top(found.material.E) / SOIL.E * SOIL.shear_modulus, column.shear),
-             (from_top(found.material.xi), column.damping), (from_top(found.strain), 0.65 * column.strain),
-             (np.abs(found.solution.history["a_x_top"]).max(), np.abs(column.surface.acceleration).max())]
+    column = soil.equivalent_linear(
+        [(DEPTH / n, SOIL, CURVES)] * n,
+        record(dt=dt),
+        rock_damping=0.0,
+        rock=ROCK if base == "rock" else None,
+        frequency=SITE,
+        tolerance=1e-3,
+    )
+    pairs = [
+        (from_top(found.material.E) / SOIL.E * SOIL.shear_modulus, column.shear),
+        (from_top(found.material.xi), column.damping),
+        (from_top(found.strain), 0.65 * column.strain),
+        (
+            np.abs(found.solution.history["a_x_top"]).max(),
+            np.abs(column.surface.acceleration).max(),
+        ),
+    ]
     return found, column, [float(np.abs(ours / exact - 1.0).max()) for ours, exact in pairs]
 
 
 @pytest.mark.serial  # several ranks have a shorter test below
-@pytest.mark.parametrize(("base", "bounds"), [("rigid", (0.021, 0.016, 0.048, 0.033)),
-                                              ("rock", (0.010, 0.007, 0.021, 0.010))])
+@pytest.mark.parametrize(
+    ("base", "bounds"),
+    [("rigid", (0.021, 0.016, 0.048, 0.033)), ("rock", (0.010, 0.007, 0.021, 0.010))],
+)
 def test_a_strip_is_the_column_of_waves(comm, base, bounds):
     """Damping of the stiffness alike: what is left is of elements of a metre and steps of 10 ms."""
     found, column, differences = beside_column(comm, base, 12, DT)
     assert len(found.changes) <= column.iterations + 1 and found.changes[-1] <= 1e-3
     assert all(one < bound for one, bound in zip(differences, bounds, strict=True)), differences
-    assert found.solution.history["largest_shear_strain"][-1] == pytest.approx(from_top(found.strain).max() / 0.65)
+    assert found.solution.history["largest_shear_strain"][-1] == pytest.approx(
+        from_top(found.strain).max() / 0.65
+    )
 
 
 @pytest.mark.serial
@@ -108,7 +145,9 @@ def test_a_box_is_the_strip(comm):
     sides = [fem.Tied(tags["left"], tags["right"]), fem.Tied(tags["back"], tags["front"])]
 
     def run(material: Any, strain: Any) -> Any:
-        system = fem.assemble(mesh, material, damping=vc.DampingRatio(SITE), clamped=tags["bottom"], tied=sides)
+        system = fem.assemble(
+            mesh, material, damping=vc.DampingRatio(SITE), clamped=tags["bottom"], tied=sides
+        )
         problem = linear(system, excitation=vc.GroundMotion(record(), direction=(1.0, 0.0, 0.0)))
         return vc.simulate(problem, dt=DT, t_end=1.0, record=(strain,), progress=False)
 
@@ -119,19 +158,34 @@ def test_a_box_is_the_strip(comm):
 
 def block_on_soil(comm: Any, peak: float, **options: Any) -> Any:
     """A heavy block on soil, gravity first; it may lift off and slide."""
-    ground, house = BlockMesh(lengths=(16.0, 8.0), divisions=(8, 4)), BlockMesh(lengths=(4.0, 6.0), divisions=(2, 2))
+    ground, house = (
+        BlockMesh(lengths=(16.0, 8.0), divisions=(8, 4)),
+        BlockMesh(lengths=(4.0, 6.0), divisions=(2, 2)),
+    )
     mesh, tags = fem.build_mesh(TwoBlocks(lower=ground, upper=house, offset=(6.0, 0.0)), comm)
-    materials = [(tags["lower"], SOIL), (tags["upper"], vc.LinearElastic(E=2e9, nu=0.2, rho=2000.0))]
+    materials = [
+        (tags["lower"], SOIL),
+        (tags["upper"], vc.LinearElastic(E=2e9, nu=0.2, rho=2000.0)),
+    ]
     curves = [(tags["lower"], CURVES), (tags["upper"], soil.SoilCurves.linear(0.02))]
 
     def run(material: Any, strain: Any) -> Any:
-        system = fem.assemble(mesh, material, damping=vc.DampingRatio(SITE, 9.0), clamped=tags["lower_bottom"],
-                              tied=fem.Tied(tags["lower_left"], tags["lower_right"]))
+        system = fem.assemble(
+            mesh,
+            material,
+            damping=vc.DampingRatio(SITE, 9.0),
+            clamped=tags["lower_bottom"],
+            tied=fem.Tied(tags["lower_left"], tags["lower_right"]),
+        )
         system = vc.with_weight(system, direction=DOWN)
         contact = fem.contact_pair(system, tags["upper_bottom"], tags["lower_top"])
-        problem = vc.ContactProblem(system, contact, friction=vc.Coulomb(0.5), excitation=vc.GroundMotion(record(peak)))
+        problem = vc.ContactProblem(
+            system, contact, friction=vc.Coulomb(0.5), excitation=vc.GroundMotion(record(peak))
+        )
         state = vc.static_equilibrium(problem, solver=vc.Condensed())
-        return vc.simulate(problem, state=state, dt=DT, t_end=1.2, record=(strain, vc.Contact()), progress=False)
+        return vc.simulate(
+            problem, state=state, dt=DT, t_end=1.2, record=(strain, vc.Contact()), progress=False
+        )
 
     return soil.strain_compatible(mesh, materials, curves, run, **options)
 
@@ -145,13 +199,28 @@ def test_a_block_on_soil(comm):
     mesh = found.strain.function_space.mesh
     own = mesh.topology.index_map(2).size_local
     middle = mesh.geometry.x[compat.geometry_dofmap(mesh)[:own]].mean(axis=1)
-    every = np.concatenate(mesh.comm.allgather(np.column_stack(
-        [middle[:, :2], found.material.E.x.array[place[:own]], found.material.xi.x.array[place[:own]]])))
+    every = np.concatenate(
+        mesh.comm.allgather(
+            np.column_stack(
+                [
+                    middle[:, :2],
+                    found.material.E.x.array[place[:own]],
+                    found.material.xi.x.array[place[:own]],
+                ]
+            )
+        )
+    )
     x, y, E, xi = every.T
     reduction = E / SOIL.E
-    above, below, beside = y > 8.0, (y > 6.0) & (abs(x - 7.0) < 2.0), (y > 6.0) & (y < 8.0) & (x < 3.0)
+    above, below, beside = (
+        y > 8.0,
+        (y > 6.0) & (abs(x - 7.0) < 2.0),
+        (y > 6.0) & (y < 8.0) & (x < 3.0),
+    )
     assert np.allclose(E[above], 2e9, rtol=1e-12) and np.all(xi[above] == 0.02)
-    assert reduction[below].min() < 0.8 * reduction[beside].min() and np.all(reduction[~above] < 1.0)
+    assert reduction[below].min() < 0.8 * reduction[beside].min() and np.all(
+        reduction[~above] < 1.0
+    )
     weight = 4.0 * 6.0 * 2000.0 * 9.80665
     assert found.solution.history["contact_resultant"][0] == pytest.approx(weight, rel=1e-6)
 
@@ -179,7 +248,9 @@ def test_cells_without_curves_keep_their_damping(comm):
     soil.strain_compatible(mesh, body, [(lower, CURVES)], run)
     for values in found:
         assert np.allclose(values[:6], 0.05, rtol=1e-14) and np.ptp(values[6:]) == 0.0
-    assert len(found) > 1 and found[-1][-1] == pytest.approx(CURVES.at(np.array([0.65 * 2e-4]))[1][0])
+    assert len(found) > 1 and found[-1][-1] == pytest.approx(
+        CURVES.at(np.array([0.65 * 2e-4]))[1][0]
+    )
 
 
 def test_strains_beyond_the_curves_are_refused(comm):
@@ -188,12 +259,21 @@ def test_strains_beyond_the_curves_are_refused(comm):
     shakes = vc.GroundMotion(record())
 
     def run(material: Any, strain: Any) -> Any:
-        system = fem.assemble(mesh, material, damping=vc.DampingRatio(SITE), clamped=tags["bottom"],
-                              tied=fem.Tied(tags["left"], tags["right"]))
-        return vc.simulate(linear(system, excitation=shakes), dt=DT, t_end=1.0, record=(strain,), progress=False)
+        system = fem.assemble(
+            mesh,
+            material,
+            damping=vc.DampingRatio(SITE),
+            clamped=tags["bottom"],
+            tied=fem.Tied(tags["left"], tags["right"]),
+        )
+        return vc.simulate(
+            linear(system, excitation=shakes), dt=DT, t_end=1.0, record=(strain,), progress=False
+        )
 
     cells = everywhere(mesh)
-    with pytest.raises(InputError, match=r"strain is 0\.\d+ % at \(1, 1\), and 'short' ends at 0\.01 %"):
+    with pytest.raises(
+        InputError, match=r"strain is 0\.\d+ % at \(1, 1\), and 'short' ends at 0\.01 %"
+    ):
         soil.strain_compatible(mesh, SOIL, [(cells, short)], run)
     with pytest.raises(ViContactError, match="after 2 runs G or damping still change by"):
         soil.strain_compatible(mesh, SOIL, [(cells, CURVES)], run, most=2)
@@ -205,6 +285,8 @@ def test_strains_beyond_the_curves_are_refused(comm):
         soil.strain_compatible(mesh, SOIL, [(cells, 0.05)], run)
     with pytest.raises(InputError, match="ratio is 0"):
         soil.strain_compatible(mesh, SOIL, [(cells, CURVES)], run, ratio=0.0)
-    wood = vc.Orthotropic(E1=1e7, E2=1e7, E3=1e7, nu12=0.3, nu13=0.3, nu23=0.3, G12=4e6, G13=4e6, G23=4e6, rho=600.0)
+    wood = vc.Orthotropic(
+        E1=1e7, E2=1e7, E3=1e7, nu12=0.3, nu13=0.3, nu23=0.3, G12=4e6, G13=4e6, G23=4e6, rho=600.0
+    )
     with pytest.raises(InputError, match="Orthotropic has several G"):
         soil.strain_compatible(mesh, wood, [(cells, CURVES)], run)

@@ -21,7 +21,9 @@ def route(request, monkeypatch):
     return request.param
 
 
-def full_exchange(G: np.ndarray, q: np.ndarray, active: np.ndarray, steps: int) -> list[tuple[bool, ...]]:
+def full_exchange(
+    G: np.ndarray, q: np.ndarray, active: np.ndarray, steps: int
+) -> list[tuple[bool, ...]]:
     """The plain method, as in the papers: the sets it visits until it stops."""
     sets = [tuple(active.tolist())]
     for _ in range(steps):
@@ -143,13 +145,17 @@ def test_an_ill_conditioned_answer_is_certified():
 
 def test_failure_tells_what_happened_and_what_to_do():
     problem = LCP(CYCLING, np.array([2.0, 1.0, -3.0]), np.zeros(3, dtype=bool))
-    with pytest.raises(StepFailure, match=r"ActiveSet.*after 2 iterations with residual .*raise max_iterations"):
+    with pytest.raises(
+        StepFailure, match=r"ActiveSet.*after 2 iterations with residual .*raise max_iterations"
+    ):
         solve(ActiveSet(max_iterations=2), problem)
     with pytest.raises(StepFailure, match="after 3 iterations"):  # in the fallback
         solve(ActiveSet(max_iterations=3), problem)
     G = 1.0 / (1.0 + np.add.outer(np.arange(8.0), np.arange(8.0)))
     with pytest.raises(StepFailure, match="ill-conditioned"):
-        solve(ActiveSet(tolerance=1e-18), LCP(G, -np.linspace(1.0, 2.0, 8), np.zeros(8, dtype=bool)))
+        solve(
+            ActiveSet(tolerance=1e-18), LCP(G, -np.linspace(1.0, 2.0, 8), np.zeros(8, dtype=bool))
+        )
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -182,6 +188,8 @@ def test_both_routes_make_the_same_exchanges(monkeypatch):
         assert compiled.history == other.history and compiled.iterations == other.iterations
         assert np.abs(compiled.r - other.r).max() <= 1e-13 * np.abs(other.r).max()
         gap = problem.G @ compiled.r + problem.q
-        sure = np.maximum(compiled.r, gap) > 1e-12 * np.abs(compiled.r).max()  # not where both are round-off
+        sure = (
+            np.maximum(compiled.r, gap) > 1e-12 * np.abs(compiled.r).max()
+        )  # not where both are round-off
         assert compiled.r.min() >= 0.0 and np.array_equal(compiled.active[sure], other.active[sure])
         assert sure.all() or problem is hard

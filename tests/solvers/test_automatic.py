@@ -38,7 +38,10 @@ def test_small_problems_are_condensed(caplog: pytest.LogCaptureFixture) -> None:
             assert report.result.method == "condensed ActiveSet"
     assert COMM.rank > 0 or "Automatic: Condensed for" in caplog.text
     problem = box()
-    assert vc.Automatic().route(problem.system.K, empty_surface(problem.surface.comm, 3), False) == vc.Condensed()
+    assert (
+        vc.Automatic().route(problem.system.K, empty_surface(problem.surface.comm, 3), False)
+        == vc.Condensed()
+    )
 
 
 @pytest.mark.parametrize("limits", [{"IN_SPACE": 100, "ALONE_IN_SPACE": 100}, {"DENSE": {3: 10}}])
@@ -65,7 +68,10 @@ def test_friction_and_ranks_make_it_iterative_sooner(monkeypatch: pytest.MonkeyP
     problem, rule = box(), vc.Automatic()
     K, surface = problem.system.K, problem.surface
     monkeypatch.setattr(automatic, "DENSE", {3: surface.total})
-    assert [rule.route(K, surface, rubs) for rubs in (False, True)] == [vc.Condensed(), vc.Iterative()]
+    assert [rule.route(K, surface, rubs) for rubs in (False, True)] == [
+        vc.Condensed(),
+        vc.Iterative(),
+    ]
     monkeypatch.setattr(automatic, "IN_SPACE", 100)
     alone = COMM.size == 1 and cholmod(surface.comm) is not None
     assert rule.route(K, surface, False) == (vc.Condensed() if alone else vc.Iterative())

@@ -42,7 +42,9 @@ def rows(n: int, owned: list[int], **more: Any) -> ContactSurface:
         "compliance": np.zeros(m),
         "tangents": np.zeros((m, 0), dtype=np.int64),
     }
-    return ContactSurface(comm=SerialComm(), owned=np.array(owned)[::-1], slots=np.arange(m), **(settings | more))
+    return ContactSurface(
+        comm=SerialComm(), owned=np.array(owned)[::-1], slots=np.arange(m), **(settings | more)
+    )
 
 
 def problem(m: int = 5, **more: Any) -> ContactProblem:
@@ -79,13 +81,17 @@ def test_V40_schur_matrix_from_its_definition():
     np.testing.assert_array_equal(prepared.delassus, prepared.delassus.T)
     eigenvalues = np.linalg.eigvalsh(schur)
     assert eigenvalues[0] > 0.0
-    np.testing.assert_allclose(np.sort(1.0 / np.linalg.eigvalsh(prepared.delassus)), eigenvalues, rtol=1e-10)
+    np.testing.assert_allclose(
+        np.sort(1.0 / np.linalg.eigvalsh(prepared.delassus)), eigenvalues, rtol=1e-10
+    )
 
 
 def test_V40_primal_and_dual_forms_of_a_step():
     """V4.0: (49) swept in v on D~ and z~, and (42) in r: the same (u_n, r_n) to 1e-10; z~ from its partition."""
     p = problem()
-    step = next(report.step for report in run(p, HALF, dt=DT, steps=60) if 2 <= report.new.active.sum() <= 3)
+    step = next(
+        report.step for report in run(p, HALF, dt=DT, steps=60) if 2 <= report.new.active.sum() <= 3
+    )
     K, c = dense(p, DT), p.surface.owned
     i = np.setdiff1d(np.arange(10), c)
     D = K[np.ix_(c, c)] - K[np.ix_(c, i)] @ np.linalg.solve(K[np.ix_(i, i)], K[np.ix_(i, c)])
@@ -124,7 +130,9 @@ def test_conditions_out_of_reach(method):
     owned = [row for row, reached in zip(range(5, 10), finite, strict=True) if reached]
     alone = replace(some, surface=rows(10, owned, gap0=gaps[np.isfinite(gaps)]))
     for one, other in zip(
-        run(some, HALF, dt=DT, steps=60, solver=Condensed(method)), run(alone, HALF, dt=DT, steps=60), strict=True
+        run(some, HALF, dt=DT, steps=60, solver=Condensed(method)),
+        run(alone, HALF, dt=DT, steps=60),
+        strict=True,
     ):
         assert not one.new.r_n[np.isinf(gaps)].any() and not one.new.active[np.isinf(gaps)].any()
         np.testing.assert_allclose(one.new.u, other.new.u, atol=1e-11)
@@ -134,7 +142,9 @@ def test_conditions_out_of_reach(method):
 def test_held_beside_unilateral(method):
     """Two of five points held: an equality with reactions of either sign; with all held, the reduced linear system."""
     mixed = problem(bilateral=np.array([True, False, False, True, False]))
-    mixed = replace(mixed, surface=replace(mixed.surface, gap0=np.array([0.0, 0.01, 0.01, 0.0, 0.01])))
+    mixed = replace(
+        mixed, surface=replace(mixed.surface, gap0=np.array([0.0, 0.01, 0.01, 0.0, 0.01]))
+    )
     signs: set[float] = set()
     for report in run(mixed, HALF, dt=DT, steps=60, solver=Condensed(method)):
         assert np.all(np.abs(mixed.surface.normal_values(report.new.u)[[0, 3]]) == 0.0)
@@ -145,7 +155,9 @@ def test_held_beside_unilateral(method):
     step = stepped(held, 10)
     K, free = dense(held, DT), np.arange(5)
     result = Condensed(method).prepare(step.A, held.surface, step.scale).solve(step)
-    np.testing.assert_allclose(result.x[free], np.linalg.solve(K[np.ix_(free, free)], step.b[free]), rtol=1e-9)
+    np.testing.assert_allclose(
+        result.x[free], np.linalg.solve(K[np.ix_(free, free)], step.b[free]), rtol=1e-9
+    )
 
 
 def test_springs_add_their_compliance():
@@ -154,7 +166,9 @@ def test_springs_add_their_compliance():
         p = bar(1, clamped=True, gap=0.0)
         p = replace(p, surface=replace(p.surface, compliance=np.array([0.125])))
         prepared = Condensed().prepare(scheme.effective_matrix(p, DT), p.surface, scale)
-        rigid = Condensed().prepare(scheme.effective_matrix(p, DT), replace(p.surface, compliance=np.zeros(1)), scale)
+        rigid = Condensed().prepare(
+            scheme.effective_matrix(p, DT), replace(p.surface, compliance=np.zeros(1)), scale
+        )
         assert prepared.delassus - rigid.delassus == pytest.approx(0.125 / scale)
 
 
@@ -170,14 +184,18 @@ def test_results_tell_method_and_iterations():
     assert report.result.method == "condensed ActiveSet" and report.new.active.all()
     step = report.step
     prepared = Condensed().prepare(step.A, step.surface, step.scale)
-    assert prepared.solve(replace(step, active=np.array([True]))).iterations == 0  # the guess was right
+    assert (
+        prepared.solve(replace(step, active=np.array([True]))).iterations == 0
+    )  # the guess was right
     assert prepared.solve(replace(step, active=np.array([False]))).iterations == 1
     assert kkt_residual(step, prepared.solve(step)).worst <= 1e-14
 
 
 def test_friction_that_cannot_act_is_refused_not_ignored():
     """A chain moves in one dimension only."""
-    with pytest.raises(InputError, match=r"Condensed cannot use Coulomb\(mu=0.3\): a body in one dimension"):
+    with pytest.raises(
+        InputError, match=r"Condensed cannot use Coulomb\(mu=0.3\): a body in one dimension"
+    ):
         Condensed().check(replace(shaken(), friction=Coulomb(0.3)))
     Condensed().check(replace(shaken(), friction=Frictionless()))
 

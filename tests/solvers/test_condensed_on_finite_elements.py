@@ -55,8 +55,16 @@ class Twice:
 
 COULOMB, TRESCA = vc.Coulomb(0.3), vc.Tresca(2e4)
 LAWS = {
-    "box, C = 5": RATES, "springs": None, "inclined": COULOMB, "bilateral": None, "rollers, 2D": TRESCA,
-    "rollers, 3D": COULOMB, "pair, 2D": None, "pair, 3D": COULOMB, "corner": TRESCA, "moving": RATES,
+    "box, C = 5": RATES,
+    "springs": None,
+    "inclined": COULOMB,
+    "bilateral": None,
+    "rollers, 2D": TRESCA,
+    "rollers, 3D": COULOMB,
+    "pair, 2D": None,
+    "pair, 3D": COULOMB,
+    "corner": TRESCA,
+    "moving": RATES,
 }
 
 
@@ -66,7 +74,9 @@ def test_steps_agree(name: str, law: Any) -> None:
     make, dt = PROBLEMS[name]
     problem = make()
     if law is not None:
-        problem = replace(problem, friction=law, surface=problem.surface.with_frictionless_corners())
+        problem = replace(
+            problem, friction=law, surface=problem.surface.with_frictionless_corners()
+        )
     checked = vc.cross_check(problem, solvers=(vc.Condensed(), Twice()), dt=dt, steps=6)
     assert max_over_ranks(COMM, np.array([checked.found[0].size["r_n"]])) > 0.0
     assert checked.worst <= ROUND_OFF
@@ -75,10 +85,15 @@ def test_steps_agree(name: str, law: Any) -> None:
 @pytest.mark.parametrize(("d", "law"), [(2, None), (3, None), (2, vc.Coulomb(0.2))], ids=repr)
 def test_statics_agree(d: int, law: Any) -> None:
     problem = pressed(d) if law is None else replace(pressed(d), friction=law)
-    one, other = (vc.static_equilibrium(problem, solver=solver) for solver in (vc.Condensed(), Twice()))
+    one, other = (
+        vc.static_equilibrium(problem, solver=solver) for solver in (vc.Condensed(), Twice())
+    )
     for name in ("u", "r_n"):
         size = max_over_ranks(COMM, getattr(one, name))
-        assert size > 0.0 and max_over_ranks(COMM, getattr(one, name) - getattr(other, name)) <= ROUND_OFF * size
+        assert (
+            size > 0.0
+            and max_over_ranks(COMM, getattr(one, name) - getattr(other, name)) <= ROUND_OFF * size
+        )
 
 
 def test_halved_steps_agree_and_each_dt_has_its_factor() -> None:
@@ -86,7 +101,8 @@ def test_halved_steps_agree_and_each_dt_has_its_factor() -> None:
     dt = vc.HalvedAtImpact(BOX_DT, halvings=2)
     lengths = set()
     for (one, report), (other, _) in zip(
-        vc.march(problem, solver=vc.Condensed(), dt=dt, steps=10), vc.march(problem, solver=Twice(), dt=dt, steps=10),
+        vc.march(problem, solver=vc.Condensed(), dt=dt, steps=10),
+        vc.march(problem, solver=Twice(), dt=dt, steps=10),
         strict=True,
     ):
         assert isinstance(report.step.A.factor, ContactLast)

@@ -42,7 +42,9 @@ def pressed(problem: ContactProblem, scheme: Scheme, dt: float) -> StepProblem:
     """A step that closes a part of the wall and rubs."""
     system = problem.equations
     points = system.space.coordinates
-    v = problem.surface.in_frames(np.sin(3.0 * points[:, 1]) + 0.3 * np.cos(5.0 * points.sum(axis=1)))
+    v = problem.surface.in_frames(
+        np.sin(3.0 * points[:, 1]) + 0.3 * np.cos(5.0 * points.sum(axis=1))
+    )
     A = scheme.effective_matrix(problem, dt)
     step = scheme.step(problem, replace(initial_state(problem), v=v), A, dt)
     return replace(step, active=np.zeros(problem.surface.count, dtype=bool))
@@ -85,14 +87,20 @@ def test_an_answer_near_the_tolerance_is_corrected(name: str) -> None:
     """Spoilt by 1e-7 it is right to a hundredth of the tolerance after three corrections at most, with the same contact
     set; a clean answer is left as it is to the last digit."""
     given, law, solver = CASES[name]
-    problem = replace(shaken_wall(COMM, contacts=None, **given), **({"friction": law} if law else {}))
+    problem = replace(
+        shaken_wall(COMM, contacts=None, **given), **({"friction": law} if law else {})
+    )
     step = pressed(problem, ZienkiewiczWoodTaylor(), 2e-3)
-    clean, certificate, _ = CertifiedSolver(problem, step.A, step.scale, [solver], TOLERANCE).solve(step)
+    clean, certificate, _ = CertifiedSolver(problem, step.A, step.scale, [solver], TOLERANCE).solve(
+        step
+    )
     again = solver.prepare(step.A, problem.surface, step.scale).solve(step)
     assert certificate.worst < 1e-12 and 0 < clean.active.sum() < len(clean.active)
     assert np.array_equal(clean.x, again.x) and np.array_equal(clean.r_n, again.r_n)
     wrong = Spoiling(solver, 1e-7)
-    result, certificate, escalated = CertifiedSolver(problem, step.A, step.scale, [wrong], TOLERANCE).solve(step)
+    result, certificate, escalated = CertifiedSolver(
+        problem, step.A, step.scale, [wrong], TOLERANCE
+    ).solve(step)
     assert kkt_residual(step, spoilt(step, clean, 1e-7)).worst > 10.0 * TOLERANCE
     assert certificate.worst <= NEAR * TOLERANCE and not escalated and 1 < len(wrong.asked) <= 4
     assert max_over_ranks(COMM, result.x - clean.x) < 1e-10 * max_over_ranks(COMM, clean.x)

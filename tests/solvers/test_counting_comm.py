@@ -55,8 +55,7 @@ class Traffic:
 
 @pytest.fixture
 def traffic(monkeypatch: pytest.MonkeyPatch) -> Traffic:
-    """From ``begin`` on all problems are large, and factors and gathered contact arrays are refused, on one rank too.
-    """
+    """From ``begin`` on all problems are large, and factors and gathered contact arrays are refused, on one rank too."""
     found = Traffic()
 
     def refuse(owner: Any, name: str) -> None:
@@ -68,7 +67,9 @@ def traffic(monkeypatch: pytest.MonkeyPatch) -> Traffic:
     def counted(operation: Any) -> Any:
         def count(comm: Any, value: Any) -> Any:
             found.outside += not found.solving
-            found.sizes.append(value.size if isinstance(value, np.ndarray) else len(pickle.dumps(value)) // 8)
+            found.sizes.append(
+                value.size if isinstance(value, np.ndarray) else len(pickle.dumps(value)) // 8
+            )
             return operation(comm, value)
 
         return count
@@ -123,7 +124,11 @@ def test_a_step_and_its_certificate(kind: str, traffic: Traffic) -> None:
     assert traffic.small and traffic.products == made
     sent = len(traffic.sizes)
     assert kkt_residual(step, result).worst <= 1e-9
-    assert traffic.small and traffic.products == made + 2 and len(traffic.sizes) == sent + (COMM.size > 1)
+    assert (
+        traffic.small
+        and traffic.products == made + 2
+        and len(traffic.sizes) == sent + (COMM.size > 1)
+    )
 
 
 # name -> problem, scheme, products a step outside the solver, certificate (1) and ledger (3) included
@@ -175,6 +180,8 @@ def test_a_whole_run(traffic: Traffic) -> None:
     assert problem.equations.rows >= 0
     traffic.begin()
     record = [Energy()]
-    solution = vc.simulate(problem, solver=vc.Iterative(), dt=BOX_DT, steps=3, record=record, progress=False)
+    solution = vc.simulate(
+        problem, solver=vc.Iterative(), dt=BOX_DT, steps=3, record=record, progress=False
+    )
     assert traffic.small and solution.facts["steps"] == 3
     assert np.isnan(solution.facts["seconds_per_linear_step"])

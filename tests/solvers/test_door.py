@@ -46,7 +46,9 @@ class Own:
         return np.where(bad, value, sound)
 
     def limit(self, r_n: Any, weights: Any, scale: float) -> Any:
-        return self._there(self.cohesion, 0.0) * weights * scale + self.slope(weights) * np.maximum(r_n, 0.0)
+        return self._there(self.cohesion, 0.0) * weights * scale + self.slope(weights) * np.maximum(
+            r_n, 0.0
+        )
 
     def slope(self, weights: Any) -> Any:
         return self._there(self.slope_, 0.3)
@@ -57,7 +59,9 @@ class Own:
 
 def body(d: int, **given: Any) -> Any:
     """A block that slides as it falls, and its contact surface."""
-    mesh, tags = fem.build_mesh(meshes.BlockMesh(lengths=(2.0, 1.0, 1.0)[:d], divisions=(4, 2, 1)[:d]), COMM)
+    mesh, tags = fem.build_mesh(
+        meshes.BlockMesh(lengths=(2.0, 1.0, 1.0)[:d], divisions=(4, 2, 1)[:d]), COMM
+    )
     soft = vc.LinearElastic(E=1.0e7, nu=0.3, rho=1000.0)
     system = fem.assemble(mesh, soft, initial_velocity=(1.0, -1.0, 0.2)[:d], **given)
     plane = vc.HalfSpace((0.0, 0.0, 0.0)[:d], (0.0, 1.0, 0.0)[:d])
@@ -78,18 +82,25 @@ METHODS = {
     "iterative": vc.Iterative(),
     "automatic": vc.Automatic(),
 }
-SCHEMES = {one.__name__: one for one in (vc.Trapezoidal, vc.MoreauJean, vc.ContactStabilisedNewmark, vc.Midpoint)}
+SCHEMES = {
+    one.__name__: one
+    for one in (vc.Trapezoidal, vc.MoreauJean, vc.ContactStabilisedNewmark, vc.Midpoint)
+}
 
 
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("solver", METHODS)
-@pytest.mark.parametrize("wrong", [{"slope_": -0.1}, {"cohesion": -1e3}, {"slope_": NAN}, {"cohesion": math.inf}])
+@pytest.mark.parametrize(
+    "wrong", [{"slope_": -0.1}, {"cohesion": -1e3}, {"slope_": NAN}, {"cohesion": math.inf}]
+)
 def test_limits_of_friction_below_zero(wrong, solver, d):
     """At one point only, with its place and the time, of every solver: none begins to iterate."""
     system, surface = body(d)
     law = Own(x=1.2, points=surface.points, **wrong)
     name = "slope" if "slope_" in wrong else r"limit\(0\)"
-    with pytest.raises(InputError, match=rf"Own: {name} is (-0.1|nan|-[\d.]+|inf) at \(1.5, 0.*and t = 0(.0004)? s"):
+    with pytest.raises(
+        InputError, match=rf"Own: {name} is (-0.1|nan|-[\d.]+|inf) at \(1.5, 0.*and t = 0(.0004)? s"
+    ):
         steps(ContactProblem(system, surface, friction=law), solver=METHODS[solver])
     right = Own(points=surface.points)
     assert len(steps(ContactProblem(system, surface, friction=right), solver=METHODS[solver])) == 6
@@ -101,8 +112,14 @@ def test_limits_of_friction_that_turn_negative_with_the_slip_rate(scheme, solver
     """A law is asked again and again in a step, and looked at every time."""
     system, surface = body(2)
     law = Own(slope_=-0.1, points=surface.points, rated=True)
-    with pytest.raises(InputError, match=r"Own: slope is -0.1 at .* and t = [\d.]+ s; a friction limit is zero or"):
-        steps(ContactProblem(system, surface, friction=law), scheme=SCHEMES[scheme](), solver=METHODS[solver])
+    with pytest.raises(
+        InputError, match=r"Own: slope is -0.1 at .* and t = [\d.]+ s; a friction limit is zero or"
+    ):
+        steps(
+            ContactProblem(system, surface, friction=law),
+            scheme=SCHEMES[scheme](),
+            solver=METHODS[solver],
+        )
 
 
 def test_a_limit_of_another_shape():
@@ -110,14 +127,20 @@ def test_a_limit_of_another_shape():
     system, surface = body(2)
     law = Own(points=surface.points)
     object.__setattr__(law, "slope", lambda weights: 0.3)
-    with pytest.raises(InputError, match=r"Own: slope is 0.3 at t = 0(.0004)? s; return \d+ real numbers"):
+    with pytest.raises(
+        InputError, match=r"Own: slope is 0.3 at t = 0(.0004)? s; return \d+ real numbers"
+    ):
         steps(ContactProblem(system, surface, friction=law))
 
 
 def test_laws_of_the_package_refuse_when_they_are_made():
     """So that nothing has to be asked in a step."""
-    for make in (lambda: vc.Coulomb(-0.1), lambda: vc.Coulomb([0.1, NAN]), lambda: vc.Tresca(-1.0),
-                 lambda: vc.Tresca(math.inf)):
+    for make in (
+        lambda: vc.Coulomb(-0.1),
+        lambda: vc.Coulomb([0.1, NAN]),
+        lambda: vc.Tresca(-1.0),
+        lambda: vc.Tresca(math.inf),
+    ):
         with pytest.raises(InputError, match="zero or a positive finite number"):
             make()
     assert vc.Coulomb.never_negative and vc.Tresca.never_negative and vc.Frictionless.never_negative
@@ -125,8 +148,10 @@ def test_laws_of_the_package_refuse_when_they_are_made():
 
 def of_the_user(value: float) -> Any:
     """A history that is no number from the third step on."""
+
     def history(t: float) -> float:
         return value if t > 1e-3 else 1.0
+
     return history
 
 
@@ -136,7 +161,9 @@ def of_the_user(value: float) -> Any:
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of numpy, for infinity times zero
 def test_histories_that_are_no_number(value, d, solver):
     """Of an own history, with its name, its time and the step."""
-    mesh, tags = fem.build_mesh(meshes.BlockMesh(lengths=(2.0, 1.0, 1.0)[:d], divisions=(4, 2, 1)[:d]), COMM)
+    mesh, tags = fem.build_mesh(
+        meshes.BlockMesh(lengths=(2.0, 1.0, 1.0)[:d], divisions=(4, 2, 1)[:d]), COMM
+    )
     load = fem.Traction(tags["right"], (1e3, 0.0, 0.0)[:d], history=of_the_user(value))
     system = fem.assemble(mesh, vc.LinearElastic(E=1.0e7, nu=0.3, rho=1000.0), loads=load)
     surface = fem.contact_surface(system, tags["left"])
@@ -165,7 +192,9 @@ class Shaking:
 def test_an_excitation_that_is_no_number(scheme):
     """Its class is named, with the time at which the scheme asked."""
     system, surface = body(2)
-    with pytest.raises(StepFailure, match=r"the load of step [34] .*, as Shaking is nan at t = 0.001\d* s"):
+    with pytest.raises(
+        StepFailure, match=r"the load of step [34] .*, as Shaking is nan at t = 0.001\d* s"
+    ):
         steps(ContactProblem(system, surface, excitation=Shaking()), scheme=SCHEMES[scheme]())
 
 
@@ -177,7 +206,9 @@ def test_gaps_slips_and_states_that_are_no_numbers():
         return lambda t: np.full(shape, NAN if t > 1e-3 else 0.0)
 
     moved = replace(surface, motion=late(surface.count))
-    with pytest.raises(StepFailure, match="the gap of step 3 at t = 0.0012 s contains NaN or infinite .*everywhere"):
+    with pytest.raises(
+        StepFailure, match="the gap of step 3 at t = 0.0012 s contains NaN or infinite .*everywhere"
+    ):
         steps(ContactProblem(system, moved))
     slid = replace(surface, slide=late(surface.tangents.shape))
     with pytest.raises(StepFailure, match="the slip of step 3 at t = 0.0012 s contains NaN"):
@@ -200,7 +231,10 @@ class Wild(vc.Trapezoidal):
 def test_the_guess_of_a_scheme():
     """The place is told, as one number is wrong only."""
     system, surface = body(2)
-    with pytest.raises(StepFailure, match=r"the guess of step 1 at t = 0.0004 s contains NaN or infinite values at \("):
+    with pytest.raises(
+        StepFailure,
+        match=r"the guess of step 1 at t = 0.0004 s contains NaN or infinite values at \(",
+    ):
         steps(ContactProblem(system, surface), scheme=Wild())
 
 
@@ -215,7 +249,9 @@ def test_matrices_with_entries_that_are_no_numbers(solver, name):
         mat.setValue(last - 1, last - 2 if last - 2 >= first else last - 1, NAN)
     mat.assemble()
     other = system.changed(**{name: PetscMatrix(mat)})
-    with pytest.raises(InputError, match=rf"the matrix of the steps \({name}\) has NaN or infinite entries at \("):
+    with pytest.raises(
+        InputError, match=rf"the matrix of the steps \({name}\) has NaN or infinite entries at \("
+    ):
         steps(ContactProblem(other, surface), scheme=vc.MoreauJean(), solver=METHODS[solver])
     if name == "K":
         with pytest.raises(InputError, match=r"the matrix of the steps \(K\) has NaN"):
@@ -231,7 +267,9 @@ def test_matrices_of_arrays():
     K[2, 3] = NAN
     other = system.changed(K=SerialMatrix(K))
     problem = ContactProblem(other, vc.contact_points(system, [5], [1.0]))
-    with pytest.raises(InputError, match=r"the matrix of the steps \(K\) has NaN or infinite entries at \(0.4\)"):
+    with pytest.raises(
+        InputError, match=r"the matrix of the steps \(K\) has NaN or infinite entries at \(0.4\)"
+    ):
         steps(problem)
 
 
@@ -244,7 +282,9 @@ def test_boundary_elements():
     for law in (Own(slope_=-0.1, points=points), Own(cohesion=NAN, points=points)):
         wrong = replace(contact, friction=law)
         for go in (march_contact, SpaceTimeUzawa().solve):
-            with pytest.raises(InputError, match="a friction limit is zero or a positive finite number"):
+            with pytest.raises(
+                InputError, match="a friction limit is zero or a positive finite number"
+            ):
                 go(wrong)
     u_free = contact.compliance.u_free.copy()
     u_free[2, 0] = NAN

@@ -53,8 +53,13 @@ def rough(order: tuple[int, ...] = (1, 0, 2)) -> ContactProblem:
     return replace(p, surface=surface)
 
 
-def reports(p: ContactProblem, scheme: Any = SCHEME, steps: int = 100, solver: Any = None) -> list[Report]:
-    return [report for _, report in march(p, scheme=scheme, solver=solver or Condensed(), dt=DT, steps=steps)]
+def reports(
+    p: ContactProblem, scheme: Any = SCHEME, steps: int = 100, solver: Any = None
+) -> list[Report]:
+    return [
+        report
+        for _, report in march(p, scheme=scheme, solver=solver or Condensed(), dt=DT, steps=steps)
+    ]
 
 
 def test_delassus_operator_from_its_definition() -> None:
@@ -95,7 +100,9 @@ def test_the_order_of_conditions_has_no_effect() -> None:
         np.testing.assert_allclose(b.new.r_t, a.new.r_t[[1, 0, 2]], rtol=0.0, atol=1e-11)
 
 
-@pytest.mark.parametrize(("scheme", "mass"), [(SCHEME, ConsistentMass()), (Trapezoidal(), Redistributed())])
+@pytest.mark.parametrize(
+    ("scheme", "mass"), [(SCHEME, ConsistentMass()), (Trapezoidal(), Redistributed())]
+)
 def test_friction_on_springs(scheme: Any, mass: Any) -> None:
     """A compliant support rubs under the force of its springs; V9.7 is in the ledger tests."""
     p = problem(mass=mass)
@@ -104,7 +111,9 @@ def test_friction_on_springs(scheme: Any, mass: Any) -> None:
     assert len(closed) > 50
     for report in closed:
         assert report.certificate.worst <= 1e-12
-        assert report.new.u[1] == pytest.approx(0.2 * report.new.r_n[0], rel=1e-9)  # u_n = -u_y of the base
+        assert report.new.u[1] == pytest.approx(
+            0.2 * report.new.r_n[0], rel=1e-9
+        )  # u_n = -u_y of the base
         assert report.new.r_t[0, 0] == pytest.approx(0.4 * report.new.r_n[0], rel=1e-12)
 
 
@@ -122,7 +131,11 @@ def test_newton_that_wanders_is_led_back() -> None:
     rescued = 0
     for seed in range(60):
         G, q, bilateral = small(seed, 10, 3)
-        result = FrictionNewton(max_iterations=2).prepare(G, bilateral).solve(q, np.zeros(10), np.full(10, 3.0))
+        result = (
+            FrictionNewton(max_iterations=2)
+            .prepare(G, bilateral)
+            .solve(q, np.zeros(10), np.full(10, 3.0))
+        )
         assert result.residual <= TOLERANCE
         rescued += result.iterations > len(result.history)
     assert rescued > 0
@@ -143,7 +156,9 @@ def test_sweeps_leave_little_to_newton(monkeypatch: pytest.MonkeyPatch, d: int) 
             patched.setattr(newton, "library", lambda comm: None)
             alone = FrictionNewton().prepare(G, bilateral).solve(*given)
         np.testing.assert_allclose(found.r, alone.r, rtol=0.0, atol=1e-9 * np.abs(alone.r).max())
-        assert np.array_equal(found.active, alone.active) and np.array_equal(found.stick, alone.stick)
+        assert np.array_equal(found.active, alone.active) and np.array_equal(
+            found.stick, alone.stick
+        )
 
 
 def test_without_an_inverse_in_single_precision_sweeps_go_on() -> None:

@@ -25,8 +25,13 @@ from vi_contact.solvers.normal.active_set import ActiveSet
 
 pytestmark = pytest.mark.serial
 METHODS = [
-    FrictionNewton(), NSGS(), FixedPoint(), FixedPoint(tresca=NSGS()),
-    FixedPoint(extrapolation=Anderson()), GivenForces(), GivenForces(extrapolation=Anderson()),
+    FrictionNewton(),
+    NSGS(),
+    FixedPoint(),
+    FixedPoint(tresca=NSGS()),
+    FixedPoint(extrapolation=Anderson()),
+    GivenForces(),
+    GivenForces(extrapolation=Anderson()),
 ]
 NAMES = ["newton", "nsgs", "fixed", "fixed nsgs", "anderson", "given", "given anderson"]
 
@@ -58,7 +63,12 @@ def _admissible(r: Array, w: Array, state: Any, G: Array, cohesion: Array, slope
     tiny = 1e-10 * np.abs(r * size).max()
     for i, (kind, side) in enumerate(state):
         limit = cohesion[i] + slope[i] * max(r[i, 0], 0.0)
-        gap, way, r_n, r_t = w[i, 0] / size[i, 0], w[i, 1] / size[i, 1], r[i, 0] * size[i, 0], r[i, 1] * size[i, 1]
+        gap, way, r_n, r_t = (
+            w[i, 0] / size[i, 0],
+            w[i, 1] / size[i, 1],
+            r[i, 0] * size[i, 0],
+            r[i, 1] * size[i, 1],
+        )
         good = gap >= -tiny if kind == 0 else (r_n >= -tiny if kind == 1 else r_n <= tiny)
         good &= abs(r_t) <= limit * size[i, 1] + tiny if side == 0 else side * way <= tiny
         if not good:
@@ -93,7 +103,9 @@ def test_two_dimensions_against_enumeration(method: Any, law: str) -> None:
         (G, q, bilateral), cohesion, slope, solutions = enumeration(seed, law)
         result = method.prepare(G, bilateral).solve(q, cohesion, slope)
         scale = max(energy_norm(result.r, G), 1e-300)
-        assert solutions and all(energy_norm(result.r - one, G) <= 1e-9 * scale for one in solutions)
+        assert solutions and all(
+            energy_norm(result.r - one, G) <= 1e-9 * scale for one in solutions
+        )
         contacts += int(result.active.sum())
     assert contacts > 25
 
@@ -107,14 +119,18 @@ def test_methods_agree(d: int, mu: float) -> None:
     for seed in range(mu == 0.8, 12, 2):
         m = 1 + seed
         G, q, bilateral = small(100 + seed, m, d)
-        results = [method.prepare(G, bilateral).solve(q, np.zeros(m), np.full(m, mu)) for method in METHODS]
+        results = [
+            method.prepare(G, bilateral).solve(q, np.zeros(m), np.full(m, mu)) for method in METHODS
+        ]
         scale = max(energy_norm(results[0].r, G), 1e-300)
         for other in results[1:]:
             assert energy_norm(other.r - results[0].r, G) <= 1e-9 * scale
             assert np.array_equal(other.active, results[0].active)
             assert np.array_equal(other.stick, results[0].stick)
         r = results[0].r
-        assert np.all(np.linalg.norm(r[:, 1:], axis=1) <= mu * np.maximum(r[:, 0], 0.0) * (1.0 + 4e-16))
+        assert np.all(
+            np.linalg.norm(r[:, 1:], axis=1) <= mu * np.maximum(r[:, 0], 0.0) * (1.0 + 4e-16)
+        )
         assert np.all(r[~bilateral, 0] >= 0.0)
         sticking += int(results[0].stick.sum())
         slipping += int((results[0].active & ~results[0].stick & (r[:, 0] > 0.0)).sum())
@@ -212,7 +228,9 @@ def test_places_that_are_left_solve_the_problem_too(d: int, held: float, monkeyp
         q[:, 0] = -np.abs(np.where(np.isinf(q[:, 0]), 1.0, q[:, 0]))
         for large in (10**6, 1):
             monkeypatch.setattr(friction_linear, "LARGE", large)
-            results.append(FrictionNewton().prepare(G, bilateral).solve(q, np.full(12, held), np.full(12, 0.6)))
+            results.append(
+                FrictionNewton().prepare(G, bilateral).solve(q, np.full(12, held), np.full(12, 0.6))
+            )
         assert energy_norm(results[1].r - results[0].r, G) <= 1e-12 * energy_norm(results[0].r, G)
         assert np.array_equal(results[0].stick, results[1].stick) and results[1].residual <= 1e-13
     assert any(len(matrix) for matrix in rests)
@@ -224,7 +242,12 @@ def test_newton_is_exact_in_few_steps_from_any_guess() -> None:
         G, q, bilateral = small(seed, 10, 2)
         rng = np.random.default_rng(seed)
         prepared = FrictionNewton().prepare(G, bilateral)
-        for guess in (None, np.zeros(10, dtype=bool), np.ones(10, dtype=bool), rng.random(10) < 0.5):
+        for guess in (
+            None,
+            np.zeros(10, dtype=bool),
+            np.ones(10, dtype=bool),
+            rng.random(10) < 0.5,
+        ):
             result = prepared.solve(q, np.zeros(10), np.full(10, 0.3), guess)
             assert result.residual <= 1e-13 and result.iterations <= 8
 
@@ -254,7 +277,11 @@ def test_a_point_that_slips_a_little_does_not_stick(method: Any) -> None:
 def contraction(result: FrictionResult) -> float:
     """Return the mean factor between changes of the thresholds above rounding (1e-10 of the first); NaN below two."""
     changes = [change for change in result.history if change > 1e-10 * result.history[0]]
-    return float((changes[-1] / changes[0]) ** (1.0 / (len(changes) - 1))) if len(changes) > 1 else float("nan")
+    return (
+        float((changes[-1] / changes[0]) ** (1.0 / (len(changes) - 1)))
+        if len(changes) > 1
+        else float("nan")
+    )
 
 
 def test_fixed_point_contracts_faster_for_less_friction() -> None:
@@ -277,10 +304,21 @@ def test_extrapolation_shortens_fixed_points() -> None:
             for seed in range(16):
                 m, d = 1 + seed % 8, 2 + seed % 2
                 G, q, bilateral = small(100 + seed, m, d)
-                spent += kind(extrapolation=way).prepare(G, bilateral).solve(q, np.zeros(m), np.full(m, 0.5)).iterations
+                spent += (
+                    kind(extrapolation=way)
+                    .prepare(G, bilateral)
+                    .solve(q, np.zeros(m), np.full(m, 0.5))
+                    .iterations
+                )
             counts.append(spent)
             G, q, bilateral = small(112, 1, 2)
-            assert kind(extrapolation=way).prepare(G, bilateral).solve(q, np.zeros(1), np.full(1, 0.8)).iterations < 150
+            assert (
+                kind(extrapolation=way)
+                .prepare(G, bilateral)
+                .solve(q, np.zeros(1), np.full(1, 0.8))
+                .iterations
+                < 150
+            )
         assert counts[1] < 0.7 * counts[0]
 
 
@@ -301,7 +339,11 @@ def test_mirror_image() -> None:
     turn = np.tile([1.0, -1.0], 7)
     mu = np.full(7, 0.4)
     one = FrictionNewton().prepare(G, bilateral).solve(q, np.zeros(7), mu)
-    other = FrictionNewton().prepare(turn[:, None] * G * turn, bilateral).solve(q * [1.0, -1.0], np.zeros(7), mu)
+    other = (
+        FrictionNewton()
+        .prepare(turn[:, None] * G * turn, bilateral)
+        .solve(q * [1.0, -1.0], np.zeros(7), mu)
+    )
     assert np.allclose(other.r, one.r * [1.0, -1.0], rtol=0.0, atol=1e-13 * np.abs(one.r).max())
 
 

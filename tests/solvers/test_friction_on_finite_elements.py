@@ -49,13 +49,20 @@ def thrown_block(comm: Any, *, angle: float = 0.3) -> ContactProblem:
 
 def thrown(comm: Any, d: int, friction: FrictionLaw, mass: Any) -> ContactProblem:
     """The block or the box."""
-    problem = thrown_block(comm) if d == 2 else thrown_box(comm, angle=0.3, simplices=True, divisions=(4, 5, 3))
+    problem = (
+        thrown_block(comm)
+        if d == 2
+        else thrown_box(comm, angle=0.3, simplices=True, divisions=(4, 5, 3))
+    )
     return replace(problem, friction=friction, mass=mass)
 
 
 def reports(problem: ContactProblem, scheme: Any, **solver: Any) -> list[Report]:
     return [
-        report for _, report in march(problem, scheme=scheme, solver=Condensed(**solver), dt=BOX_DT, steps=STEPS)
+        report
+        for _, report in march(
+            problem, scheme=scheme, solver=Condensed(**solver), dt=BOX_DT, steps=STEPS
+        )
     ]
 
 
@@ -119,7 +126,10 @@ def test_prescribed_tangents_carry_no_friction(comm: Any) -> None:
     mesh, tags = block(comm, lengths=(1.5, 1.0, 1.2), divisions=(3, 2, 2))
     rollers = Prescribed(tags["front"], components=(2,))
     system = assemble(
-        mesh, material, prescribed=[rollers], loads=BodyForce((0.0, -9.81e3, 0.0)),
+        mesh,
+        material,
+        prescribed=[rollers],
+        loads=BodyForce((0.0, -9.81e3, 0.0)),
         initial_velocity=lambda x: np.outer(x[:, 1] + 1.0, [0.5, -1.0, 0.0]),
     )
     plane = HalfSpace(point=(0.0, -1e-3, 0.0), normal=(0.0, 1.0, 0.0))

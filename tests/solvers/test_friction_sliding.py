@@ -35,14 +35,22 @@ from vi_contact.solvers.volume import ReducedNewton
 G, SLOPE = 9.81, pi / 6.0
 MIDPOINT = vc.ZienkiewiczWoodTaylor()
 METHODS = [
-    solvers.NSGS(), solvers.FixedPoint(),
+    solvers.NSGS(),
+    solvers.FixedPoint(),
     solvers.FixedPoint(extrapolation=solvers.Anderson()),
-    solvers.GivenForces(), solvers.GivenForces(extrapolation=solvers.Anderson()),
+    solvers.GivenForces(),
+    solvers.GivenForces(extrapolation=solvers.Anderson()),
 ]
 
 
 def resting(
-    comm: Any, friction: FrictionLaw, *, scale: float = 1.0, angle: float = SLOPE, cells: int = 4, **more: Any
+    comm: Any,
+    friction: FrictionLaw,
+    *,
+    scale: float = 1.0,
+    angle: float = SLOPE,
+    cells: int = 4,
+    **more: Any,
 ) -> ContactProblem:
     """A soft block of 2 x 1 m (times scale) on a slope, vibrations damped within a few periods.
 
@@ -61,7 +69,9 @@ def along(problem: ContactProblem, x: Array, angle: float = SLOPE) -> float:
     """Mean over the mass of a vector's component down the slope."""
     system = problem.equations
     total = system.algebra.comm.sum(system.influence.T @ (system.M @ x))
-    mass = system.algebra.comm.sum(np.array([np.sum(system.influence[:, 0] * (system.M @ system.influence[:, 0]))]))
+    mass = system.algebra.comm.sum(
+        np.array([np.sum(system.influence[:, 0] * (system.M @ system.influence[:, 0]))])
+    )
     return float(-total @ turned((1.0, 0.0), angle) / mass[0])
 
 
@@ -76,19 +86,33 @@ def test_incline_sticks(comm: Any, scale: float) -> None:
     run = list(march(problem, scheme=MIDPOINT, dt=0.01 * sqrt(scale), steps=50, state=start))
     assert max(report.certificate.worst for _, report in run) <= 1e-9
     state = run[-1][0]
-    moved = np.abs(problem.surface.everywhere(problem.surface.tangential_values(state.u - start.u))).max()
+    moved = np.abs(
+        problem.surface.everywhere(problem.surface.tangential_values(state.u - start.u))
+    ).max()
     assert moved <= 1e-8 * scale
     with pytest.raises(InputError, match="no static equilibrium"):
         static_equilibrium(resting(comm, Coulomb(0.5), scale=scale), solver=Condensed())
 
 
-def slid(comm: Any, scale: float, *, cells: int = 4, steps: int = 300) -> tuple[float, float, Array]:
+def slid(
+    comm: Any, scale: float, *, cells: int = 4, steps: int = 300
+) -> tuple[float, float, Array]:
     """mu = 0.5: (acceleration of the centre of mass, friction force over weight) once vibrations have died out, means
     of 50 steps over which the ringing of contact nodes cancels, and the way in block heights after every 50 steps."""
-    problem, dt, rows = resting(comm, Coulomb(0.5), scale=scale, cells=cells), 0.01 * sqrt(scale), []
+    problem, dt, rows = (
+        resting(comm, Coulomb(0.5), scale=scale, cells=cells),
+        0.01 * sqrt(scale),
+        [],
+    )
     for state, report in march(problem, scheme=MIDPOINT, dt=dt, steps=steps):
         assert report.certificate.worst <= 1e-9
-        rows.append((along(problem, state.v), along(problem, state.u) / scale, abs(comm.allreduce(state.r_t.sum()))))
+        rows.append(
+            (
+                along(problem, state.v),
+                along(problem, state.u) / scale,
+                abs(comm.allreduce(state.r_t.sum())),
+            )
+        )
     v, u, force = np.array(rows).T
     friction = force[-50:].mean() / (2.0e3 * scale**2 * G)
     return float((v[-1] - v[-51]) / (50 * dt)), float(friction), u[49::50]
@@ -120,7 +144,9 @@ PERIOD = 100  # steps
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize(("friction", "cycles"), zip(LAWS, (9, 6), strict=True), ids=["constant", "slip rate"])
+@pytest.mark.parametrize(
+    ("friction", "cycles"), zip(LAWS, (9, 6), strict=True), ids=["constant", "slip rate"]
+)
 def test_loop_area_is_friction_work(comm: Any, friction: FrictionLaw, cycles: int) -> None:
     """A block on a table that shakes with 0.4 g and 2 Hz. The last cycle: the area inside the closed loops of
     tangential reaction over slip, point by point, is the friction work of the ledger, to 1e-8. The whole run: the work
@@ -164,7 +190,9 @@ def test_all_methods_agree_on_a_finite_element_step(comm: Any, d: int) -> None:
         steps = 40
     else:
         problem, steps = thrown_box(comm, angle=0.3, simplices=True, divisions=(4, 5, 3)), 40
-        problem = ContactProblem(problem.system, problem.surface, friction=Coulomb(0.3), mass=ConsistentMass())
+        problem = ContactProblem(
+            problem.system, problem.surface, friction=Coulomb(0.3), mass=ConsistentMass()
+        )
     reports = [report for _, report in march(problem, scheme=MIDPOINT, dt=1e-3, steps=steps)]
     report = max(reports, key=lambda report: comm.allreduce(int(report.new.active.sum())))
     step, one = report.step, report.result
@@ -173,7 +201,9 @@ def test_all_methods_agree_on_a_finite_element_step(comm: Any, d: int) -> None:
     everywhere = problem.surface.everywhere
     r_n, r_t = everywhere(one.r_n), everywhere(one.r_t)
     for method in METHODS:
-        other = Condensed(friction_method=method).prepare(step.A, step.surface, step.scale).solve(step)
+        other = (
+            Condensed(friction_method=method).prepare(step.A, step.surface, step.scale).solve(step)
+        )
         assert core.kkt_residual(step, other).worst <= 1e-9
         assert np.abs(other.x - one.x).max(initial=0.0) <= 1e-9 * moved
         assert np.abs(everywhere(other.r_n) - r_n).max() <= 1e-9 * r_n.max()
@@ -193,9 +223,12 @@ def test_ranks_agree_on_friction_of_the_slip_rate(comm: Any) -> None:
     assert np.abs(ends[0] - ends[1]).max() <= 1e-10 * np.abs(ends[1]).max()
 
 
-@pytest.mark.parametrize("solver", [Condensed(), solvers.Iterative(), solvers.Volume(ReducedNewton())], ids=repr)
+@pytest.mark.parametrize(
+    "solver", [Condensed(), solvers.Iterative(), solvers.Volume(ReducedNewton())], ids=repr
+)
 def test_a_law_that_fails_on_one_rank_stops_all(comm: Any, solver: Any) -> None:
     """At rest, before anything is computed, and once points slide; with the line of the user's function."""
+
     def broken(speed: Array, *, from_speed: float) -> Array:
         if comm.rank == comm.size - 1 and np.any(speed >= from_speed):
             raise ZeroDivisionError("no such rate")
@@ -203,6 +236,9 @@ def test_a_law_that_fails_on_one_rank_stops_all(comm: Any, solver: Any) -> None:
 
     for least in (0.0, 1e-3):
         law = SlipRateCoulomb(partial(broken, from_speed=least))
-        with pytest.raises(InputError, match=r"ended in ZeroDivisionError: no such rate .test_friction_sliding.py, li"):
+        with pytest.raises(
+            InputError,
+            match=r"ended in ZeroDivisionError: no such rate .test_friction_sliding.py, li",
+        ):
             for _ in march(resting(comm, law), scheme=MIDPOINT, solver=solver, dt=0.01, steps=10):
                 pass

@@ -19,8 +19,16 @@ def membrane_schur() -> tuple[np.ndarray, np.ndarray]:
     rows, columns = 12, 8
     chain = np.diag(np.full(rows, 2.0)) - np.eye(rows, k=1) - np.eye(rows, k=-1)
     chain[-1, -1] = 1.0
-    across = np.diag(np.r_[1.0, np.full(columns - 2, 2.0), 1.0]) - np.eye(columns, k=1) - np.eye(columns, k=-1)
-    K = np.kron(chain, np.eye(columns)) + np.kron(np.eye(rows), across) + 0.05 * np.eye(rows * columns)
+    across = (
+        np.diag(np.r_[1.0, np.full(columns - 2, 2.0), 1.0])
+        - np.eye(columns, k=1)
+        - np.eye(columns, k=-1)
+    )
+    K = (
+        np.kron(chain, np.eye(columns))
+        + np.kron(np.eye(rows), across)
+        + 0.05 * np.eye(rows * columns)
+    )
     F = np.random.default_rng(0).normal(size=rows * columns)
     contact = np.zeros(rows * columns, dtype=bool)
     contact[columns - 1 :: columns] = True
@@ -88,7 +96,9 @@ def test_strong_duality():
     rng = np.random.default_rng(2)
     for _ in range(20):
         problem = mixed(rng, 10)
-        primal, dual = (solve(Hildreth(primal=form, record=True), problem) for form in (True, False))
+        primal, dual = (
+            solve(Hildreth(primal=form, record=True), problem) for form in (True, False)
+        )
         assert primal.history[-1] == pytest.approx(-dual.history[-1], rel=1e-11)
         assert primal.history[-1] > 0.0
 
@@ -102,13 +112,18 @@ def test_diagonal_problem_ends_after_the_first_sweep():
     problem = LCP(np.diag([1.0, 2.0, 4.0]), np.array([-1.0, -2.0, 1.0]), np.zeros(3, dtype=bool))
     for primal in (True, False):
         result = solve(Hildreth(primal=primal), problem)
-        assert result.r.tolist() == pytest.approx([1.0, 1.0, 0.0], rel=1e-15) and result.iterations <= 2
+        assert (
+            result.r.tolist() == pytest.approx([1.0, 1.0, 0.0], rel=1e-15)
+            and result.iterations <= 2
+        )
 
 
 @pytest.mark.parametrize("primal", [True, False])
 def test_failure_tells_what_happened_and_what_to_do(primal):
     problem = generic(np.random.default_rng(4), 12)
-    with pytest.raises(StepFailure, match=r"Hildreth.*after 3 iterations with residual .*use ActiveSet"):
+    with pytest.raises(
+        StepFailure, match=r"Hildreth.*after 3 iterations with residual .*use ActiveSet"
+    ):
         solve(Hildreth(primal=primal, max_sweeps=3), problem)
     with pytest.raises(InputError, match="finite numbers"):
         solve(Hildreth(primal=primal), problem, guess=np.full(12, np.nan))

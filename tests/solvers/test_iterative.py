@@ -29,11 +29,20 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "bilateral": {"bilateral": np.arange(M) % 3 == 0},
     "springs": {"compliance": np.full(M, 0.3)},
     "stiff and soft springs": {"compliance": 10.0 ** np.linspace(-6.0, 6.0, M)},
-    "springs, rigid and bilateral": {"compliance": HALF, "bilateral": np.arange(M) < 3, "scale": 2.0},
+    "springs, rigid and bilateral": {
+        "compliance": HALF,
+        "bilateral": np.arange(M) < 3,
+        "scale": 2.0,
+    },
 }
 
 
-@pytest.fixture(params=[pytest.param(False, marks=pytest.mark.serial, id="scipy"), pytest.param(True, id="petsc")])
+@pytest.fixture(
+    params=[
+        pytest.param(False, marks=pytest.mark.serial, id="scipy"),
+        pytest.param(True, id="petsc"),
+    ]
+)
 def parallel(request: pytest.FixtureRequest) -> Iterator[bool]:
     if request.param:
         pytest.importorskip("mpi4py")
@@ -46,7 +55,10 @@ def prepared(c: Case, kind: str = "icc", **settings: Any) -> Any:
 
 def agree(c: Case, result: Any, exact: Any) -> None:
     """x and r_n to 1e-9 of their largest values, the same contact set, and the certificate of the loop."""
-    bilateral, worst = c.step.surface.everywhere(c.step.surface.bilateral), kkt_residual(c.step, result).worst
+    bilateral, worst = (
+        c.step.surface.everywhere(c.step.surface.bilateral),
+        kkt_residual(c.step, result).worst,
+    )
     result = c.whole(result)
     assert np.max(np.abs(result.x - exact.x)) <= 1e-9 * np.max(np.abs(exact.x))
     assert np.max(np.abs(result.r_n - exact.r_n), initial=0.0) <= 1e-9 * np.max(np.abs(exact.r_n))
@@ -58,7 +70,9 @@ def agree(c: Case, result: Any, exact: Any) -> None:
 @pytest.mark.parametrize("changes", [15, 0], ids=["active set", "projected gradients"])
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS.keys())
-def test_agrees_with_brute_force(parallel: bool, kind: str, changes: int, options: dict[str, Any]) -> None:
+def test_agrees_with_brute_force(
+    parallel: bool, kind: str, changes: int, options: dict[str, Any]
+) -> None:
     c = pushed_block(parallel=parallel, **options)
     exact = c.exact()
     assert 0 < np.sum(exact.active) < M
@@ -97,7 +111,10 @@ def test_nothing_happens_at_rest(parallel: bool) -> None:
 @pytest.mark.parametrize("length, force", [(1e-3, 1e6), (1e6, 1e-3)])
 def test_units_do_not_matter(parallel: bool, length: float, force: float) -> None:
     """Millimetres and meganewtons: the same dimensionless numbers and the same work."""
-    one, other = pushed_block(parallel=parallel), pushed_block(parallel=parallel, length=length, force=force)
+    one, other = (
+        pushed_block(parallel=parallel),
+        pushed_block(parallel=parallel, length=length, force=force),
+    )
     first, second = prepared(one), prepared(other)
     a, b = one.whole(first.solve(one.step)), other.whole(second.solve(other.step))
     assert np.max(np.abs(b.x / length - a.x)) <= 1e-9 * np.max(np.abs(a.x))
@@ -119,10 +136,17 @@ def test_is_deterministic_and_warm_starts(parallel: bool) -> None:
 def test_work_is_counted(parallel: bool) -> None:
     """A product for every iteration, one in the beginning and in the end, and for a set with more closed points; where
     points only open, and at springs, the residual is known. GAMG is renewed."""
-    for options, start, extra in (({}, False, 1), ({}, True, 0), ({"compliance": np.full(M, 0.3)}, False, 0)):
+    for options, start, extra in (
+        ({}, False, 1),
+        ({}, True, 0),
+        ({"compliance": np.full(M, 0.3)}, False, 0),
+    ):
         c = pushed_block(parallel=parallel, **options)
         solver = prepared(c, "gamg")
-        result, work = solver.solve(replace(c.step, active=np.full_like(c.step.active, start))), solver.work
+        result, work = (
+            solver.solve(replace(c.step, active=np.full_like(c.step.active, start))),
+            solver.work,
+        )
         assert result.iterations >= 1
         assert work.products == work.linear_iterations + extra * result.iterations + 2
         assert 0 <= work.renewals <= 4
@@ -170,7 +194,11 @@ def failing(matrix: Any, b: Any, words: str, **settings: Any) -> None:
 @pytest.mark.serial
 def test_a_driven_floating_body_is_a_sentence() -> None:
     """Two masses on one spring, pulled: nothing holds them, and no residual vanishes."""
-    failing([[1.0, -1.0], [-1.0, 1.0]], np.array([-1.0, -1.0]), "is not positive definite|broke down|stagnated")
+    failing(
+        [[1.0, -1.0], [-1.0, 1.0]],
+        np.array([-1.0, -1.0]),
+        "is not positive definite|broke down|stagnated",
+    )
 
 
 @pytest.mark.serial
@@ -193,21 +221,30 @@ def test_not_a_number_is_a_sentence() -> None:
 
 def test_history_shows_first_some_and_last() -> None:
     assert told([1.0]) == "1.0e+00" and told([]) == "none"
-    assert told([10.0 ** -i for i in range(11)]) == "1.0e+00, 1.0e-02, 1.0e-04, 1.0e-06, 1.0e-08, 1.0e-10"
+    assert (
+        told([10.0**-i for i in range(11)])
+        == "1.0e+00, 1.0e-02, 1.0e-04, 1.0e-06, 1.0e-08, 1.0e-10"
+    )
 
 
 # Settings -------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("settings, words", [
-    ({"preconditioner": "ilu"}, "unknown preconditioner 'ilu': choose one of auto, jacobi, icc, gamg"),
-    ({"tolerance": 2.0}, "tolerance is 2.0; give a relative error below 1"),
-    ({"tolerance": 0.0}, "tolerance"),
-    ({"changes": -1}, "changes"),
-    ({"patience": 0}, "patience"),
-    ({"petsc_options": "pc_type"}, "petsc_options"),
-    ({"prefix": None}, "prefix"),
-])
+@pytest.mark.parametrize(
+    "settings, words",
+    [
+        (
+            {"preconditioner": "ilu"},
+            "unknown preconditioner 'ilu': choose one of auto, jacobi, icc, gamg",
+        ),
+        ({"tolerance": 2.0}, "tolerance is 2.0; give a relative error below 1"),
+        ({"tolerance": 0.0}, "tolerance"),
+        ({"changes": -1}, "changes"),
+        ({"patience": 0}, "patience"),
+        ({"petsc_options": "pc_type"}, "petsc_options"),
+        ({"prefix": None}, "prefix"),
+    ],
+)
 def test_wrong_settings_are_told(settings: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         Iterative(**settings)
@@ -221,24 +258,38 @@ def test_petsc_options_choose_the_preconditioner(parallel: bool) -> None:
         prepared(c, "gamg", petsc_options={"pc_type": "no such thing"})
 
 
-@pytest.mark.parametrize(("kind", "options", "said"), [
-    ("jacobi", {"pc_typ": "sor"}, "Iterative(jacobi): nothing reads 'pc_typ' of petsc_options: did you mean 'pc_type'"),
-    ("icc", {"sub_pc_factor_level": 1}, "did you mean 'sub_pc_factor_levels'"),
-    ("icc", {"pc_gamg_threshold": 0.1}, "nothing reads 'pc_gamg_threshold'"),
-    ("gamg", {"pc_gamg_treshold": 0.1}, "did you mean 'pc_gamg_threshold'"),
-    ("gamg", {"ksp_type": "cg"}, "nothing reads 'ksp_type'"),
-    ("auto", {"pc_gamg_treshold": 0.1}, "did you mean 'pc_gamg_threshold'"),
-])
-def test_options_that_nothing_reads_are_refused(parallel: bool, kind: str, options: dict[str, Any], said: str) -> None:
+@pytest.mark.parametrize(
+    ("kind", "options", "said"),
+    [
+        (
+            "jacobi",
+            {"pc_typ": "sor"},
+            "Iterative(jacobi): nothing reads 'pc_typ' of petsc_options: did you mean 'pc_type'",
+        ),
+        ("icc", {"sub_pc_factor_level": 1}, "did you mean 'sub_pc_factor_levels'"),
+        ("icc", {"pc_gamg_threshold": 0.1}, "nothing reads 'pc_gamg_threshold'"),
+        ("gamg", {"pc_gamg_treshold": 0.1}, "did you mean 'pc_gamg_threshold'"),
+        ("gamg", {"ksp_type": "cg"}, "nothing reads 'ksp_type'"),
+        ("auto", {"pc_gamg_treshold": 0.1}, "did you mean 'pc_gamg_threshold'"),
+    ],
+)
+def test_options_that_nothing_reads_are_refused(
+    parallel: bool, kind: str, options: dict[str, Any], said: str
+) -> None:
     with pytest.raises(InputError) as caught:
         prepared(pushed_block(parallel=parallel), kind, petsc_options=options)
     assert said in str(caught.value)
 
 
-@pytest.mark.parametrize(("kind", "options"), [
-    ("icc", {"sub_pc_factor_levels": 1}), ("gamg", {"pc_gamg_threshold": 0.1, "mg_levels_ksp_max_it": 3}),
-    ("gamg", {"mg_coarse_sub_pc_type": "lu"}), ("auto", {"pc_gamg_threshold": 0.1, "sub_pc_factor_levels": 1}),
-])
+@pytest.mark.parametrize(
+    ("kind", "options"),
+    [
+        ("icc", {"sub_pc_factor_levels": 1}),
+        ("gamg", {"pc_gamg_threshold": 0.1, "mg_levels_ksp_max_it": 3}),
+        ("gamg", {"mg_coarse_sub_pc_type": "lu"}),
+        ("auto", {"pc_gamg_threshold": 0.1, "sub_pc_factor_levels": 1}),
+    ],
+)
 def test_options_of_parts_are_taken(parallel: bool, kind: str, options: dict[str, Any]) -> None:
     """Those of blocks and levels, read late or not at all on so few unknowns; with "auto" those of every kind."""
     c = pushed_block(parallel=parallel)
@@ -260,7 +311,9 @@ def effective(matrix: Any, ids: Any, inertia: Any = None) -> EffectiveMatrix:
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("ids", [range(8), [0, 1, 3, 4, 5, 6], [7, 1, 2, 3]], ids=["whole", "rollers", "any order"])
+@pytest.mark.parametrize(
+    "ids", [range(8), [0, 1, 3, 4, 5, 6], [7, 1, 2, 3]], ids=["whole", "rollers", "any order"]
+)
 def test_blocks_of_whole_nodes_multiply_alike(ids: Any) -> None:
     """Nodes with one of two components get the other one back, held at zero."""
     ids, rng = np.array(ids), np.random.default_rng(1)
@@ -268,14 +321,19 @@ def test_blocks_of_whole_nodes_multiply_alike(ids: Any) -> None:
     half = rng.normal(size=(n, n))
     nodewise = Nodewise(effective(half @ half.T, ids))
     layout, x = nodewise.layout, rng.normal(size=n)
-    assert layout.complete == (n == 8) and layout.size == 2 * len(np.unique(ids // 2)) == n + len(layout.missing)
+    assert layout.complete == (n == 8) and layout.size == 2 * len(np.unique(ids // 2)) == n + len(
+        layout.missing
+    )
     assert np.array_equal(layout.stripped(layout.padded(x)), x)
     for mat in (nodewise.blocks(), nodewise.entries()):
         vx, vy = mat.createVecs()
         vx.array[:] = layout.padded(x)
         mat.mult(vx, vy)
         assert mat.getBlockSize() == 2
-        assert np.max(np.abs(layout.stripped(vy.array_r) - half @ half.T @ x)) <= 1e-13 * np.abs(half).sum() ** 2
+        assert (
+            np.max(np.abs(layout.stripped(vy.array_r) - half @ half.T @ x))
+            <= 1e-13 * np.abs(half).sum() ** 2
+        )
         assert not np.any(vy.array_r[layout.missing])
 
 
@@ -288,5 +346,13 @@ def test_the_courant_number_follows_the_matrices() -> None:
     assert courant(effective(K, range(4), (0.0, M))) == np.inf
     assert np.isnan(courant(effective(K, range(4))))
     numbers = (0.1, 0.5, 0.6, 30.0, 31.0, np.inf, np.nan)
-    assert [chosen(one, modes=True) for one in numbers] == ["jacobi", "jacobi", "icc", "icc", "gamg", "gamg", "icc"]
+    assert [chosen(one, modes=True) for one in numbers] == [
+        "jacobi",
+        "jacobi",
+        "icc",
+        "icc",
+        "gamg",
+        "gamg",
+        "icc",
+    ]
     assert chosen(np.inf, modes=False) == "icc"

@@ -20,7 +20,13 @@ from volume_cases import Case, case, pushed_block
 from vi_contact.core.errors import StepFailure
 from vi_contact.core.step import StepResult
 from vi_contact.core.verify import kkt_residual
-from vi_contact.laws.friction import Coulomb, ExponentialDecay, SlipRateCoulomb, StaticKinetic, Tresca
+from vi_contact.laws.friction import (
+    Coulomb,
+    ExponentialDecay,
+    SlipRateCoulomb,
+    StaticKinetic,
+    Tresca,
+)
 from vi_contact.solvers import Iterative
 from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.volume.route import ReducedNewton, Volume
@@ -28,7 +34,12 @@ from vi_contact.solvers.volume.route import ReducedNewton, Volume
 NAMES = ["coulomb", "coulomb field", "tresca", "tresca field", "slip rate"]
 
 
-@pytest.fixture(params=[pytest.param(False, marks=pytest.mark.serial, id="scipy"), pytest.param(True, id="petsc")])
+@pytest.fixture(
+    params=[
+        pytest.param(False, marks=pytest.mark.serial, id="scipy"),
+        pytest.param(True, id="petsc"),
+    ]
+)
 def parallel(request: pytest.FixtureRequest) -> Iterator[bool]:
     if request.param:
         pytest.importorskip("mpi4py")
@@ -40,7 +51,9 @@ def prepared(c: Case, kind: str = "icc", **settings: Any) -> Any:
 
 
 def solve(c: Case, solver: Any = None) -> StepResult:
-    found = prepared(c) if solver is None else solver.prepare(c.step.A, c.step.surface, c.step.scale)
+    found = (
+        prepared(c) if solver is None else solver.prepare(c.step.A, c.step.surface, c.step.scale)
+    )
     result: StepResult = found.solve(c.step)
     return result
 
@@ -62,13 +75,17 @@ def sound(c: Case, result: StepResult) -> None:
 @pytest.mark.parametrize("law", [Coulomb(0.5), Tresca(1.0)], ids=repr)
 def test_one_point_by_hand(law: Any, push: float, pull: float) -> None:
     """A = diag(4, 2): r_n = push, r_t = pull where |pull| <= 1, else ±1, x_t = (pull - r_t)/2; open: Coulomb none."""
-    c = rubbing(case(sp.diags([4.0, 2.0]), np.array([0]), np.array([push, pull]), np.zeros(1)), law, 0.0)
+    c = rubbing(
+        case(sp.diags([4.0, 2.0]), np.array([0]), np.array([push, pull]), np.zeros(1)), law, 0.0
+    )
     result = solve(c)
     limit = 1.0 if push > 0.0 or isinstance(law, Tresca) else 0.0
     r_t = np.clip(pull, -limit, limit)
     assert result.r_n[0] == pytest.approx(max(push, 0.0), rel=1e-14)
     assert result.r_t[0, 0] == pytest.approx(r_t, rel=1e-13)
-    assert result.x == pytest.approx([min(push, 0.0) / 4.0, (pull - r_t) / 2.0], rel=1e-13, abs=1e-15)
+    assert result.x == pytest.approx(
+        [min(push, 0.0) / 4.0, (pull - r_t) / 2.0], rel=1e-13, abs=1e-15
+    )
 
 
 @pytest.mark.serial
@@ -78,12 +95,18 @@ def test_slip_direction_in_space_by_hand(law: Any) -> None:
     r_t = np.array([np.cos(0.7), np.sin(0.7)])
     slip, origin = 2.5 * r_t, np.array([0.3, -0.2])
     b = np.array([2.0, *(r_t + np.array([1.0, 3.0]) * (origin + slip))])
-    c = rubbing(case(sp.diags([4.0, 1.0, 3.0]), np.array([0]), b, np.zeros(1)), law, origin, tangents=2)
+    c = rubbing(
+        case(sp.diags([4.0, 1.0, 3.0]), np.array([0]), b, np.zeros(1)), law, origin, tangents=2
+    )
     result = solve(c)
-    assert result.r_t[0] == pytest.approx(r_t, rel=1e-9) and result.x[1:] == pytest.approx(origin + slip, rel=1e-9)
+    assert result.r_t[0] == pytest.approx(r_t, rel=1e-9) and result.x[1:] == pytest.approx(
+        origin + slip, rel=1e-9
+    )
     inside = replace(c, step=replace(c.step, b=np.array([2.0, 0.3 + 0.1, 3.0 * -0.2 - 0.2])))
     stuck = solve(inside)
-    assert np.array_equal(stuck.x[1:], origin) and stuck.r_t[0] == pytest.approx([0.1, -0.2], rel=1e-12)
+    assert np.array_equal(stuck.x[1:], origin) and stuck.r_t[0] == pytest.approx(
+        [0.1, -0.2], rel=1e-12
+    )
 
 
 # Random bodies -------------------------------------------------------------------------------------------------------
@@ -104,10 +127,18 @@ def test_agrees_with_the_condensed_route(parallel: bool, law: Any, options: dict
     assert all(total > 0 for total in np.sum(seen, axis=0))
 
 
-@pytest.mark.parametrize("kind, law", [
-    ("icc", Coulomb(0.3)), ("jacobi", Coulomb(0.8)), ("gamg", Coulomb(0.8)), ("icc", Coulomb(1.2)),
-    ("icc", Tresca((0.0, 0.1, 0.3, 0.6, 1.0, 2.0))), ("gamg", Tresca(0.1)),
-], ids=str)
+@pytest.mark.parametrize(
+    "kind, law",
+    [
+        ("icc", Coulomb(0.3)),
+        ("jacobi", Coulomb(0.8)),
+        ("gamg", Coulomb(0.8)),
+        ("icc", Coulomb(1.2)),
+        ("icc", Tresca((0.0, 0.1, 0.3, 0.6, 1.0, 2.0))),
+        ("gamg", Tresca(0.1)),
+    ],
+    ids=str,
+)
 def test_disks_agree_with_the_condensed_route(parallel: bool, kind: str, law: Any) -> None:
     """In space: the exact disk, no polygon; at most 12 Newton steps."""
     seen = []
@@ -129,9 +160,16 @@ def test_agrees_with_the_reference_in_the_volume(parallel: bool) -> None:
 
 
 @pytest.mark.two_ranks
-@pytest.mark.parametrize("mu", [
-    ExponentialDecay(0.8, 0.2, 0.5), ExponentialDecay(0.2, 0.8, 0.5), StaticKinetic(0.6, 0.4), lambda v: 0.1 + 0.2 * v,
-], ids=["weakening", "strengthening", "static and kinetic", "viscous"])
+@pytest.mark.parametrize(
+    "mu",
+    [
+        ExponentialDecay(0.8, 0.2, 0.5),
+        ExponentialDecay(0.2, 0.8, 0.5),
+        StaticKinetic(0.6, 0.4),
+        lambda v: 0.1 + 0.2 * v,
+    ],
+    ids=["weakening", "strengthening", "static and kinetic", "viscous"],
+)
 def test_rates_in_space(parallel: bool, mu: Any) -> None:
     """The coefficient of the rate that the step itself finds."""
     for seed in range(3):
@@ -156,7 +194,11 @@ def test_newton_in_circles_goes_on_with_given_limits(parallel: bool) -> None:
 @pytest.mark.two_ranks
 def test_answers_do_not_depend_on_steps_before(parallel: bool) -> None:
     """One prepared solver over many steps, and a new one for each; Tresca, Coulomb and frictionless steps mixed."""
-    cases = [random_case(law, seed=seed, parallel=parallel) for seed in range(3) for law in (Coulomb(0.4), Tresca(0.2))]
+    cases = [
+        random_case(law, seed=seed, parallel=parallel)
+        for seed in range(3)
+        for law in (Coulomb(0.4), Tresca(0.2))
+    ]
     cases.append(pushed_block(parallel=parallel, seed=3))
     first = replace(cases[0], step=replace(cases[0].step))
     solver = prepared(first, "gamg")
@@ -169,8 +211,10 @@ def test_answers_do_not_depend_on_steps_before(parallel: bool) -> None:
 @pytest.mark.parametrize("length, force", [(1e-6, 1e6), (1e6, 1e-6)])
 def test_units_do_not_matter(parallel: bool, length: float, force: float) -> None:
     """The same case in other units of length and force: the same numbers, and the same work."""
-    one, c = random_case(Coulomb(0.4), seed=4, parallel=parallel), pushed_block(
-        seed=4, parallel=parallel, length=length, force=force)
+    one, c = (
+        random_case(Coulomb(0.4), seed=4, parallel=parallel),
+        pushed_block(seed=4, parallel=parallel, length=length, force=force),
+    )
     c = rubbing(c, Coulomb(0.4), length * one.step.surface.everywhere(one.step.slip0))
     first, second = prepared(one), prepared(c)
     a, b = one.whole(first.solve(one.step)), c.whole(second.solve(c.step))
@@ -188,8 +232,13 @@ def test_the_mirrored_problem_has_the_mirrored_answer(parallel: bool) -> None:
     found = []
     for turn in (np.ones(18), mirror):
         matrix = sp.csr_matrix((root @ root.T / 18.0 + np.eye(18)) * np.outer(turn, turn))
-        c = case(matrix, np.arange(0, 18, 3), turn * (b + np.tile([0.5, 0.0, 0.0], 6)), np.full(6, 0.05),
-                 parallel=parallel)
+        c = case(
+            matrix,
+            np.arange(0, 18, 3),
+            turn * (b + np.tile([0.5, 0.0, 0.0], 6)),
+            np.full(6, 0.05),
+            parallel=parallel,
+        )
         c = rubbing(c, Coulomb(0.5), slip0 * turn[1:3], tangents=2)
         found.append(c.whole(solve(c)))
     one, other = found
@@ -209,10 +258,16 @@ def test_infinite_bounds_nothing_and_everything_opens(parallel: bool) -> None:
         agree(c, result, solve(c, Condensed()))
         assert np.any(c.whole(result).r_t[:4]) == isinstance(law, Tresca)
         toward = c.step.surface.reaction_load(np.ones_like(c.step.bound), len(c.step.b))
-        pulled = replace(c, step=replace(c.step, b=c.step.b - 50.0 * toward, active=np.ones_like(c.step.active)))
+        pulled = replace(
+            c, step=replace(c.step, b=c.step.b - 50.0 * toward, active=np.ones_like(c.step.active))
+        )
         off = solver.solve(pulled.step)
         agree(pulled, off, solve(pulled, Condensed())) if isinstance(law, Tresca) else None
-        assert not off.active.any() and not np.any(off.r_n) and np.any(c.whole(off).r_t) == isinstance(law, Tresca)
+        assert (
+            not off.active.any()
+            and not np.any(off.r_n)
+            and np.any(c.whole(off).r_t) == isinstance(law, Tresca)
+        )
         zeros = np.zeros_like(c.step.bound)
         still = replace(c.step, b=np.zeros_like(c.step.b), slip0=zeros[:, None], bound=zeros)
         nothing = c.whole(prepared(c).solve(still))
@@ -226,7 +281,9 @@ def test_work_is_counted_and_a_warm_start_is_one(parallel: bool) -> None:
     assert work.newton_steps == result.iterations == len(result.history) - 1 > 1
     assert work.linear_iterations > work.newton_steps
     assert work.products <= work.linear_iterations + 2 * work.newton_steps + 1
-    assert result.history[-1] <= 1.5e-10 and result.method == "Iterative(icc)" and result.aim == 3e-10
+    assert (
+        result.history[-1] <= 1.5e-10 and result.method == "Iterative(icc)" and result.aim == 3e-10
+    )
     before = work.linear_iterations
     again = solver.solve(c.starting_at(result))
     assert again.iterations == 0 and work.linear_iterations == before
@@ -238,7 +295,10 @@ def test_work_is_counted_and_a_warm_start_is_one(parallel: bool) -> None:
 
 def test_not_a_number_is_a_sentence(parallel: bool) -> None:
     c = random_case(Coulomb(0.4), parallel=parallel)
-    with pytest.raises(StepFailure, match=r"stopped after 0 Newton steps, the residual is not a number \(residuals .*"):
+    with pytest.raises(
+        StepFailure,
+        match=r"stopped after 0 Newton steps, the residual is not a number \(residuals .*",
+    ):
         prepared(c).solve(replace(c.step, b=np.full_like(c.step.b, np.nan)))
 
 
@@ -246,7 +306,9 @@ def test_not_a_number_is_a_sentence(parallel: bool) -> None:
 def test_stagnation_is_a_sentence_with_the_history(parallel: bool) -> None:
     """A tolerance below round-off is reached by no step."""
     c = random_case(Coulomb(0.4), parallel=parallel)
-    solver = Iterative("jacobi", tolerance=1e-30, patience=2).prepare(c.step.A, c.step.surface, c.step.scale)
+    solver = Iterative("jacobi", tolerance=1e-30, patience=2).prepare(
+        c.step.A, c.step.surface, c.step.scale
+    )
     with pytest.raises(StepFailure, match=r"Newton steps, .*\(residuals .*, .*\): ") as found:
         solver.solve(c.step)
     assert "\n" not in str(found.value)

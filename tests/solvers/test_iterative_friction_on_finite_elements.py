@@ -27,12 +27,16 @@ COMM = MPI.COMM_WORLD
 RATES, AT_REST = (SlipRateCoulomb(ExponentialDecay(*mu, 2.0)) for mu in ((0.5, 0.3), (0.2, 0.1)))
 
 
-def checked(problem: vc.ContactProblem, dt: float, steps: int, kind: str = "icc") -> tuple[CrossChecked, np.ndarray]:
+def checked(
+    problem: vc.ContactProblem, dt: float, steps: int, kind: str = "icc"
+) -> tuple[CrossChecked, np.ndarray]:
     """The cross-check of a run: u, r_n and r_t to 1e-9; and the counts of open, sticking and slipping points."""
     compared, counts = CrossChecked(Iterative(kind), [vc.Condensed()]), np.zeros(3)
     for _, report in vc.march(problem, solver=compared, dt=dt, steps=steps):
         result = report.result
-        slips = result.active & np.any(problem.surface.tangential_values(result.x) != report.step.slip0, axis=1)
+        slips = result.active & np.any(
+            problem.surface.tangential_values(result.x) != report.step.slip0, axis=1
+        )
         counts += [np.sum(~result.active), np.sum(result.active & ~slips), np.sum(slips)]
     assert compared.found[0].size["r_t"] > 0.0 and compared.worst <= 1e-9
     return compared, problem.surface.comm.sum(counts)
@@ -46,10 +50,21 @@ def test_a_tipped_block(law: Any) -> None:
     assert counts.min() > 0
 
 
-@pytest.mark.parametrize("name", [
-    "box, C = 5", "box, C = 50", "springs", "inclined", "bilateral", "rollers, 3D", "pair, 2D", "pair, 3D", "corner",
-    "moving",
-])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "box, C = 5",
+        "box, C = 50",
+        "springs",
+        "inclined",
+        "bilateral",
+        "rollers, 3D",
+        "pair, 2D",
+        "pair, 3D",
+        "corner",
+        "moving",
+    ],
+)
 def test_steps_agree_with_the_condensed_route(name: str) -> None:
     make, dt = PROBLEMS[name]
     problem = make()
@@ -85,7 +100,10 @@ def test_statics_agree_with_the_condensed_route(d: int, law: Any) -> None:
     sizes, errors = surface.comm.max(np.array(local)).reshape(-1, 2).T
     assert np.all(sizes > 0.0) and np.all(errors <= 1e-9 * sizes)
     assert np.array_equal(one.active, two.active)
-    slips = [np.any(surface.tangential_values(state.u) != 0.0, axis=1) & state.active for state in (one, two)]
+    slips = [
+        np.any(surface.tangential_values(state.u) != 0.0, axis=1) & state.active
+        for state in (one, two)
+    ]
     assert surface.some(slips[0]) and np.array_equal(*slips)
 
 
@@ -118,4 +136,9 @@ def test_newton_steps_are_few_and_reductions_short() -> None:
 @pytest.mark.two_ranks
 def test_a_body_in_one_dimension_cannot_slide() -> None:
     with pytest.raises(InputError, match="a body in one dimension cannot slide"):
-        vc.simulate(replace(chain_problem(3), friction=vc.Coulomb(0.3)), solver=Iterative(), dt=1e-3, steps=1)
+        vc.simulate(
+            replace(chain_problem(3), friction=vc.Coulomb(0.3)),
+            solver=Iterative(),
+            dt=1e-3,
+            steps=1,
+        )

@@ -50,28 +50,42 @@ def pair(d: int, **how: Any) -> vc.ContactProblem:
     down = np.append(turned((0.0, -1.0), 0.4), np.zeros(d - 2))
     system = thrown(system, lambda x: 0.0 * x, lambda x: 0.0 * x + down)
     one, two = (tags[side] for side in mesh.interface)
-    return vc.ContactProblem(system, fem.contact_pair(system, one, two, **how), mass=vc.ConsistentMass())
+    return vc.ContactProblem(
+        system, fem.contact_pair(system, one, two, **how), mass=vc.ConsistentMass()
+    )
 
 
 def corner() -> vc.ContactProblem:
     """A parallelogram in a notch: three faces, no right angle."""
-    mesh, tags = block(COMM, lengths=(1.5, 1.0), divisions=(4, 3), deform=lambda x: x @ np.array([[1, 0.2], [0.35, 1]]))
+    mesh, tags = block(
+        COMM,
+        lengths=(1.5, 1.0),
+        divisions=(4, 3),
+        deform=lambda x: x @ np.array([[1, 0.2], [0.35, 1]]),
+    )
     system = fem.assemble(mesh, SOFT, initial_velocity=(-1.0, -2.0))
     near = vc.AnalyticGap(lambda x: np.full(len(x), 1e-3))
-    surfaces = (fem.contact_surface(system, tags[name], obstacle=near) for name in ("left", "bottom", "right"))
+    surfaces = (
+        fem.contact_surface(system, tags[name], obstacle=near)
+        for name in ("left", "bottom", "right")
+    )
     return vc.ContactProblem(system, fem.joined_surfaces(*surfaces), mass=vc.ConsistentMass())
 
 
 def moving() -> vc.ContactProblem:
     """A plane that rises towards a box which it then throws up."""
     given = thrown_box(COMM)
-    return replace(given, surface=given.surface.moving(lambda t: 0.5 * np.sin(40.0 * t) ** 2 / 40.0))
+    return replace(
+        given, surface=given.surface.moving(lambda t: 0.5 * np.sin(40.0 * t) ** 2 / 40.0)
+    )
 
 
 def some_bilateral() -> vc.ContactProblem:
     given = thrown_box(COMM, simplices=True, angle=0.4)
     first = np.arange(given.surface.count) % 4 == 0
-    return replace(given, surface=replace(given.surface, bilateral=first & (given.surface.gap0 < 0.1)))
+    return replace(
+        given, surface=replace(given.surface, bilateral=first & (given.surface.gap0 < 0.1))
+    )
 
 
 PROBLEMS: dict[str, tuple[Callable[[], vc.ContactProblem], float]] = {  # name -> problem, dt
@@ -119,12 +133,15 @@ def pressed(d: int) -> vc.ContactProblem:
 def test_statics_agree_with_the_condensed_route(d: int, kind: str) -> None:
     problem = pressed(d)
     one, two = (
-        vc.static_equilibrium(problem, solver=solver) for solver in (Iterative(kind), vc.Condensed())
+        vc.static_equilibrium(problem, solver=solver)
+        for solver in (Iterative(kind), vc.Condensed())
     )
     load = [problem.surface.reaction_load(state.r_n, len(state.u)) for state in (one, two)]
     comm = problem.surface.comm
     for found, exact in ((one.u, two.u), (load[0], load[1])):
-        size, error = comm.max(np.array([np.abs(exact).max(initial=0.0), np.abs(found - exact).max(initial=0.0)]))
+        size, error = comm.max(
+            np.array([np.abs(exact).max(initial=0.0), np.abs(found - exact).max(initial=0.0)])
+        )
         assert size > 0.0 and error <= 1e-9 * size
     assert np.array_equal(one.active, two.active)
 
@@ -163,7 +180,9 @@ def test_ranks_that_overlap_take_hardly_more_iterations_than_one(simplices: bool
         counts.append(solver.prepared.work.linear_iterations)
     assert counts[1] <= 1.2 * counts[0]
     shares = solver.prepared._masked._shares
-    assert np.all((shares > 0.3) & (shares <= 1.0)) and bool(np.any(shares < 1.0)) == (COMM.size > 1)
+    assert np.all((shares > 0.3) & (shares <= 1.0)) and bool(np.any(shares < 1.0)) == (
+        COMM.size > 1
+    )
 
 
 def test_the_answer_is_taken_as_it_is() -> None:
@@ -197,9 +216,10 @@ def test_rigid_modes_in_turned_and_relative_unknowns(name: str) -> None:
         assert image.norm() <= 1e-12 * A.largest
 
 
-
 def test_the_choice_is_said_once(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level("INFO"):
         vc.simulate(thrown_box(COMM), solver=Iterative(), dt=1e-3, steps=2)
     said = [r.getMessage() for r in caplog.records if "chosen at" in r.getMessage()]
-    assert len(said) == (COMM.rank == 0) and all("jacobi, chosen at Courant number 0." in one for one in said)
+    assert len(said) == (COMM.rank == 0) and all(
+        "jacobi, chosen at Courant number 0." in one for one in said
+    )

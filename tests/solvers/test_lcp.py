@@ -24,8 +24,12 @@ def test_w_is_the_gap_left_by_the_reactions():
 def test_residual_of_zero_reaction_is_one():
     """By definition of the unit: the violation of r = 0."""
     G = np.array([[4.0, 1.0], [1.0, 9.0]])
-    assert LCP(G, np.array([-1e-5, 3e-5]), UNILATERAL).residual(np.zeros(2)) == pytest.approx(1.0, rel=1e-15)
-    assert LCP(G, np.array([1.0, 3e-5]), ONE_BILATERAL).residual(np.zeros(2)) == pytest.approx(1.0, rel=1e-15)
+    assert LCP(G, np.array([-1e-5, 3e-5]), UNILATERAL).residual(np.zeros(2)) == pytest.approx(
+        1.0, rel=1e-15
+    )
+    assert LCP(G, np.array([1.0, 3e-5]), ONE_BILATERAL).residual(np.zeros(2)) == pytest.approx(
+        1.0, rel=1e-15
+    )
 
 
 def test_residual_counts_penetration_tension_and_pressure_across_a_gap():
@@ -50,7 +54,9 @@ def test_residual_is_the_same_in_all_units():
     G, q, r = spd(rng, 6), rng.normal(size=6), rng.random(6)
     bilateral, units = rng.random(6) < 0.3, 10.0 ** rng.uniform(-6.0, 6.0, size=6)
     base = LCP(G, q, bilateral).residual(r)
-    assert LCP(G * 3e-9, q * 1e3, bilateral).residual(r * (1e3 / 3e-9)) == pytest.approx(base, rel=1e-13)
+    assert LCP(G * 3e-9, q * 1e3, bilateral).residual(r * (1e3 / 3e-9)) == pytest.approx(
+        base, rel=1e-13
+    )
     other = LCP(units[:, None] * G * units, q * units, bilateral)
     assert other.residual(r / units) == pytest.approx(base, rel=1e-12)
 

@@ -41,7 +41,9 @@ def test_p_matrices_have_the_solution_that_enumeration_finds():
         for q in rng.normal(size=(5, 5)):
             exact = solutions(G, q)
             assert len(exact) == 1
-            assert lemke(G, q) == pytest.approx(exact[0], abs=1e-11 * (1.0 + np.abs(exact[0]).max()))
+            assert lemke(G, q) == pytest.approx(
+                exact[0], abs=1e-11 * (1.0 + np.abs(exact[0]).max())
+            )
 
 
 @pytest.mark.parametrize("index", range(len(KINDS)), ids=[kind.__name__ for kind in KINDS])
@@ -51,18 +53,27 @@ def test_symmetric_problems_have_the_answer_of_the_active_set(index):
         found, other = solve(Lemke(), problem), solve(ActiveSet(), problem)
         d = np.diag(problem.G) ** -0.5
         size = np.abs(other.r / d).max() or 1.0
-        assert np.abs((found.r - other.r) / d).max() <= 1e-12 * size * np.linalg.cond(problem.G * np.outer(d, d))
+        assert np.abs((found.r - other.r) / d).max() <= 1e-12 * size * np.linalg.cond(
+            problem.G * np.outer(d, d)
+        )
         assert problem.residual(found.r) <= 1e-13
         if problem.q.size <= 6:
-            assert found.r / d == pytest.approx(enumerate_lcp(problem.G, problem.q, problem.bilateral) / d, rel=1e-9,
-                                                abs=1e-11 * size)
+            assert found.r / d == pytest.approx(
+                enumerate_lcp(problem.G, problem.q, problem.bilateral) / d,
+                rel=1e-9,
+                abs=1e-11 * size,
+            )
 
 
 def test_a_guess_costs_no_pivot_and_a_wrong_one_no_digit():
     """The set and the reactions of the answer as guesses; the opposite set."""
     problem = problems(0)[11]
     cold = solve(Lemke(), problem)
-    assert cold.iterations > 0 and all(0.0 <= z <= 1.0 + 1e-12 for z in cold.history) and cold.history[-1] == 0.0
+    assert (
+        cold.iterations > 0
+        and all(0.0 <= z <= 1.0 + 1e-12 for z in cold.history)
+        and cold.history[-1] == 0.0
+    )
     for guess in (cold.active, cold.r):
         assert solve(Lemke(), problem, guess=guess).iterations == 0
     other = solve(Lemke(), problem, guess=~cold.active)
@@ -78,16 +89,30 @@ def test_lists_are_told_of_or_read():
         Lemke().prepare(G, nothing.tolist())
     prepared = Lemke().prepare(G, nothing)
     result = prepared.solve([-2.0, -1.0])
-    assert (G @ result.r == [2.0, 1.0]).all() and prepared.solve([-2.0, -1.0], [True, True]).iterations == 0
+    assert (G @ result.r == [2.0, 1.0]).all() and prepared.solve(
+        [-2.0, -1.0], [True, True]
+    ).iterations == 0
 
 
-@pytest.mark.parametrize(("G", "q", "count"), [
-    ([[1.0, 2.0], [2.0, 1.0]], [-1.0, -1.0], 3),  # several: Cottle, Pang and Stone, positive but not a P-matrix
-    ([[0.0, 1.0], [1.0, 0.0]], [-1.0, -1.0], 1),  # no diagonal: a game
-    ([[0.0, -1.0], [1.0, 0.0]], [-1.0, -1.0], 0),  # skew: copositive-plus, and without a solution
-    ([[-1.0]], [-1.0], 0),  # a ray at once
-    ([[0.0, -10.0], [20.0, 0.0]], [1.0, -1.0], 1),
-], ids=["three solutions", "no diagonal", "no solution", "negative", "skew"])
+@pytest.mark.parametrize(
+    ("G", "q", "count"),
+    [
+        (
+            [[1.0, 2.0], [2.0, 1.0]],
+            [-1.0, -1.0],
+            3,
+        ),  # several: Cottle, Pang and Stone, positive but not a P-matrix
+        ([[0.0, 1.0], [1.0, 0.0]], [-1.0, -1.0], 1),  # no diagonal: a game
+        (
+            [[0.0, -1.0], [1.0, 0.0]],
+            [-1.0, -1.0],
+            0,
+        ),  # skew: copositive-plus, and without a solution
+        ([[-1.0]], [-1.0], 0),  # a ray at once
+        ([[0.0, -10.0], [20.0, 0.0]], [1.0, -1.0], 1),
+    ],
+    ids=["three solutions", "no diagonal", "no solution", "negative", "skew"],
+)
 def test_other_matrices_have_a_solution_several_or_none(G, q, count):
     """Where there is none the method says so; it says what p_matrix says too."""
     G, q = np.array(G), np.array(q)
@@ -96,7 +121,9 @@ def test_other_matrices_have_a_solution_several_or_none(G, q, count):
     if exact:
         assert any(lemke(G, q) == pytest.approx(one, abs=1e-12) for one in exact)
     else:
-        with pytest.raises(StepFailure, match=r"on a ray after \d pivots: there is no solution, or G is not"):
+        with pytest.raises(
+            StepFailure, match=r"on a ray after \d pivots: there is no solution, or G is not"
+        ):
             lemke(G, q)
 
 
@@ -112,7 +139,10 @@ def test_a_ray_need_not_mean_that_there_is_no_solution():
             assert "ray" in str(failure)
             missed += bool(exact)
             continue
-        assert any(np.allclose(found, one, atol=1e-9) for one in exact) or (q + G @ found).min() > -1e-12
+        assert (
+            any(np.allclose(found, one, atol=1e-9) for one in exact)
+            or (q + G @ found).min() > -1e-12
+        )
     assert 0 < missed < 40
 
 
@@ -120,7 +150,11 @@ def test_murty_needs_all_pivots():
     """Murty (1978): ones on, twos below the diagonal, q = -d parallel to the covering vector, both in its units:
     r = d (1, 0, ..., 0) after 2^m pivots; fewer allowed are too few in words. For q = -1 two are enough."""
     for m in (3, 6, 9):
-        G, d, none = np.eye(m) + 2.0 * np.tril(np.ones((m, m)), -1), 1.5 + probe(np.arange(m), 0), np.zeros(m, bool)
+        G, d, none = (
+            np.eye(m) + 2.0 * np.tril(np.ones((m, m)), -1),
+            1.5 + probe(np.arange(m), 0),
+            np.zeros(m, bool),
+        )
         found = solve(Lemke(), LCP(G * d[:, None] / d, -d, none), guess=none)
         assert found.iterations == 2**m and found.r == pytest.approx(d * np.eye(m)[0], abs=1e-12)
         found = solve(Lemke(), LCP(G, -np.ones(m), none), guess=none)
@@ -147,7 +181,9 @@ def test_a_guess_that_leads_to_huge_reactions_is_not_taken():
     B = np.column_stack([np.cos(angles), np.sin(angles)])
     for singular in (G, B @ B.T):
         found = solve(Lemke(), LCP(singular, q, np.zeros(3, bool)), guess=np.ones(3, bool))
-        assert found.residual < 1e-13 and found.r == pytest.approx([16.0 / 15.0, 2.0 / 15.0, 0.0], rel=1e-12)
+        assert found.residual < 1e-13 and found.r == pytest.approx(
+            [16.0 / 15.0, 2.0 / 15.0, 0.0], rel=1e-12
+        )
 
 
 def test_ties_end():
@@ -167,7 +203,9 @@ def test_units_do_not_matter():
     """Every row in a unit of its own: the same pivots and the same answer; twice the same digits."""
     G, q = np.eye(8) + 2.0 * np.triu(np.random.default_rng(4).normal(size=(8, 8)), 1), -np.ones(8)
     units = 10.0 ** np.random.default_rng(1).uniform(-5.0, 5.0, size=8)
-    method, other = (Lemke().prepare(one, np.zeros(8, dtype=bool)) for one in (G, units[:, None] * G * units))
+    method, other = (
+        Lemke().prepare(one, np.zeros(8, dtype=bool)) for one in (G, units[:, None] * G * units)
+    )
     found, scaled = method.solve(q), other.solve(q * units)
     assert found.iterations == scaled.iterations
     assert scaled.r * units == pytest.approx(found.r, rel=1e-11, abs=1e-13)
@@ -192,7 +230,10 @@ def friction_states(G: Array, q: Array, cohesion: float, slope: float) -> list[A
         A, b = np.zeros((2 * m, 2 * m)), np.zeros(2 * m)
         for i, state in enumerate(states):
             n, t = 2 * i, 2 * i + 1
-            A[n, n], A[t, t] = 1.0, 1.0  # open, r = 0; under cohesion open points are not tried here
+            A[n, n], A[t, t] = (
+                1.0,
+                1.0,
+            )  # open, r = 0; under cohesion open points are not tried here
             if state != "open":
                 A[n], b[n] = G[n], -q[i, 0]
             if state == "stick":
@@ -204,9 +245,16 @@ def friction_states(G: Array, q: Array, cohesion: float, slope: float) -> list[A
         r = np.linalg.solve(A, b).reshape(m, 2)
         w = q + (G @ r.ravel()).reshape(m, 2)
         fits = all(
-            w[i, 0] >= -1e-11 if state == "open" else r[i, 0] >= -1e-11
-            and (abs(r[i, 1]) <= cohesion + slope * r[i, 0] + 1e-11 if state == "stick" else state * w[i, 1] <= 1e-11)
-            for i, state in enumerate(states))
+            w[i, 0] >= -1e-11
+            if state == "open"
+            else r[i, 0] >= -1e-11
+            and (
+                abs(r[i, 1]) <= cohesion + slope * r[i, 0] + 1e-11
+                if state == "stick"
+                else state * w[i, 1] <= 1e-11
+            )
+            for i, state in enumerate(states)
+        )
         if fits and not any(np.allclose(r, one, atol=1e-9) for one in found):
             found.append(r)
     return found
@@ -223,7 +271,11 @@ def test_friction_without_symmetry_by_enumeration():
         q = rng.normal(size=(3, 2))
         exact = friction_states(G, q, 0.0, 0.3)
         found = FrictionNewton().prepare(G, np.zeros(3, dtype=bool)).solve(q, none, slope)
-        assert len(exact) == 1 and found.r == pytest.approx(exact[0], abs=1e-10) and found.residual <= 1e-12
+        assert (
+            len(exact) == 1
+            and found.r == pytest.approx(exact[0], abs=1e-10)
+            and found.residual <= 1e-12
+        )
 
 
 def test_friction_that_is_not_solved_ends_in_its_sentence():
@@ -240,12 +292,21 @@ def test_friction_that_is_not_solved_ends_in_its_sentence():
             with np.errstate(over="raise", divide="raise", invalid="raise"):
                 assert prepared.solve(q, np.zeros(m), np.full(m, 0.4)).residual <= 1e-11
         except StepFailure as failure:
-            assert "FrictionNewton" in str(failure) and "smaller step of time or load" in str(failure)
+            assert "FrictionNewton" in str(failure) and "smaller step of time or load" in str(
+                failure
+            )
             ended += 1
     assert ended > 0
-    for G in (np.array([[1.0, -3.0], [-3.0, 1.0]]), np.array([[1.0, -1.0], [-1.0, 1.0]])):  # rᵀG r < 0 and = 0
-        step = FrictionNewton().prepare(np.kron(G, np.eye(2)) + np.eye(4, k=1) * 1e-3, np.zeros(2, bool))
-        start = step.delassus.problem(-np.ones((2, 2)), np.zeros(2), np.zeros(2)).start(np.ones(2, bool))
+    for G in (
+        np.array([[1.0, -3.0], [-3.0, 1.0]]),
+        np.array([[1.0, -1.0], [-1.0, 1.0]]),
+    ):  # rᵀG r < 0 and = 0
+        step = FrictionNewton().prepare(
+            np.kron(G, np.eye(2)) + np.eye(4, k=1) * 1e-3, np.zeros(2, bool)
+        )
+        start = step.delassus.problem(-np.ones((2, 2)), np.zeros(2), np.zeros(2)).start(
+            np.ones(2, bool)
+        )
         assert not start.any()
 
 
@@ -255,10 +316,16 @@ def test_friction_in_space_without_symmetry():
     for k in range(12):
         A, skew = rng.normal(size=(24, 30)), np.triu(rng.uniform(-0.3, 0.3, size=(24, 24)), 1)
         G, held = A @ A.T / 30.0 + 0.2 * np.eye(24) + skew - skew.T, rng.random(8) < 0.2
-        q, cohesion, slope = rng.normal(size=(8, 3)), np.full(8, 0.2 * (k % 2)), np.full(8, 0.3 * ((k + 1) % 2))
+        q, cohesion, slope = (
+            rng.normal(size=(8, 3)),
+            np.full(8, 0.2 * (k % 2)),
+            np.full(8, 0.3 * ((k + 1) % 2)),
+        )
         found = FrictionNewton().prepare(G, held).solve(q, cohesion, slope)
         w, (r_n, r_t) = q + (G @ found.r.ravel()).reshape(8, 3), (found.r[:, 0], found.r[:, 1:])
         limit, size = cohesion + slope * np.maximum(r_n, 0.0), np.linalg.norm(r_t, axis=1)
         assert np.abs(np.where(held, w[:, 0], np.minimum(r_n, w[:, 0]))).max() < 1e-10
         assert (size <= limit + 1e-12).all()
-        assert limit * np.linalg.norm(w[:, 1:], axis=1) == pytest.approx(-np.sum(r_t * w[:, 1:], axis=1), abs=1e-10)
+        assert limit * np.linalg.norm(w[:, 1:], axis=1) == pytest.approx(
+            -np.sum(r_t * w[:, 1:], axis=1), abs=1e-10
+        )

@@ -6,7 +6,17 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from reference_lcp import KINDS, LCP, enumerate_lcp, from_solution, generic, mixed, problems, solve, spd
+from reference_lcp import (
+    KINDS,
+    LCP,
+    enumerate_lcp,
+    from_solution,
+    generic,
+    mixed,
+    problems,
+    solve,
+    spd,
+)
 
 from vi_contact.core.errors import InputError
 from vi_contact.solvers.normal.active_set import ActiveSet
@@ -15,12 +25,17 @@ from vi_contact.solvers.normal.hildreth import Hildreth
 pytestmark = pytest.mark.serial
 
 METHODS = (ActiveSet(), Hildreth(), Hildreth(primal=False))
-each_method = pytest.mark.parametrize("method", METHODS, ids=("ActiveSet", "primal Hildreth", "dual Hildreth"))
+each_method = pytest.mark.parametrize(
+    "method", METHODS, ids=("ActiveSet", "primal Hildreth", "dual Hildreth")
+)
 
 
 @lru_cache
 def truths(kind: int) -> list[tuple[LCP, np.ndarray]]:
-    return [(problem, enumerate_lcp(problem.G, problem.q, problem.bilateral)) for problem in problems(kind)]
+    return [
+        (problem, enumerate_lcp(problem.G, problem.q, problem.bilateral))
+        for problem in problems(kind)
+    ]
 
 
 @each_method
@@ -77,7 +92,11 @@ def test_a_row_in_another_unit_does_not_change_the_answer(method):
     rng = np.random.default_rng(12)
     problem, units = generic(rng, 9), 10.0 ** rng.uniform(-5.0, 5.0, size=9)
     base = solve(method, problem, guess=None)
-    other = solve(method, LCP(units[:, None] * problem.G * units, problem.q * units, problem.bilateral), guess=None)
+    other = solve(
+        method,
+        LCP(units[:, None] * problem.G * units, problem.q * units, problem.bilateral),
+        guess=None,
+    )
     assert np.abs(other.r * units - base.r).max() <= 1e-11 * base.r.max()
 
 

@@ -35,11 +35,17 @@ give_back(kept(MPI.COMM_WORLD))
 def test_every_matrix_solver_and_vector_is_freed(tmp_path: Path) -> None:
     """As many destructions as creations in PETSc's own account."""
     account, support = tmp_path / "log", str(Path(__file__).parents[1] / "support")
-    paths = os.pathsep.join([support, str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")])
+    paths = os.pathsep.join(
+        [support, str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")]
+    )
     environment = {**os.environ, "PYTHONPATH": paths, "PETSC_OPTIONS": f"-log_view :{account}"}
-    done = subprocess.run([sys.executable, "-c", RUN], env=environment, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", RUN], env=environment, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
-    table = re.findall(r"^ *([A-Z][A-Za-z ]+?) +(\d+) +(\d+)$", account.read_text(), flags=re.MULTILINE)
+    table = re.findall(
+        r"^ *([A-Z][A-Za-z ]+?) +(\d+) +(\d+)$", account.read_text(), flags=re.MULTILINE
+    )
     kinds = {name: (int(made), int(freed)) for name, made, freed in table}
     assert kinds["Matrix"][0] > 50
     for name in ("Matrix", "Vector", "Krylov Solver", "Preconditioner", "Index Set"):

@@ -45,10 +45,15 @@ def complementary(G: Array, q: Array, bilateral: Array) -> Array:
 
 
 @Fuzz("lcp", __file__).property(
-    entries=st.lists(ENTRY, min_size=1, max_size=25), gaps=st.lists(ENTRY, min_size=1, max_size=5),
-    held=st.integers(0, 31), units=st.lists(st.integers(-6, 6), min_size=5, max_size=5), examples=150)
-def test_every_normal_method_finds_the_solution(entries: list[int], gaps: list[int], held: int,
-                                                units: list[int]) -> None:
+    entries=st.lists(ENTRY, min_size=1, max_size=25),
+    gaps=st.lists(ENTRY, min_size=1, max_size=5),
+    held=st.integers(0, 31),
+    units=st.lists(st.integers(-6, 6), min_size=5, max_size=5),
+    examples=150,
+)
+def test_every_normal_method_finds_the_solution(
+    entries: list[int], gaps: list[int], held: int, units: list[int]
+) -> None:
     m = len(gaps)
     G, q = operator(entries, m), np.asarray(gaps, dtype=float)
     bilateral = np.array([bool(held >> i & 1) and i % 2 == 1 for i in range(m)])
@@ -81,20 +86,36 @@ def rubbing(G: Array, q: Array, mu: float) -> list[Array]:
         r = np.linalg.solve(rows, right)
         w, r = (q.ravel() + G @ r).reshape(m, 2), r.reshape(m, 2)
         small = ZERO * size
-        good = bool(np.all(r[:, 0] >= -small) and np.all(w[:, 0] >= -small)
-                    and np.all(np.abs(r[:, 1]) <= mu * np.maximum(r[:, 0], 0.0) + small))
-        slides = [state * w[i, 1] >= -small for i, state in enumerate(states) if not isinstance(state, str)]
+        good = bool(
+            np.all(r[:, 0] >= -small)
+            and np.all(w[:, 0] >= -small)
+            and np.all(np.abs(r[:, 1]) <= mu * np.maximum(r[:, 0], 0.0) + small)
+        )
+        slides = [
+            state * w[i, 1] >= -small
+            for i, state in enumerate(states)
+            if not isinstance(state, str)
+        ]
         if good and all(slides):
             found.append(r)
     return found
 
 
 @Fuzz("friction", __file__).property(
-    entries=st.lists(ENTRY, min_size=1, max_size=16), places=st.lists(ENTRY, min_size=4, max_size=4),
-    points=st.integers(1, 2), mu=st.integers(1, 4), examples=150)
-def test_every_friction_method_finds_a_solution(entries: list[int], places: list[int], points: int, mu: int) -> None:
+    entries=st.lists(ENTRY, min_size=1, max_size=16),
+    places=st.lists(ENTRY, min_size=4, max_size=4),
+    points=st.integers(1, 2),
+    mu=st.integers(1, 4),
+    examples=150,
+)
+def test_every_friction_method_finds_a_solution(
+    entries: list[int], places: list[int], points: int, mu: int
+) -> None:
     """mu up to 0.2, where the problem has one solution that all methods reach."""
-    G, q = operator(entries, 2 * points), np.asarray(places[: 2 * points], dtype=float).reshape(points, 2)
+    G, q = (
+        operator(entries, 2 * points),
+        np.asarray(places[: 2 * points], dtype=float).reshape(points, 2),
+    )
     exact, bilateral = rubbing(G, q, 0.05 * mu), np.zeros(points, dtype=bool)
     assert exact
     scale = max(max(float(np.abs(one).max()) for one in exact), 1e-300)

@@ -29,22 +29,43 @@ pytestmark = pytest.mark.serial
 MIDPOINT, BACKWARD = vc.ZienkiewiczWoodTaylor(), vc.ZienkiewiczWoodTaylor(phi=1.0)
 DECAY = ExponentialDecay(mu_s=0.6, mu_k=0.3, v_c=0.1)
 SCHEMES = [
-    vc.ZienkiewiczWoodTaylor(), vc.SS22(), vc.Midpoint(), vc.Newmark(), vc.HHT(), vc.GeneralisedAlpha.spectral_radius(),
-    vc.Houbolt(), vc.ContactStabilisedNewmark(), vc.MoreauJean(), vc.LinearMultistep.newmark(), vc.Trapezoidal(),
+    vc.ZienkiewiczWoodTaylor(),
+    vc.SS22(),
+    vc.Midpoint(),
+    vc.Newmark(),
+    vc.HHT(),
+    vc.GeneralisedAlpha.spectral_radius(),
+    vc.Houbolt(),
+    vc.ContactStabilisedNewmark(),
+    vc.MoreauJean(),
+    vc.LinearMultistep.newmark(),
+    vc.Trapezoidal(),
 ]
 
 
-def belted(mu: Any, along: Any, *, stiffness: float = 100.0, normal_force: float = 10.0, **more: Any) -> ContactProblem:
+def belted(
+    mu: Any, along: Any, *, stiffness: float = 100.0, normal_force: float = 10.0, **more: Any
+) -> ContactProblem:
     """1 kg on a spring, pressed onto a belt that has moved along(t) [m]."""
     law = mu if isinstance(mu, Coulomb) else SlipRateCoulomb(mu)
     mass = rubbing_mass(
-        u0=0.0, stiffness=stiffness, normal_force=normal_force, friction=law, mass=ConsistentMass(), **more
+        u0=0.0,
+        stiffness=stiffness,
+        normal_force=normal_force,
+        friction=law,
+        mass=ConsistentMass(),
+        **more,
     )
     return replace(mass, surface=mass.surface.moving(along=along))
 
 
-def reports(problem: ContactProblem, dt: float, t_end: float, *, scheme: Any = MIDPOINT, **more: Any) -> list[Report]:
-    return [report for _, report in march(problem, scheme=scheme, solver=Condensed(**more), dt=dt, t_end=t_end)]
+def reports(
+    problem: ContactProblem, dt: float, t_end: float, *, scheme: Any = MIDPOINT, **more: Any
+) -> list[Report]:
+    return [
+        report
+        for _, report in march(problem, scheme=scheme, solver=Condensed(**more), dt=dt, t_end=t_end)
+    ]
 
 
 def rate(report: Report) -> Array:
@@ -74,8 +95,14 @@ def stick_slip(speed: float, times: Array, *, k: float = 100.0, force: float = 1
 
         caught.terminal = True  # type: ignore[attr-defined]
         run = solve_ivp(
-            motion, (release, release + 5.0), [0.6 * force / k, speed], method="DOP853", events=caught,
-            dense_output=True, rtol=1e-10, atol=1e-13,
+            motion,
+            (release, release + 5.0),
+            [0.6 * force / k, speed],
+            method="DOP853",
+            events=caught,
+            dense_output=True,
+            rtol=1e-10,
+            atol=1e-13,
         )
         t, x = float(run.t[-1]), float(run.y[0, -1])
         slipping = (times > release) & (times <= t)
@@ -90,7 +117,9 @@ def stick_slip(speed: float, times: Array, *, k: float = 100.0, force: float = 1
     [(MIDPOINT, 2e-3, 4.0, 5e-4, 12.0), (vc.MoreauJean(), 4e-3, 2.8, 0.03, 3.0)],
     ids=["displacements", "velocities"],
 )
-def test_stick_slip_on_a_belt(scheme: Any, fine: float, t_end: float, error: float, gain: float) -> None:
+def test_stick_slip_on_a_belt(
+    scheme: Any, fine: float, t_end: float, error: float, gain: float
+) -> None:
     """Rides on the belt to 0.06 m, slips back, is caught: two cycles and a half of the differential equation. Order 2
     where the rate is that of the mean reaction; order 1, in the first cycle, with the impulses of Moreau and Jean."""
     errors = []
@@ -118,10 +147,14 @@ def test_oscillator_slides_to_rest() -> None:
             return float(y[1]) * side if at > 1e-3 else 1.0
 
         turned.terminal = True  # type: ignore[attr-defined]
-        way = solve_ivp(motion, (0.0, 1.0), [x, 0.0], events=turned, method="DOP853", rtol=1e-10, atol=1e-13)
+        way = solve_ivp(
+            motion, (0.0, 1.0), [x, 0.0], events=turned, method="DOP853", rtol=1e-10, atol=1e-13
+        )
         x = float(way.y[0, -1])
         turns.append(x)
-    run = reports(rubbing_mass(u0=0.45e-3, friction=SlipRateCoulomb(mu), mass=ConsistentMass()), 2.5e-4, 0.15)
+    run = reports(
+        rubbing_mass(u0=0.45e-3, friction=SlipRateCoulomb(mu), mass=ConsistentMass()), 2.5e-4, 0.15
+    )
     u = np.array([r.new.u[0] for r in run])
     peaks = u[1:-1][(np.diff(u)[:-1] * np.diff(u)[1:] <= 0.0) & (np.diff(u)[:-1] != 0.0)]
     assert len(turns) >= 3 and peaks == pytest.approx(turns, rel=0.0, abs=2e-4 * 0.45e-3)
@@ -134,7 +167,9 @@ def test_steady_sliding() -> None:
     for scheme in (MIDPOINT, vc.MoreauJean(), vc.Newmark()):
         last = reports(belted(lambda v: 0.2 + v, lambda t: 0.2 * t), 0.05, 6.0, scheme=scheme)[-1]
         assert last.new.u[0] == pytest.approx(0.4 * 10.0 / 100.0, rel=1e-9)
-        assert last.new.r_t[0, 0] == pytest.approx(-4.0, rel=1e-9) and rate(last) == pytest.approx(0.2, rel=1e-9)
+        assert last.new.r_t[0, 0] == pytest.approx(-4.0, rel=1e-9) and rate(last) == pytest.approx(
+            0.2, rel=1e-9
+        )
 
 
 LAWS = {
@@ -148,19 +183,29 @@ LAWS = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("law", "scheme"), [
-    *((law, BACKWARD) for law in LAWS), ("jump", vc.MoreauJean(1.0)), ("growing logarithm", vc.MoreauJean(1.0)),
-], ids=lambda value: value if isinstance(value, str) else type(value).__name__)
+@pytest.mark.parametrize(
+    ("law", "scheme"),
+    [
+        *((law, BACKWARD) for law in LAWS),
+        ("jump", vc.MoreauJean(1.0)),
+        ("growing logarithm", vc.MoreauJean(1.0)),
+    ],
+    ids=lambda value: value if isinstance(value, str) else type(value).__name__,
+)
 def test_slow_slip_stays_inside_the_cone(law: str, scheme: Any) -> None:
     """A belt whose speed grows from 1e-6 to 1 m/s: |r_t| <= mu(|v|) r_n in every step, equal where it slips, with the
     exact law at the rate of the step; mu_s where it sticks. Rates over five decades occur under growing friction."""
     growth, mu = np.log(1e6) / 6.0, LAWS[law]
-    run = reports(belted(mu, lambda t: 1e-6 * np.expm1(growth * t) / growth), 4e-2, 6.0, scheme=scheme)
+    run = reports(
+        belted(mu, lambda t: 1e-6 * np.expm1(growth * t) / growth), 4e-2, 6.0, scheme=scheme
+    )
     speeds = np.array([rate(r)[0] for r in run])
     friction = np.array([abs(r.result.r_t[0, 0]) for r in run])
     limit = np.array([mu(rate(r))[0] * r.result.r_n[0] for r in run])
     assert np.all(friction <= limit * (1.0 + 1e-10))
-    assert np.all(friction[speeds > 0.0] >= limit[speeds > 0.0] * (1.0 - 1e-10)) and np.any(speeds > 0.0)
+    assert np.all(friction[speeds > 0.0] >= limit[speeds > 0.0] * (1.0 - 1e-10)) and np.any(
+        speeds > 0.0
+    )
     assert max(r.certificate.worst for r in run) <= 1e-10
     assert speeds.max() > 0.3
     if law == "growing logarithm":
@@ -171,10 +216,16 @@ def test_slow_slip_stays_inside_the_cone(law: str, scheme: Any) -> None:
 def test_every_scheme_knows_its_rate(scheme: Any) -> None:
     """Displacement schemes: (u1 - u0)/dt; Moreau-Jean: v1. The reactions obey mu at that rate."""
     law = SlipRateCoulomb(lambda v: 0.1 + 0.5 * v)
-    problem = rubbing_mass(u0=0.01, stiffness=100.0, normal_force=1.0, friction=law, mass=ConsistentMass())
+    problem = rubbing_mass(
+        u0=0.01, stiffness=100.0, normal_force=1.0, friction=law, mass=ConsistentMass()
+    )
     slid = 0
     for report in reports(problem, 0.01, 0.2, scheme=scheme):
-        v = report.new.v[0] if isinstance(scheme, vc.MoreauJean) else (report.new.u[0] - report.old.u[0]) / 0.01
+        v = (
+            report.new.v[0]
+            if isinstance(scheme, vc.MoreauJean)
+            else (report.new.u[0] - report.old.u[0]) / 0.01
+        )
         assert rate(report)[0] == pytest.approx(abs(v), rel=1e-9, abs=1e-12)
         r_n, r_t = report.result.r_n[0], report.result.r_t[0, 0]
         if abs(v) > 1e-6:
@@ -193,9 +244,15 @@ def test_static_and_kinetic_coefficients() -> None:
     assert friction[first] == pytest.approx(3.0, rel=1e-12)
     for pull, sticks in ((5.9, True), (6.1, False)):
         still = rubbing_mass(
-            u0=0.0, stiffness=100.0, normal_force=10.0, friction=SlipRateCoulomb(DECAY), mass=ConsistentMass()
+            u0=0.0,
+            stiffness=100.0,
+            normal_force=10.0,
+            friction=SlipRateCoulomb(DECAY),
+            mass=ConsistentMass(),
         )
-        loaded = replace(still, system=still.system.with_load((np.array([pull, 0.0]), lambda t: 1.0)))
+        loaded = replace(
+            still, system=still.system.with_load((np.array([pull, 0.0]), lambda t: 1.0))
+        )
         state = static_equilibrium(loaded, solver=Condensed())
         assert bool(state.u[0] == 0.0) is sticks
         assert state.r_t[0, 0] == pytest.approx(min(pull, 6.0), rel=1e-12)
@@ -220,7 +277,10 @@ def test_several_points_with_every_method(method: Any, rubbed: list[Report]) -> 
     assert np.allclose(run[-1].new.u, rubbed[-1].new.u, rtol=0.0, atol=1e-8)
     touching = [r for r in run if r.new.r_n.any()]
     assert len(touching) > 20 and max(r.certificate.worst for r in run) <= 1e-10
-    assert all(r.result.history[-1] <= 1e-12 for r in touching) and max(len(r.result.history) for r in touching) <= 20
+    assert (
+        all(r.result.history[-1] <= 1e-12 for r in touching)
+        and max(len(r.result.history) for r in touching) <= 20
+    )
     assert any(np.any(rate(r) > 0.0) for r in touching)
 
 
@@ -235,7 +295,9 @@ def test_a_constant_function_is_coulombs_law() -> None:
 def test_failures_are_told() -> None:
     """Coefficients that are none, at the rate that was tried; an iteration that does not end."""
     problem = belted(lambda v: 0.3 - v, lambda t: t)
-    with pytest.raises(InputError, match=r"mu\([0-9.e-]+ m/s\) is -[0-9.]+; let it return zero or a positive"):
+    with pytest.raises(
+        InputError, match=r"mu\([0-9.e-]+ m/s\) is -[0-9.]+; let it return zero or a positive"
+    ):
         reports(problem, 1e-2, 1.0)
     with pytest.raises(InputError, match=r"mu\([0-9.e-]+ m/s\) is nan"):
         reports(belted(lambda v: np.where(v > 0.1, np.nan, 0.3), lambda t: t), 1e-2, 1.0)

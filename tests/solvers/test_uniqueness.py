@@ -25,7 +25,10 @@ def test_p_matrices_by_their_minors():
     assert len(seen) == 3
     big = np.eye(30) + 3.0 * np.triu(np.ones((30, 30)), 1)
     assert p_matrix(big).holds is None and "30 rows are too many" in p_matrix(big).sentence
-    assert p_matrix(big[:12, :12]).holds and "all its principal minors" in p_matrix(big[:12, :12]).sentence
+    assert (
+        p_matrix(big[:12, :12]).holds
+        and "all its principal minors" in p_matrix(big[:12, :12]).sentence
+    )
     assert p_matrix(big + 90.0 * np.eye(30)).holds
 
 
@@ -34,9 +37,15 @@ def test_a_minor_that_rounding_hides_decides_nothing():
     neither positive nor not, unless another is negative."""
     huge = np.eye(3) + 1e16 * np.triu(np.ones((3, 3)), 1)
     assert p_matrix(huge).holds and p_matrix(huge.T).holds and p_matrix(huge[:2, :2]).holds
-    for zero in (np.ones((2, 2)), np.array([[1.0, 3.0], [1.0 / 3.0, 1.0]]), np.array([[0.3, 3.0], [0.07, 0.7]])):
+    for zero in (
+        np.ones((2, 2)),
+        np.array([[1.0, 3.0], [1.0 / 3.0, 1.0]]),
+        np.array([[0.3, 3.0], [0.07, 0.7]]),
+    ):
         assert p_matrix(zero).holds is None and "zero to rounding" in p_matrix(zero).sentence
-        worse = np.block([[zero, np.zeros((2, 2))], [np.zeros((2, 2)), np.array([[1.0, 2.0], [2.0, 1.0]])]])
+        worse = np.block(
+            [[zero, np.zeros((2, 2))], [np.zeros((2, 2)), np.array([[1.0, 2.0], [2.0, 1.0]])]]
+        )
         assert p_matrix(worse).holds is False
 
 
@@ -48,7 +57,12 @@ def test_units_and_wrong_numbers():
         assert p_matrix(units[:, None] * G * units) == p_matrix(G)
     assert p_matrix(np.zeros((0, 0))).holds
     assert p_matrix([[1.0, 5.0], [0.0, 1.0]]).holds  # type: ignore[arg-type]
-    for wrong, words in ((np.full((2, 2), np.nan), "finite numbers"), (np.ones(3), "has shape"),
-                         (np.ones((2, 3)), "give a square"), ([[1.0], [1.0, 2.0]], "real numbers"), ("G", "is 'G'")):
+    for wrong, words in (
+        (np.full((2, 2), np.nan), "finite numbers"),
+        (np.ones(3), "has shape"),
+        (np.ones((2, 3)), "give a square"),
+        ([[1.0], [1.0, 2.0]], "real numbers"),
+        ("G", "is 'G'"),
+    ):
         with pytest.raises(InputError, match=words):
             p_matrix(wrong)  # type: ignore[arg-type]

@@ -34,11 +34,19 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "springs": {"compliance": np.full(M, 0.3)},
     "stiff and soft springs": {"compliance": 10.0 ** np.linspace(-3.0, 3.0, M)},
     "springs and rigid points": {"compliance": np.array([0.3, 0.0] * 4), "scale": 2.0},
-    "springs and bilateral": {"compliance": np.array([0.3, 0.0] * 4), "bilateral": np.arange(M) < 3},
+    "springs and bilateral": {
+        "compliance": np.array([0.3, 0.0] * 4),
+        "bilateral": np.arange(M) < 3,
+    },
 }
 
 
-@pytest.fixture(params=[pytest.param(False, marks=pytest.mark.serial, id="scipy"), pytest.param(True, id="petsc")])
+@pytest.fixture(
+    params=[
+        pytest.param(False, marks=pytest.mark.serial, id="scipy"),
+        pytest.param(True, id="petsc"),
+    ]
+)
 def parallel(request: pytest.FixtureRequest) -> Iterator[bool]:
     if request.param:
         pytest.importorskip("mpi4py")
@@ -59,7 +67,9 @@ def agree(c: Case, result: Any, exact: Any) -> None:
     """x and r_n to 1e-9 of their largest values, the same contact set, and the certificate of the loop."""
     found, bilateral = c.whole(result), c.step.surface.everywhere(c.step.surface.bilateral)
     assert np.max(np.abs(found.x - exact.x)) <= 1e-9 * np.max(np.abs(exact.x))
-    assert np.max(np.abs(found.r_n - exact.r_n), initial=0.0) <= 1e-9 * np.max(np.abs(exact.r_n), initial=0.0)
+    assert np.max(np.abs(found.r_n - exact.r_n), initial=0.0) <= 1e-9 * np.max(
+        np.abs(exact.r_n), initial=0.0
+    )
     assert np.array_equal(found.active, exact.active | bilateral)
     assert not np.any(found.r_n[~found.active])
     assert kkt_residual(c.step, result).worst <= 1e-9
@@ -90,7 +100,9 @@ def test_agrees_on_other_loads(parallel: bool, method: Any, seed: int) -> None:
 def test_infinite_bounds_leave_points_free(parallel: bool, method: Any) -> None:
     """Moreau-Jean: +inf where no contact is predicted."""
     c = pushed_block(parallel=parallel, seed=3)
-    bound = np.where(c.exact().active & (np.arange(M) > 3), np.inf, c.step.surface.everywhere(c.step.bound))
+    bound = np.where(
+        c.exact().active & (np.arange(M) > 3), np.inf, c.step.surface.everywhere(c.step.bound)
+    )
     c = c.bounded(bound)
     assert np.isinf(bound).any()
     agree(c, solve(c, method), c.exact())
@@ -108,7 +120,12 @@ def test_nothing_happens_at_rest(parallel: bool, method: Any) -> None:
     c = pushed_block(parallel=parallel)
     c = replace(c, step=replace(c.step, b=np.zeros_like(c.step.b)))
     result = c.whole(solve(c, method))
-    assert result.iterations == 0 and not np.any(result.x) and not np.any(result.r_n) and not result.active.any()
+    assert (
+        result.iterations == 0
+        and not np.any(result.x)
+        and not np.any(result.r_n)
+        and not result.active.any()
+    )
 
 
 def test_no_contact_surface_is_a_linear_solve(parallel: bool, method: Any) -> None:
@@ -121,8 +138,12 @@ def test_no_contact_surface_is_a_linear_solve(parallel: bool, method: Any) -> No
 
 
 @pytest.mark.two_ranks
-@pytest.mark.parametrize("options", [OPTIONS["rigid"], OPTIONS["springs and bilateral"]], ids=["rigid", "springs"])
-def test_warm_start_at_the_solution_costs_no_iteration(parallel: bool, method: Any, options: dict[str, Any]) -> None:
+@pytest.mark.parametrize(
+    "options", [OPTIONS["rigid"], OPTIONS["springs and bilateral"]], ids=["rigid", "springs"]
+)
+def test_warm_start_at_the_solution_costs_no_iteration(
+    parallel: bool, method: Any, options: dict[str, Any]
+) -> None:
     """P2: PETSc's own test would not stop there (solver notes 3d)."""
     c = pushed_block(parallel=parallel, **options)
     prepared = Volume(method=method).prepare(c.step.A, c.step.surface, c.step.scale)
@@ -158,7 +179,10 @@ def test_units_do_not_matter(parallel: bool, method: Any, length: float, force: 
     """V4.1 (6), P1, P18: the same case in other units of length and force gives the same numbers to 1e-9."""
     options = OPTIONS["springs and rigid points"]
     exact = pushed_block(seed=4, **options).exact()
-    scaled = {key: value * length / force if key == "compliance" else value for key, value in options.items()}
+    scaled = {
+        key: value * length / force if key == "compliance" else value
+        for key, value in options.items()
+    }
     c = pushed_block(parallel=parallel, seed=4, length=length, force=force, **scaled)
     result = c.whole(solve(c, method))
     assert np.max(np.abs(result.x / length - exact.x)) <= 1e-9 * np.max(np.abs(exact.x))
@@ -167,7 +191,9 @@ def test_units_do_not_matter(parallel: bool, method: Any, length: float, force: 
 
 @pytest.mark.two_ranks
 @pytest.mark.parametrize("unit", [1e-6, 1e6])
-def test_units_do_not_matter_when_nothing_gives_the_scale(parallel: bool, method: Any, unit: float) -> None:
+def test_units_do_not_matter_when_nothing_gives_the_scale(
+    parallel: bool, method: Any, unit: float
+) -> None:
     """P18: from rest and in touch, only A and b tell how large the displacements are."""
     cases = [pushed_block(parallel=parallel, seed=4, length=length) for length in (1.0, unit)]
     one, other = (c.whole(solve(c.bounded(np.zeros(M)), method)) for c in cases)
@@ -180,7 +206,9 @@ def test_a_start_below_the_tolerance_is_still_improved(parallel: bool, method: A
     """A small residual is not a small error: what can be solved to round-off is, from a guess that is off by 1e-11."""
     c = pushed_block(parallel=parallel)
     exact = c.exact()
-    mine = replace(exact, x=exact.x[c.rows] * (1.0 + 1e-11), active=exact.active[c.step.surface.slots])
+    mine = replace(
+        exact, x=exact.x[c.rows] * (1.0 + 1e-11), active=exact.active[c.step.surface.slots]
+    )
     step = c.starting_at(mine)
     result = Volume(method=method).prepare(step.A, step.surface, step.scale).solve(step)
     assert np.max(np.abs(c.all(result.x) - exact.x)) <= 1e-13 * np.max(np.abs(exact.x))
@@ -225,7 +253,9 @@ def test_one_spring_and_one_wall_by_hand() -> None:
     """k x = b - r, wall at g on a spring of compliance c: r = (b - k g)/(1 + k c), x = g + c r."""
     k, b, g, c = 4.0, 3.0, 0.5, 0.125
     by_hand = (b - k * g) / (1.0 + k * c)
-    one = case(sp.csr_matrix([[k]]), np.array([0]), np.array([b]), np.array([g]), compliance=np.array([c]))
+    one = case(
+        sp.csr_matrix([[k]]), np.array([0]), np.array([b]), np.array([g]), compliance=np.array([c])
+    )
     for method in METHODS.values():
         result = solve(one, method)
         assert result.r_n[0] == pytest.approx(by_hand, rel=1e-12)

@@ -28,7 +28,12 @@ from vi_contact.solvers.volume.route import ReducedNewton, Volume
 VOLUME = Volume(method=ReducedNewton())
 
 
-@pytest.fixture(params=[pytest.param(False, marks=pytest.mark.serial, id="scipy"), pytest.param(True, id="petsc")])
+@pytest.fixture(
+    params=[
+        pytest.param(False, marks=pytest.mark.serial, id="scipy"),
+        pytest.param(True, id="petsc"),
+    ]
+)
 def parallel(request: pytest.FixtureRequest) -> Iterator[bool]:
     if request.param:
         pytest.importorskip("mpi4py")
@@ -48,13 +53,17 @@ def solve(c: Case, solver: Any = VOLUME) -> StepResult:
 @pytest.mark.parametrize("law", [Coulomb(0.5), Tresca(1.0)], ids=repr)
 def test_one_point_by_hand(law: Any, push: float, pull: float) -> None:
     """A = diag(4, 2): r_n = push, r_t = pull where |pull| <= 1, else ±1, x_t = (pull - r_t)/2; open: Coulomb none."""
-    c = rubbing(case(sp.diags([4.0, 2.0]), np.array([0]), np.array([push, pull]), np.zeros(1)), law, 0.0)
+    c = rubbing(
+        case(sp.diags([4.0, 2.0]), np.array([0]), np.array([push, pull]), np.zeros(1)), law, 0.0
+    )
     result = solve(c)
     limit = 1.0 if push > 0.0 or isinstance(law, Tresca) else 0.0
     r_t = np.clip(pull, -limit, limit)
     assert result.r_n[0] == pytest.approx(max(push, 0.0), rel=1e-14)
     assert result.r_t[0, 0] == pytest.approx(r_t, rel=1e-13)
-    assert result.x == pytest.approx([min(push, 0.0) / 4.0, (pull - r_t) / 2.0], rel=1e-13, abs=1e-15)
+    assert result.x == pytest.approx(
+        [min(push, 0.0) / 4.0, (pull - r_t) / 2.0], rel=1e-13, abs=1e-15
+    )
 
 
 @pytest.mark.serial
@@ -66,19 +75,27 @@ def test_slip_direction_in_space_by_hand(law: Any) -> None:
     slip = factor * r_t
     origin = np.array([0.3, -0.2])
     b = np.array([2.0, *(r_t + np.array([1.0, 3.0]) * (origin + slip))])
-    c = rubbing(case(sp.diags([4.0, 1.0, 3.0]), np.array([0]), b, np.zeros(1)), law, origin, tangents=2)
+    c = rubbing(
+        case(sp.diags([4.0, 1.0, 3.0]), np.array([0]), b, np.zeros(1)), law, origin, tangents=2
+    )
     result = solve(c)
-    assert result.r_t[0] == pytest.approx(r_t, rel=1e-10) and result.x[1:] == pytest.approx(origin + slip, rel=1e-10)
+    assert result.r_t[0] == pytest.approx(r_t, rel=1e-10) and result.x[1:] == pytest.approx(
+        origin + slip, rel=1e-10
+    )
     inside = replace(c, step=replace(c.step, b=np.array([2.0, 0.3 + 0.1, 3.0 * -0.2 - 0.2])))
     stuck = solve(inside)
-    assert np.array_equal(stuck.x[1:], origin) and stuck.r_t[0] == pytest.approx([0.1, -0.2], rel=1e-12)
+    assert np.array_equal(stuck.x[1:], origin) and stuck.r_t[0] == pytest.approx(
+        [0.1, -0.2], rel=1e-12
+    )
 
 
 # Random blocks -------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS.keys())
-@pytest.mark.parametrize("law", LAWS, ids=["coulomb", "coulomb field", "tresca", "tresca field", "slip rate"])
+@pytest.mark.parametrize(
+    "law", LAWS, ids=["coulomb", "coulomb field", "tresca", "tresca field", "slip rate"]
+)
 def test_agrees_with_the_condensed_route(parallel: bool, law: Any, options: dict[str, Any]) -> None:
     """V4.0 with friction: x, r_n and r_t of both routes to 1e-9, in steps with open, sticking and slipping points."""
     seen = []
@@ -114,7 +131,11 @@ def test_units_do_not_matter(parallel: bool, length: float, force: float) -> Non
 @pytest.mark.two_ranks
 def test_answers_do_not_depend_on_steps_before(parallel: bool) -> None:
     """One prepared solver over many steps, and a new one for each; Tresca, Coulomb and frictionless steps mixed."""
-    cases = [random_case(law, seed=seed, parallel=parallel) for seed in range(3) for law in (Coulomb(0.4), Tresca(0.2))]
+    cases = [
+        random_case(law, seed=seed, parallel=parallel)
+        for seed in range(3)
+        for law in (Coulomb(0.4), Tresca(0.2))
+    ]
     cases.append(pushed_block(parallel=parallel, seed=3))
     prepared = VOLUME.prepare(cases[0].step.A, cases[0].step.surface, 1.0)
     for c in [*cases, cases[0]]:
@@ -148,9 +169,15 @@ def test_history_is_that_of_the_thresholds(parallel: bool) -> None:
 # Spatial -------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("law", [
-    pytest.param(Coulomb(0.4), marks=pytest.mark.slow), Tresca(0.1), Tresca((0.0, 0.1, 0.3, 0.6, 1.0, 2.0)),
-], ids=repr)
+@pytest.mark.parametrize(
+    "law",
+    [
+        pytest.param(Coulomb(0.4), marks=pytest.mark.slow),
+        Tresca(0.1),
+        Tresca((0.0, 0.1, 0.3, 0.6, 1.0, 2.0)),
+    ],
+    ids=repr,
+)
 def test_disks_agree_with_the_condensed_route(parallel: bool, law: Any) -> None:
     """V4.0 with friction in space: the exact disk, no polygon; both routes to 1e-9."""
     seen = []
@@ -177,14 +204,19 @@ def test_disks_agree_with_the_condensed_route(parallel: bool, law: Any) -> None:
 )
 def test_unsound_options_are_refused(parallel: bool, options: dict[str, str], reason: str) -> None:
     with pytest.raises(InputError, match=reason):
-        solve(random_case(Coulomb(0.4), parallel=parallel), Volume(method=ReducedNewton(), petsc_options=options))
+        solve(
+            random_case(Coulomb(0.4), parallel=parallel),
+            Volume(method=ReducedNewton(), petsc_options=options),
+        )
 
 
 @pytest.mark.two_ranks
 def test_a_limit_of_iterations_is_told(parallel: bool) -> None:
     with pytest.raises(StepFailure, match="iteration limit"):
-        solve(random_case(Coulomb(0.4), parallel=parallel), Volume(method=ReducedNewton(),
-                                                                   petsc_options={"snes_max_it": 1}))
+        solve(
+            random_case(Coulomb(0.4), parallel=parallel),
+            Volume(method=ReducedNewton(), petsc_options={"snes_max_it": 1}),
+        )
 
 
 def test_solvers_are_freed(parallel: bool) -> None:
@@ -196,8 +228,12 @@ def test_solvers_are_freed(parallel: bool) -> None:
         prepared.solve(c.step)
         friction = prepared._friction
         parts = [prepared, friction, *vars(friction).values(), *vars(friction.driver).values()]
-        alive = [weakref.ref(part) for part in parts if type(part).__module__.startswith("vi_contact")]
-        assert len(alive) >= 5 and prepared.snes.getType() == "vinewtonrsls" and prepared.tao is None
+        alive = [
+            weakref.ref(part) for part in parts if type(part).__module__.startswith("vi_contact")
+        ]
+        assert (
+            len(alive) >= 5 and prepared.snes.getType() == "vinewtonrsls" and prepared.tao is None
+        )
         del prepared, friction, parts
         assert [reference() for reference in alive] == [None] * len(alive)
     finally:

@@ -29,13 +29,17 @@ from vi_contact.solvers.condensed import Condensed
 from vi_contact.solvers.volume.route import ReducedNewton, Volume
 
 
-def compared(problem: ContactProblem, scheme: Any, steps: int) -> tuple[CrossChecked, list[tuple[int, int, int]]]:
+def compared(
+    problem: ContactProblem, scheme: Any, steps: int
+) -> tuple[CrossChecked, list[tuple[int, int, int]]]:
     """The cross-check of a run, and how many points are open, stick and slip in every step."""
     checked = CrossChecked(Condensed(), [Volume(method=ReducedNewton())])
     states = []
     for _, report in march(problem, scheme=scheme, solver=checked, dt=BOX_DT, steps=steps):
         result = report.result
-        slip = np.linalg.norm(problem.surface.tangential_values(result.x) - report.step.slip0, axis=1)
+        slip = np.linalg.norm(
+            problem.surface.tangential_values(result.x) - report.step.slip0, axis=1
+        )
         slips = result.active & (slip > 0.0)
         found = (~result.active).sum(), (result.active & ~slips).sum(), slips.sum()
         states.append(tuple(int(count) for count in problem.surface.comm.sum(np.array(found))))
@@ -45,7 +49,9 @@ def compared(problem: ContactProblem, scheme: Any, steps: int) -> tuple[CrossChe
 @pytest.mark.parametrize("angle", [0.0, pytest.param(0.3, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("simplices", [False, True], ids=["quadrilaterals", "triangles"])
 @pytest.mark.parametrize("friction", ROUGH_ON_ONE_SIDE, ids=["coulomb", "tresca"])
-def test_routes_agree_in_the_plane(comm: Any, friction: FrictionLaw, simplices: bool, angle: float) -> None:
+def test_routes_agree_in_the_plane(
+    comm: Any, friction: FrictionLaw, simplices: bool, angle: float
+) -> None:
     """u, r_n and r_t of every step to 1e-9; open, sticking and slipping points in the same step."""
     problem = tipped(comm, friction, simplices=simplices, angle=angle)
     checked, states = compared(problem, ZienkiewiczWoodTaylor(), 30)
@@ -72,7 +78,10 @@ def test_nodes_with_one_and_with_two_free_tangents(comm: Any) -> None:
     """On rollers along z some points have one free tangent, and rub in an interval, the others in a disk."""
     mesh, tags = block(comm, lengths=(1.5, 1.0, 1.2), divisions=(3, 2, 2))
     system = assemble(
-        mesh, RUBBER, prescribed=[Prescribed(tags["front"], components=(2,))], loads=BodyForce((0.0, -9.81e3, 0.0)),
+        mesh,
+        RUBBER,
+        prescribed=[Prescribed(tags["front"], components=(2,))],
+        loads=BodyForce((0.0, -9.81e3, 0.0)),
         initial_velocity=lambda x: np.outer(x[:, 1] + 1.0, [0.5, -1.0, 0.0]),
     )
     plane = HalfSpace(point=(0.0, -1e-3, 0.0), normal=(0.0, 1.0, 0.0))

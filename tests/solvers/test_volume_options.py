@@ -33,7 +33,12 @@ METHODS = (ReducedNewton(), SemismoothNewton(), TaoTron())
 PREFIX = "vi_contact_volume_"
 
 
-@pytest.fixture(params=[pytest.param(False, marks=pytest.mark.serial, id="scipy"), pytest.param(True, id="petsc")])
+@pytest.fixture(
+    params=[
+        pytest.param(False, marks=pytest.mark.serial, id="scipy"),
+        pytest.param(True, id="petsc"),
+    ]
+)
 def pushed(request: pytest.FixtureRequest) -> Case:
     if request.param:
         pytest.importorskip("mpi4py")
@@ -70,7 +75,9 @@ def test_friction_is_refused_with_the_methods_that_carry_it(pushed: Case) -> Non
     for method in METHODS:
         Volume(method=method).check(Rubbing(pushed, Frictionless()))
     for method in METHODS[1:]:
-        with pytest.raises(InputError, match=r"would ignore Coulomb\(mu=0.3\).*ReducedNewton\(\).*condensed"):
+        with pytest.raises(
+            InputError, match=r"would ignore Coulomb\(mu=0.3\).*ReducedNewton\(\).*condensed"
+        ):
             Volume(method=method).check(Rubbing(pushed, Coulomb(mu=0.3)))
     with pytest.raises(InputError, match="one dimension"):
         Volume(method=ReducedNewton()).check(Rubbing(pushed, Coulomb(mu=0.3)))
@@ -102,7 +109,9 @@ REFUSED = [
 
 @pytest.mark.two_ranks
 @pytest.mark.parametrize(("method", "options", "reason"), REFUSED)
-def test_unsound_options_are_refused(pushed: Case, method: Any, options: dict[str, str], reason: str) -> None:
+def test_unsound_options_are_refused(
+    pushed: Case, method: Any, options: dict[str, str], reason: str
+) -> None:
     """P5, P6, P8, P18."""
     with pytest.raises(InputError, match=reason):
         prepare(pushed, Volume(method=method, petsc_options=options))
@@ -120,28 +129,51 @@ def test_unsound_options_of_the_command_line_are_refused(
 
 
 SPELT = [
-    (ReducedNewton(), {"pc_typ": "jacobi"}, "nothing reads 'pc_typ' of petsc_options: did you mean 'pc_type'?"),
+    (
+        ReducedNewton(),
+        {"pc_typ": "jacobi"},
+        "nothing reads 'pc_typ' of petsc_options: did you mean 'pc_type'?",
+    ),
     (ReducedNewton(), {"snes_max_its": 5}, "did you mean 'snes_max_it'?"),
     (ReducedNewton(), {"mat_mumps_icntl_140": 5}, "did you mean 'mat_mumps_icntl_14'?"),
-    (ReducedNewton(), {"ksp_rtol": 1e-8}, "nothing reads 'ksp_rtol' of petsc_options: what it is for is not part of"),
+    (
+        ReducedNewton(),
+        {"ksp_rtol": 1e-8},
+        "nothing reads 'ksp_rtol' of petsc_options: what it is for is not part of",
+    ),
     (ReducedNewton(), {"tao_max_it": 5}, "nothing reads 'tao_max_it'"),
     (ReducedNewton(), {PREFIX + "pc_type": "lu"}, "give it without its prefix, as 'pc_type'"),
     (SemismoothNewton(), {"-snes_linesearch_typ": "bt"}, "did you mean 'snes_linesearch_type'?"),
-    (TaoTron(), {"sub_pc_factor_level": 1, "pc_type": "bjacobi"}, "did you mean 'sub_pc_factor_levels'?"),
+    (
+        TaoTron(),
+        {"sub_pc_factor_level": 1, "pc_type": "bjacobi"},
+        "did you mean 'sub_pc_factor_levels'?",
+    ),
     (TaoTron(), {"quite_another": 1}, "nothing reads 'quite_another'"),
 ]
 RIGHT = [
     (ReducedNewton(), {"snes_linesearch_max_it": 3, "mat_mumps_icntl_14": 90, "snes_max_it": 30}),
-    (ReducedNewton(), {"ksp_type": "cg", "pc_type": "bjacobi", "ksp_rtol": 1e-10, "sub_pc_type": "icc"}),
-    (SemismoothNewton(), {"ksp_type": "gmres", "ksp_gmres_restart": 20, "pc_type": "lu", "ksp_rtol": 1e-12}),
-    (TaoTron(), {"pc_type": "bjacobi", "sub_pc_type": "icc", "sub_pc_factor_levels": 1, "tao_max_it": 90}),
+    (
+        ReducedNewton(),
+        {"ksp_type": "cg", "pc_type": "bjacobi", "ksp_rtol": 1e-10, "sub_pc_type": "icc"},
+    ),
+    (
+        SemismoothNewton(),
+        {"ksp_type": "gmres", "ksp_gmres_restart": 20, "pc_type": "lu", "ksp_rtol": 1e-12},
+    ),
+    (
+        TaoTron(),
+        {"pc_type": "bjacobi", "sub_pc_type": "icc", "sub_pc_factor_levels": 1, "tao_max_it": 90},
+    ),
     (TaoTron(), {"pc_type": "jacobi", "-ksp_rtol": 1e-6}),
 ]
 
 
 @pytest.mark.two_ranks
 @pytest.mark.parametrize(("method", "options", "said"), SPELT)
-def test_what_nothing_reads_is_refused(pushed: Case, method: Any, options: dict[str, Any], said: str) -> None:
+def test_what_nothing_reads_is_refused(
+    pushed: Case, method: Any, options: dict[str, Any], said: str
+) -> None:
     """By name and with the nearest one that PETSc has, once a step has been solved; the database is as before."""
     before = PETSc.Options().getAll()
     with pytest.raises(InputError) as caught:
@@ -180,11 +212,17 @@ def test_bounds_on_a_field_have_the_same_options(comm: Any) -> None:
     from vi_contact import vi
 
     def solve(**options: Any) -> Any:
-        known = Known(space(square(comm, 6), ("Lagrange", 1)), lambda u, v: inner(grad(u), grad(v)) * dx)
-        return vi.solve(known.linear, known.u, lower=known.lower, upper=known.upper, bcs=[known.bc], **options)
+        known = Known(
+            space(square(comm, 6), ("Lagrange", 1)), lambda u, v: inner(grad(u), grad(v)) * dx
+        )
+        return vi.solve(
+            known.linear, known.u, lower=known.lower, upper=known.upper, bcs=[known.bc], **options
+        )
 
     for method in (None, *METHODS):
-        with pytest.raises(InputError, match="nothing reads 'pc_typ' of petsc_options: did you mean 'pc_type'"):
+        with pytest.raises(
+            InputError, match="nothing reads 'pc_typ' of petsc_options: did you mean 'pc_type'"
+        ):
             solve(method=method, petsc_options={"pc_typ": "jacobi"})
     assert solve(petsc_options={"tao_max_it": 90}).method == "TaoTron"
 
@@ -262,7 +300,9 @@ def test_the_users_tolerance_stops_earlier(pushed: Case, key: str) -> None:
 
 @pytest.mark.two_ranks
 def test_tao_tolerance_of_the_user(pushed: Case) -> None:
-    early = prepare(pushed, Volume(method=TaoTron(), petsc_options={"tao_gatol": 1e-4})).solve(pushed.step)
+    early = prepare(pushed, Volume(method=TaoTron(), petsc_options={"tao_gatol": 1e-4})).solve(
+        pushed.step
+    )
     full = prepare(pushed, Volume(method=TaoTron())).solve(pushed.step)
     assert early.iterations < full.iterations
 
@@ -294,8 +334,13 @@ def test_reasons_of_every_petsc_have_words() -> None:
     old = type("Old", (), {"DIVERGED_FNORM_NAN": NOT_A_NUMBER})
     new = type("New", (), {"DIVERGED_FUNCTION_NANORINF": NOT_A_NUMBER})
     for reasons in (old, new, PETSc.SNES.ConvergedReason):
-        assert "(the residual is not a number): check the load" in str(stopped("Volume", reasons, NOT_A_NUMBER, 1, 0.5))
-    for words in ("Inf or NaN detected", "User provided compute function generated infinity or NaN"):
+        assert "(the residual is not a number): check the load" in str(
+            stopped("Volume", reasons, NOT_A_NUMBER, 1, 0.5)
+        )
+    for words in (
+        "Inf or NaN detected",
+        "User provided compute function generated infinity or NaN",
+    ):
         assert "check the load" in str(raised("Volume", RuntimeError(words)))
     assert "check that" in str(raised("Volume", RuntimeError("Nanometres are too long")))
 
@@ -319,7 +364,9 @@ def test_the_objective_keeps_its_digits_near_its_origin() -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_nan_bound_is_refused(pushed: Case, method: Any) -> None:
     with pytest.raises(InputError, match="bound .* contains NaN"):
-        prepare(pushed, Volume(method=method)).solve(replace(pushed.step, bound=pushed.step.bound * np.nan))
+        prepare(pushed, Volume(method=method)).solve(
+            replace(pushed.step, bound=pushed.step.bound * np.nan)
+        )
 
 
 def test_petsc_errors_are_failures_and_leave_a_usable_solver(pushed: Case, database: Any) -> None:
@@ -335,10 +382,18 @@ def test_petsc_errors_are_failures_and_leave_a_usable_solver(pushed: Case, datab
 def test_a_body_that_flies_away_is_a_failure(method: Any) -> None:
     """P11: a floating chain pulled off its wall has no equilibrium, and PETSc may report none of it as an error."""
     n = 20
-    stiffness = sp.diags([-np.ones(n - 1), np.r_[1.0, 2.0 * np.ones(n - 2), 1.0], -np.ones(n - 1)], [-1, 0, 1]).tocsr()
+    stiffness = sp.diags(
+        [-np.ones(n - 1), np.r_[1.0, 2.0 * np.ones(n - 2), 1.0], -np.ones(n - 1)], [-1, 0, 1]
+    ).tocsr()
     load = np.zeros(n)
     load[3] = -1.0
-    c = case(stiffness, np.array([n - 1]), load, np.array([0.1]), parallel=bool(pytest.importorskip("mpi4py")))
+    c = case(
+        stiffness,
+        np.array([n - 1]),
+        load,
+        np.array([0.1]),
+        parallel=bool(pytest.importorskip("mpi4py")),
+    )
     with pytest.raises(StepFailure, match="check that"):
         prepare(c, Volume(method=method)).solve(c.step)
 
@@ -353,7 +408,9 @@ def test_solvers_are_freed(pushed: Case, method: Any, closed: bool) -> None:
         prepared = prepare(pushed, Volume(method=method))
         prepared.solve(pushed.step)
         parts = [prepared, prepared._scaled, prepared._driver, *vars(prepared._driver).values()]
-        alive = [weakref.ref(part) for part in parts if type(part).__module__.startswith("vi_contact")]
+        alive = [
+            weakref.ref(part) for part in parts if type(part).__module__.startswith("vi_contact")
+        ]
         assert len(alive) >= 5
         if closed:
             prepared.close()
@@ -371,7 +428,9 @@ def test_a_closed_solver_opens_again(pushed: Case) -> None:
         change = np.max(np.abs(prepared.solve(pushed.step).x - first.x), initial=0.0)
         size = np.max(np.abs(first.x), initial=0.0)
         change, size = pushed.step.surface.comm.max(np.array([change, size]))
-        assert change <= 1e-11 * size  # not 0: MUMPS on several ranks does not repeat itself to the last bit
+        assert (
+            change <= 1e-11 * size
+        )  # not 0: MUMPS on several ranks does not repeat itself to the last bit
 
 
 def test_methods_do_not_disturb_the_matrix(pushed: Case) -> None:

@@ -34,7 +34,11 @@ from vi_contact.studies.cases.vocabulary import names_of, words
 ROOT = Path(__file__).resolve().parents[2]
 WALL = ROOT / "demos" / "cases" / "wall.toml"
 COMM = MPI.COMM_WORLD
-ROUND_OFF = ("certificate", "energy_defect", "loss_algorithmic")  # nothing but round-off in these runs
+ROUND_OFF = (
+    "certificate",
+    "energy_defect",
+    "loss_algorithmic",
+)  # nothing but round-off in these runs
 
 
 def write(folder: Path, text: str, name: str = "case.toml") -> Path:
@@ -54,26 +58,37 @@ def assert_same(one: Mapping[str, Any], other: Mapping[str, Any]) -> None:
             assert np.array_equal(values, other[name], equal_nan=True), name
         elif name not in ROUND_OFF:
             size = float(np.nanmax(np.abs(np.asarray(other[name], dtype=float)), initial=0.0))
-            assert np.allclose(values, other[name], rtol=0.0, atol=1e-9 * size, equal_nan=True), name
+            assert np.allclose(values, other[name], rtol=0.0, atol=1e-9 * size, equal_nan=True), (
+                name
+            )
 
 
 def test_readmes_first_example_to_the_last_bit() -> None:
     """demos/cases/wall.toml is the code of README, run for 60 of its 400 steps; dt is 1/560 s exactly."""
-    code = re.search(r"^```python\n(.*?)^```$", (ROOT / "README.md").read_text("utf-8"), re.MULTILINE | re.DOTALL)
+    code = re.search(
+        r"^```python\n(.*?)^```$", (ROOT / "README.md").read_text("utf-8"), re.MULTILINE | re.DOTALL
+    )
     assert code is not None
     names: dict[str, Any] = {}
     exec(code[1].split("solution = ")[0], names)
     solution = vc.simulate(
-        names["problem"], scheme=vc.ZienkiewiczWoodTaylor(phi=0.5), solver=vc.Condensed(), dt=1.0 / 560.0, steps=60,
-        record=[vc.Energy(), vc.Contact(), vc.Probe({"top": (6.0, 9.0)})], progress=False,
+        names["problem"],
+        scheme=vc.ZienkiewiczWoodTaylor(phi=0.5),
+        solver=vc.Condensed(),
+        dt=1.0 / 560.0,
+        steps=60,
+        record=[vc.Energy(), vc.Contact(), vc.Probe({"top": (6.0, 9.0)})],
+        progress=False,
     )
-    assert "dt=1.0 / 560.0, steps=400" in code[1] and 'fields=fem.XDMF(every=10)' in code[1]
+    assert "dt=1.0 / 560.0, steps=400" in code[1] and "fields=fem.XDMF(every=10)" in code[1]
     case = read_case(WALL)
-    assert case.tables["run"] == {"dt": 1.0 / 560.0, "steps": 400} and case.tables["fields"] == {"every": 10}
+    assert case.tables["run"] == {"dt": 1.0 / 560.0, "steps": 400} and case.tables["fields"] == {
+        "every": 10
+    }
     tables = {name: value for name, value in case.nodes.items() if name != "fields"}
-    found = Case(case.path, case.tables, (), tables | {"run": read_case(WALL, ["run.steps=60"]).nodes["run"]}).run(
-        COMM, progress=False
-    )
+    found = Case(
+        case.path, case.tables, (), tables | {"run": read_case(WALL, ["run.steps=60"]).nodes["run"]}
+    ).run(COMM, progress=False)
     assert found.history["contact_resultant"].max() > 0.0
     assert_same(found.history, solution.history)
 
@@ -143,7 +158,11 @@ dt = 0.005
 @pytest.mark.slow
 def test_a_pair_with_weight_and_record_to_the_last_bit(shared_tmp: Path) -> None:
     """Two materials, static stage, Coulomb, a processed record beside the file: the run lasts as long as the record."""
-    write(shared_tmp, "".join(f"{0.01 * k} {np.sin(30.0 * 0.01 * k)}\n" for k in range(11)), "motion.txt")
+    write(
+        shared_tmp,
+        "".join(f"{0.01 * k} {np.sin(30.0 * 0.01 * k)}\n" for k in range(11)),
+        "motion.txt",
+    )
     found = read_case(write(shared_tmp, PAIR)).run(COMM, progress=False)
 
     lower = BlockMesh(lengths=(2.0, 1.0), divisions=(4, 2))
@@ -151,8 +170,10 @@ def test_a_pair_with_weight_and_record_to_the_last_bit(shared_tmp: Path) -> None
     mesh, tags = fem.build_mesh(TwoBlocks(lower=lower, upper=upper, offset=(0.5,)), COMM)
     soft = vc.LinearElastic.from_wave_speeds(2000.0, 1000.0, 2000.0)
     system = fem.assemble(
-        mesh, [(tags["lower"], vc.LinearElastic(E=3e9, nu=0.2, rho=2400.0)), (tags["upper"], soft)],
-        clamped=tags["lower_bottom"], damping=vc.Rayleigh.from_frequencies(1.0, 10.0, xi1=0.05, xi2=0.05),
+        mesh,
+        [(tags["lower"], vc.LinearElastic(E=3e9, nu=0.2, rho=2400.0)), (tags["upper"], soft)],
+        clamped=tags["lower_bottom"],
+        damping=vc.Rayleigh.from_frequencies(1.0, 10.0, xi1=0.05, xi2=0.05),
         loads=fem.Traction(tags["upper_top"], (0.0, -1e3)),
     )
     system = vc.with_weight(system, acceleration=9.81)
@@ -164,10 +185,16 @@ def test_a_pair_with_weight_and_record_to_the_last_bit(shared_tmp: Path) -> None
     rest = vc.static_equilibrium(problem, solver=vc.Condensed())
     foot = fem.Reactions("foot", tags["lower_bottom"], (1.0, 0.0))
     expected = vc.simulate(
-        problem, dt=0.005, t_end=0.1, state=rest, progress=False,
+        problem,
+        dt=0.005,
+        t_end=0.1,
+        state=rest,
+        progress=False,
         record=[vc.Energy(), vc.Contact(), foot, engineering.Resultants("joint", (1.0, 1.0))],
     )
-    assert len(found.history["t"]) == 21 and np.abs(found.history["a_g_x"]).max() == pytest.approx(6.0, rel=1e-12)
+    assert len(found.history["t"]) == 21 and np.abs(found.history["a_g_x"]).max() == pytest.approx(
+        6.0, rel=1e-12
+    )
     weight = 9.81 * (2000.0 * 1.0) + 1e3
     assert found.history["contact_resultant"][0] == pytest.approx(weight, rel=1e-9)
     assert found.history["contact_max_slip"].max() > 0.0
@@ -177,14 +204,25 @@ def test_a_pair_with_weight_and_record_to_the_last_bit(shared_tmp: Path) -> None
 @pytest.mark.serial
 def test_the_wall_with_other_values(shared_tmp: Path) -> None:
     """The case that ships is the wall beside its demo, its probes too, with the convention of its reference numbers."""
-    given = ("contact.points=[[6.0, 3.0], [6.0, 5.25], [6.0, 7.5]]", "system.section.thickness=0.3",
-             'mass={type="ConsistentMass"}', 'excitation={type="Harmonic", amplitude=1, frequency=14}', "run.dt=0.0018",
-             "run.steps=30", "scheme.phi=", "fields=")
+    given = (
+        "contact.points=[[6.0, 3.0], [6.0, 5.25], [6.0, 7.5]]",
+        "system.section.thickness=0.3",
+        'mass={type="ConsistentMass"}',
+        'excitation={type="Harmonic", amplitude=1, frequency=14}',
+        "run.dt=0.0018",
+        "run.steps=30",
+        "scheme.phi=",
+        "fields=",
+    )
     found = read_case(located("wall"), given).run(COMM, progress=False)
     model = build(Wall(thickness=0.3), COMM, base_inertia="catalogue")
     expected = vc.simulate(
-        model.problem("a", excitation=vc.Harmonic(1.0, 14.0)), scheme=vc.ZienkiewiczWoodTaylor(), dt=0.0018, steps=30,
-        record=(vc.Energy(), vc.Contact(), vc.Probe(model.probes())), progress=False,
+        model.problem("a", excitation=vc.Harmonic(1.0, 14.0)),
+        scheme=vc.ZienkiewiczWoodTaylor(),
+        dt=0.0018,
+        steps=30,
+        record=(vc.Energy(), vc.Contact(), vc.Probe(model.probes())),
+        progress=False,
     )
     assert_same(found.history, expected.history)
 
@@ -192,7 +230,8 @@ def test_the_wall_with_other_values(shared_tmp: Path) -> None:
 def test_the_channel_with_a_recorder_of_its_demo(shared_tmp: Path) -> None:
     """Keys of its mesh; a recorder that stands with the demo, its weight and static stage."""
     text = located("channel").read_text("utf-8") + (
-        '\n[[record]]\ntype = "demos.problems.channel:SoilProbe"\npoints = {1_soil = [10.0, 5.0]}\n')
+        '\n[[record]]\ntype = "demos.problems.channel:SoilProbe"\npoints = {1_soil = [10.0, 5.0]}\n'
+    )
     path = write(shared_tmp, text)
     given = ("mesh.size=1.0", "mesh.wall=1.0", "mesh.slab=1.0", "run.steps=2", "fields=")
     history = read_case(path, given, allow=("demos",)).run(COMM, progress=False).history
@@ -220,13 +259,20 @@ dt = 0.004
 steps = 20
 """
 BASE = """{type = "CompliantBase", facets = "bottom",
- motion = {motion = {type = "Ricker", amplitude = 2.0, frequency = 4.0}, dt = 0.004}}""".replace("\n", "")
-COMPLIANT = GROUND + f"""
+ motion = {motion = {type = "Ricker", amplitude = 2.0, frequency = 4.0}, dt = 0.004}}""".replace(
+    "\n", ""
+)
+COMPLIANT = (
+    GROUND
+    + f"""
 [system]
 dashpots = [{BASE}, {{type = "FreeField", facets = "left", base = {BASE}}},
             {{type = "FreeField", facets = "right", base = {BASE}}}]
 """
-RIGID = GROUND + """
+)
+RIGID = (
+    GROUND
+    + """
 [system]
 clamped = "bottom"
 dashpots = [{type = "FreeField", facets = "left"}, {type = "FreeField", facets = "right"}]
@@ -236,6 +282,7 @@ type = "Ricker"
 amplitude = 2.0
 frequency = 4.0
 """
+)
 
 
 @pytest.mark.slow
@@ -258,7 +305,10 @@ def test_soil_boundaries(shared_tmp: Path) -> None:
     sides = [FreeField(tags[side], base=(shaking,)) for side in ("left", "right")]
     system = fem.assemble(mesh, soil, dashpots=sides, clamped=tags["bottom"])
     problem = vc.ContactProblem(system, empty_surface(system.algebra.comm, 2), excitation=shaking)
-    assert_same(rigid.history, vc.simulate(problem, dt=0.004, steps=20, record=[probe], progress=False).history)
+    assert_same(
+        rigid.history,
+        vc.simulate(problem, dt=0.004, steps=20, record=[probe], progress=False).history,
+    )
 
 
 @pytest.mark.serial
@@ -266,16 +316,28 @@ def test_weight_is_the_body_force_of_the_density(comm: Any) -> None:
     """M r g of one material is BodyForce((0, -rho g)), to round-off."""
     mesh, tags = fem.build_mesh(BlockMesh(lengths=(2.0, 1.0), divisions=(3, 2)), comm)
     material = vc.LinearElastic(E=1e9, nu=0.2, rho=2000.0)
-    heavy = fem.assemble(mesh, material, clamped=tags["bottom"], loads=fem.BodyForce((0.0, -2000.0 * 9.80665)))
+    heavy = fem.assemble(
+        mesh, material, clamped=tags["bottom"], loads=fem.BodyForce((0.0, -2000.0 * 9.80665))
+    )
     system = fem.assemble(mesh, material, clamped=tags["bottom"])
     difference = vc.with_weight(system).load(0.0) - heavy.load(0.0)
-    assert comm.allreduce(float(np.abs(difference).max(initial=0.0)), op=MPI.MAX) < 1e-12 * 2000.0 * 9.80665
+    assert (
+        comm.allreduce(float(np.abs(difference).max(initial=0.0)), op=MPI.MAX)
+        < 1e-12 * 2000.0 * 9.80665
+    )
     for direction, components in (((0.0, 2.0), 2), ((1.0,), 2)):
-        with pytest.raises(InputError, match=f"direction .* give {components} components of a vector of length one"):
+        with pytest.raises(
+            InputError, match=f"direction .* give {components} components of a vector of length one"
+        ):
             vc.with_weight(system, direction=direction)
     assert not vc.with_weight(system, bodies=()).load(0.0).any()
-    assert np.array_equal(vc.with_weight(system, bodies=[0]).load(0.0), vc.with_weight(system).load(0.0))
-    with pytest.raises(InputError, match="the number of a body is 1; give a whole number of at least 0 and at most 0"):
+    assert np.array_equal(
+        vc.with_weight(system, bodies=[0]).load(0.0), vc.with_weight(system).load(0.0)
+    )
+    with pytest.raises(
+        InputError,
+        match="the number of a body is 1; give a whole number of at least 0 and at most 0",
+    ):
         vc.with_weight(system, bodies=[1])
     bare = fem.assemble(mesh, material, clamped=tags["bottom"], base_inertia=False)
     with pytest.raises(InputError, match="assemble with base_inertia=True"):
@@ -286,28 +348,76 @@ MISTAKES = {  # what is replaced in demos/cases/wall.toml, by what, what the sen
     "no TOML": ("[mesh]", "[mesh", ": Expected ']'"),
     "end of file": ("every = 10", "every =", ": Invalid value (at line 54"),
     "table twice": ("[impact]", "[solver]", ": Cannot declare ("),
-    "table": ("[impact]", "[impakt]", ": the table [impakt] is unknown: did you mean impact or format? Known: format"),
-    "key": ("amplitude", "amplitute", ": [excitation[1]] has the unknown key 'amplitute' for Harmonic: did you mean "
-            "amplitude? Known: amplitude, frequency, phase, direction"),
-    "type": ('"Condensed"', '"Condensd"', ": [solver] has the unknown type 'Condensd': did you mean Condensed?"),
-    "no type": ('type = "Inelastic"', "", ": [impact] has no type: give type = one of Inelastic, Newton, "
-                "Elastic"),
-    "nameless": ("[material.concrete]", "[material]", ": [material] has the keys of one material and no name: "),
-    "missing": ("rho = 2400.0", "", ": [material.concrete] lacks the key 'rho', which LinearElastic needs"),
-    "text": ("amplitude = 3.0", 'amplitude = "big"', ": [excitation[1]] amplitude is 'big': give a number"),
-    "truth": ("amplitude = 3.0", "amplitude = true", ": [excitation[1]] amplitude is true: give a number"),
+    "table": (
+        "[impact]",
+        "[impakt]",
+        ": the table [impakt] is unknown: did you mean impact or format? Known: format",
+    ),
+    "key": (
+        "amplitude",
+        "amplitute",
+        ": [excitation[1]] has the unknown key 'amplitute' for Harmonic: did you mean "
+        "amplitude? Known: amplitude, frequency, phase, direction",
+    ),
+    "type": (
+        '"Condensed"',
+        '"Condensd"',
+        ": [solver] has the unknown type 'Condensd': did you mean Condensed?",
+    ),
+    "no type": (
+        'type = "Inelastic"',
+        "",
+        ": [impact] has no type: give type = one of Inelastic, Newton, Elastic",
+    ),
+    "nameless": (
+        "[material.concrete]",
+        "[material]",
+        ": [material] has the keys of one material and no name: ",
+    ),
+    "missing": (
+        "rho = 2400.0",
+        "",
+        ": [material.concrete] lacks the key 'rho', which LinearElastic needs",
+    ),
+    "text": (
+        "amplitude = 3.0",
+        'amplitude = "big"',
+        ": [excitation[1]] amplitude is 'big': give a number",
+    ),
+    "truth": (
+        "amplitude = 3.0",
+        "amplitude = true",
+        ": [excitation[1]] amplitude is true: give a number",
+    ),
     "fraction": ("[8, 12]", "[8, 12.5]", ": [mesh] divisions[2] is 12.5: give a whole number"),
     "count": ("[8, 12]", "[8, 12, 1]", ": [mesh] divisions has 3 entries: give 2"),
     "list": ("steps = 400", "steps = [400]", ": [run] steps is a list: give a whole number"),
-    "name": ('clamped = "base"', 'clamped = "base"\nmaterial = "steel"', ": [system] material names 'steel', "
-             "which does not exist: Known: concrete"),
-    "function": ('"HalfSpace"', '"AnalyticGap"', ": [contact[1].obstacle] has the unknown key 'point' for AnalyticGap"),
-    "inner table": ('section = {type = "PlaneStress", thickness = 0.20}', "section = {type = 'PlaneStress', depth = 1}",
-                    ": [system.section] has the unknown key 'depth' for PlaneStress"),
+    "name": (
+        'clamped = "base"',
+        'clamped = "base"\nmaterial = "steel"',
+        ": [system] material names 'steel', which does not exist: Known: concrete",
+    ),
+    "function": (
+        '"HalfSpace"',
+        '"AnalyticGap"',
+        ": [contact[1].obstacle] has the unknown key 'point' for AnalyticGap",
+    ),
+    "inner table": (
+        'section = {type = "PlaneStress", thickness = 0.20}',
+        "section = {type = 'PlaneStress', depth = 1}",
+        ": [system.section] has the unknown key 'depth' for PlaneStress",
+    ),
     "no dt": ("dt = 0.0017857142857142857", "", ": [run] lacks the key 'dt', which simulate needs"),
-    "unknown table": ("[mesh]", '[model]\ntype = "Wall"\n[mesh]', ": the table [model] is unknown: "),
-    "no mesh": ('[mesh]\ntype = "WallMesh"\nheight = 9.0              # m\nwidth = 6.0\ndivisions = [8, 12]\n', "",
-                ": the table [mesh] is missing: give the mesh of the body"),
+    "unknown table": (
+        "[mesh]",
+        '[model]\ntype = "Wall"\n[mesh]',
+        ": the table [model] is unknown: ",
+    ),
+    "no mesh": (
+        '[mesh]\ntype = "WallMesh"\nheight = 9.0              # m\nwidth = 6.0\ndivisions = [8, 12]\n',
+        "",
+        ": the table [mesh] is missing: give the mesh of the body",
+    ),
 }
 
 
@@ -325,22 +435,46 @@ def test_mistakes_are_one_sentence(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize(("old", "new", "said"), [
-    ("rho = 2400.0", "rho = -1.0", "[material.concrete] LinearElastic: the mass density"),
-    ('type = "Inelastic"', 'type = "Newton"\ne = 2.0', "[impact] restitution coefficient e is 2.0"),
-    ("frequency = 14.0", "frequency = 0.0", "[excitation[1]] Harmonic: frequency is 0.0"),
-])
-def test_wrong_values_are_told_without_a_mesh(tmp_path: Path, old: str, new: str, said: str) -> None:
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("rho = 2400.0", "rho = -1.0", "[material.concrete] LinearElastic: the mass density"),
+        (
+            'type = "Inelastic"',
+            'type = "Newton"\ne = 2.0',
+            "[impact] restitution coefficient e is 2.0",
+        ),
+        ("frequency = 14.0", "frequency = 0.0", "[excitation[1]] Harmonic: frequency is 0.0"),
+    ],
+)
+def test_wrong_values_are_told_without_a_mesh(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
     with pytest.raises(InputError, match=re.escape(said)):
         read_case(write(tmp_path, WALL.read_text("utf-8").replace(old, new, 1))).check()
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize(("old", "new", "said"), [
-    ('clamped = "base"', 'clamped = "foot"', "[system] clamped is 'foot', but the mesh has no group 'foot'"),
-    ('clamped = "base"', 'clamped = ["wall"]', "[system] clamped[1] is 'wall', a cell group: give the name"),
-    ("steps = 400", "", "[run] has neither steps nor t_end, and the excitation has no end: give one"),
-])
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            'clamped = "base"',
+            'clamped = "foot"',
+            "[system] clamped is 'foot', but the mesh has no group 'foot'",
+        ),
+        (
+            'clamped = "base"',
+            'clamped = ["wall"]',
+            "[system] clamped[1] is 'wall', a cell group: give the name",
+        ),
+        (
+            "steps = 400",
+            "",
+            "[run] has neither steps nor t_end, and the excitation has no end: give one",
+        ),
+    ],
+)
 def test_mistakes_that_need_the_mesh(tmp_path: Path, old: str, new: str, said: str) -> None:
     with pytest.raises(InputError, match=re.escape(said)):
         read_case(write(tmp_path, WALL.read_text("utf-8").replace(old, new, 1))).run(COMM)
@@ -375,7 +509,9 @@ steps = 1
 
 @pytest.mark.serial
 def test_corners_beside_friction_are_said_to_slide_freely(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"1 contact nodes, the first at \(0, 0\), have several contact directions"):
+    with pytest.raises(
+        InputError, match=r"1 contact nodes, the first at \(0, 0\), have several contact directions"
+    ):
         read_case(write(tmp_path, CORNER)).problem(COMM)
     allowed = CORNER.replace("\nfacets", "\nfrictionless_corners = true\nfacets")
     surface = read_case(write(tmp_path, allowed)).problem(COMM).surface
@@ -385,8 +521,11 @@ def test_corners_beside_friction_are_said_to_slide_freely(tmp_path: Path) -> Non
 @pytest.mark.serial
 def test_files_that_are_none(tmp_path: Path) -> None:
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe")
-    for path, said in ((tmp_path / "none.toml", "No such file"), (tmp_path, "cannot be read"),
-                       (tmp_path / "binary.toml", "no UTF-8")):
+    for path, said in (
+        (tmp_path / "none.toml", "No such file"),
+        (tmp_path, "cannot be read"),
+        (tmp_path / "binary.toml", "no UTF-8"),
+    ):
         with pytest.raises(InputError, match=said):
             read_case(path)
 
@@ -395,12 +534,24 @@ def test_files_that_are_none(tmp_path: Path) -> None:
 def test_settings() -> None:
     """KEY=VALUE on a copy: values of TOML, other words as text, lists counted from 1, new tables on the way."""
     tables = {"run": {"dt": 1.0}, "excitation": [{"scale": 1.0}, {}]}
-    made = with_settings(tables, ["run.dt=2", "excitation.2.scale=[1, 2]", "scheme.type=HHT", "a.b.c=true", "t= x = 1"])
-    assert made == {"run": {"dt": 2}, "excitation": [{"scale": 1.0}, {"scale": [1, 2]}], "scheme": {"type": "HHT"},
-                    "a": {"b": {"c": True}}, "t": "x = 1"}
+    made = with_settings(
+        tables,
+        ["run.dt=2", "excitation.2.scale=[1, 2]", "scheme.type=HHT", "a.b.c=true", "t= x = 1"],
+    )
+    assert made == {
+        "run": {"dt": 2},
+        "excitation": [{"scale": 1.0}, {"scale": [1, 2]}],
+        "scheme": {"type": "HHT"},
+        "a": {"b": {"c": True}},
+        "t": "x = 1",
+    }
     assert tables == {"run": {"dt": 1.0}, "excitation": [{"scale": 1.0}, {}]}
-    for setting, said in (("run.dt", "give KEY=VALUE"), ("excitation.3.scale=1", "number from 1 to 2"),
-                          ("run.dt.x=1", "plain value"), ("excitation.0.scale=1", "no entry '0'")):
+    for setting, said in (
+        ("run.dt", "give KEY=VALUE"),
+        ("excitation.3.scale=1", "number from 1 to 2"),
+        ("run.dt.x=1", "plain value"),
+        ("excitation.0.scale=1", "no entry '0'"),
+    ):
         with pytest.raises(InputError, match=said):
             with_settings(tables, [setting])
 
@@ -408,10 +559,16 @@ def test_settings() -> None:
 @pytest.mark.serial
 def test_short_options_are_settings() -> None:
     """What replaces comes before --set, what acts on the result after it; KEY= takes a key away."""
-    tables = {"excitation": [{"type": "Harmonic", "amplitude": 2.0, "direction": [1.0, 0.0]}], "impact": {"type": "X"},
-              "run": {"dt": 0.1, "t_end": 1.0}, "system": {"prescribed": ROLLERS}}
+    tables = {
+        "excitation": [{"type": "Harmonic", "amplitude": 2.0, "direction": [1.0, 0.0]}],
+        "impact": {"type": "X"},
+        "run": {"dt": 0.1, "t_end": 1.0},
+        "system": {"prescribed": ROLLERS},
+    }
     given = ["excitation.1.amplitude=3", "run.dt=0.2"]
-    short = ShortOptions(scale=2.0, dt=0.5, steps=7, scheme="Newmark", solver="Hildreth", cross_check=True)
+    short = ShortOptions(
+        scale=2.0, dt=0.5, steps=7, scheme="Newmark", solver="Hildreth", cross_check=True
+    )
     made = with_settings(tables, short.settings(tables, given))
     assert made["excitation"][0]["amplitude"] == 6.0 and made["run"] == {"dt": 0.2, "steps": 7}
     assert "impact" not in made and made["scheme"] == {"type": "Newmark"}
@@ -420,15 +577,25 @@ def test_short_options_are_settings() -> None:
     assert solver["others"] == [REFERENCE]
     shaken = with_settings(tables, ShortOptions(motion="h.at2,v.at2", scale=3.0).settings(tables))
     assert [one["direction"] for one in shaken["excitation"]] == [[1.0, 0.0], [0.0, 1.0]]
-    assert [one["scale"] for one in shaken["excitation"]] == [3.0, 3.0] and shaken["run"] == {"dt": 0.1}
+    assert [one["scale"] for one in shaken["excitation"]] == [3.0, 3.0] and shaken["run"] == {
+        "dt": 0.1
+    }
     assert shaken["excitation"][1]["record"] == {"path": str(Path("v.at2").absolute())}
     assert shaken["system"] == {"tied": {"first": "left_side", "second": "right_side"}}
     assert tables["run"]["t_end"] == 1.0
-    made = {"type": "GroundMotion", "direction": [0.0, 1.0], "scale": 0.8, "record": {"type": "synthetic", "seed": 1}}
-    shaken = with_settings({"excitation": [made]}, ShortOptions(motion="h.at2").settings({"excitation": [made]}))
+    made = {
+        "type": "GroundMotion",
+        "direction": [0.0, 1.0],
+        "scale": 0.8,
+        "record": {"type": "synthetic", "seed": 1},
+    }
+    shaken = with_settings(
+        {"excitation": [made]}, ShortOptions(motion="h.at2").settings({"excitation": [made]})
+    )
     assert shaken["excitation"] == [made | {"record": {"path": str(Path("h.at2").absolute())}}]
     for wrong, said in (
-        (ShortOptions(scale=2.0), "nothing shakes it"), (ShortOptions(motion="a,b,c"), "give FILE, or FILE,FILE"),
+        (ShortOptions(scale=2.0), "nothing shakes it"),
+        (ShortOptions(motion="a,b,c"), "give FILE, or FILE,FILE"),
     ):
         with pytest.raises(InputError, match=said):
             wrong.settings({"mesh": {}})
@@ -437,40 +604,59 @@ def test_short_options_are_settings() -> None:
 @pytest.mark.serial
 def test_what_follows_from_the_first_mode() -> None:
     """Harmonic and time step by the body's lowest frequency; where it is not known yet, a sentence."""
-    settings = ["excitation.1={type='FirstModeHarmonic', amplitude=2, ratio=0.25}", "fields=", "run.steps=2",
-                "run.dt={type='FirstModePeriod', parts=10}"]
+    settings = [
+        "excitation.1={type='FirstModeHarmonic', amplitude=2, ratio=0.25}",
+        "fields=",
+        "run.steps=2",
+        "run.dt={type='FirstModePeriod', parts=10}",
+    ]
     case = read_case(WALL, settings)
     case.check()
     problem = case.problem(MPI.COMM_WORLD)
     f1 = engineering.lowest_frequency(problem.system)
     assert problem.excitations == (vc.Harmonic(2.0, 0.25 * f1, direction=(1.0, 0.0)),)
     solution = case.run(MPI.COMM_WORLD, progress=False)
-    assert solution.history["t"] == pytest.approx(np.array([0.0, 1.0, 2.0]) / (10.0 * f1), rel=1e-14)
+    assert solution.history["t"] == pytest.approx(
+        np.array([0.0, 1.0, 2.0]) / (10.0 * f1), rel=1e-14
+    )
     with pytest.raises(InputError, match="needs the excitations, still unknown here"):
-        read_case(WALL, [*settings, "system.dashpots=[{type='FreeField', facets='back'}]"]).problem(MPI.COMM_WORLD)
+        read_case(WALL, [*settings, "system.dashpots=[{type='FreeField', facets='back'}]"]).problem(
+            MPI.COMM_WORLD
+        )
 
 
 @pytest.mark.serial
-def test_the_command_runs_checks_and_restarts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_runs_checks_and_restarts(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """20 steps at once are 10 steps, then --restart; case.toml in the folder tells the settings."""
     whole, parts = tmp_path / "whole", tmp_path / "parts"
     quiet = ["--quiet", "--set", "solver.method.type=Hildreth"]
     assert main(["run", str(WALL), "--out", str(whole), "--set", "run.steps=20", *quiet]) == 0
     assert main(["run", str(WALL), "--out", str(parts), "--set", "run.steps=10", *quiet]) == 0
-    assert main(["run", str(WALL), "--out", str(parts), "--set", "run.steps=20", "--restart", *quiet]) == 0
+    assert (
+        main(["run", str(WALL), "--out", str(parts), "--set", "run.steps=20", "--restart", *quiet])
+        == 0
+    )
     assert (whole / "history.csv").read_bytes() == (parts / "history.csv").read_bytes()
     assert (whole / "fields.xdmf").is_file()
     copy = (whole / "case.toml").read_text("utf-8")
     assert copy.startswith("# set run.steps=20\n# set solver.method.type=Hildreth\n")
     assert copy.endswith(WALL.read_text("utf-8"))
     printed = capsys.readouterr().out
-    assert printed.count("A concrete wall beside the ground, shaken\nrun finished:") == 3 and "Hildreth" in printed
+    assert (
+        printed.count("A concrete wall beside the ground, shaken\nrun finished:") == 3
+        and "Hildreth" in printed
+    )
     assert main(["run", str(WALL), "--check", "--out", str(tmp_path / "checked")]) == 0
     assert "in order" in capsys.readouterr().out
     assert main(["run", str(WALL), "--set", "run.stepps=1", "--check"]) == 1
     said = capsys.readouterr().err
-    assert said == f"vi-contact: {WALL}: [run] has the unknown key 'stepps' for simulate: did you mean steps? Known: " \
-                   "dt, t_end, steps, out, tolerance, checkpoint_every\n"
+    assert (
+        said
+        == f"vi-contact: {WALL}: [run] has the unknown key 'stepps' for simulate: did you mean steps? Known: "
+        "dt, t_end, steps, out, tolerance, checkpoint_every\n"
+    )
 
 
 @pytest.mark.serial
@@ -478,20 +664,49 @@ def test_case_files_know_the_public_names() -> None:
     """Laws, obstacles, excitations, schemes, solvers, their methods and recorders, but those that take functions."""
     known = {name.split(".")[0] for choices in words(ROOT).choices.values() for name in choices}
     wanted = {*laws.__all__, *schemes.__all__, *solvers.__all__, *meshes.__all__}
-    wanted |= {"Energy", "Contact", "Probe", "Resultants", "Racking", "Reactions", "SectionForces", "CompliantBase",
-               "FreeField", "Schedule", "HalvedAtImpact", "CrossChecked", "GroundMotion"}
-    others = {"ExponentialDecay", "StaticKinetic", "RateIteration", "with_weight", "PMatrix", "p_matrix"}  # no words
+    wanted |= {
+        "Energy",
+        "Contact",
+        "Probe",
+        "Resultants",
+        "Racking",
+        "Reactions",
+        "SectionForces",
+        "CompliantBase",
+        "FreeField",
+        "Schedule",
+        "HalvedAtImpact",
+        "CrossChecked",
+        "GroundMotion",
+    }
+    others = {
+        "ExponentialDecay",
+        "StaticKinetic",
+        "RateIteration",
+        "with_weight",
+        "PMatrix",
+        "p_matrix",
+    }  # no words
     assert wanted - known == others
 
 
 @pytest.mark.serial
 def test_schemes_and_solvers_have_one_vocabulary() -> None:
     """Case files, the command line, ``vc.`` and the rooms say the same names, each listed once."""
-    assert {name.split(".")[0] for name in names_of(Scheme)} == set(schemes.__all__) <= set(vc.__all__)
+    assert (
+        {name.split(".")[0] for name in names_of(Scheme)} == set(schemes.__all__) <= set(vc.__all__)
+    )
     assert {"GeneralisedAlpha.spectral_radius", "LinearMultistep.newmark"} <= set(names_of(Scheme))
-    assert set(names_of(Solver)) == {"Automatic", "Condensed", "Iterative", "Volume", "CrossChecked"} <= set(vc.__all__)
+    assert (
+        set(names_of(Solver))
+        == {"Automatic", "Condensed", "Iterative", "Volume", "CrossChecked"}
+        <= set(vc.__all__)
+    )
     assert set(names_of(FrictionMethod)) == set(solvers.friction.__all__) - {
-        "Anderson", "Plain", "RateIteration"}
+        "Anderson",
+        "Plain",
+        "RateIteration",
+    }
 
 
 @pytest.mark.serial
@@ -502,7 +717,9 @@ def test_every_example_is_in_order() -> None:
 
 def test_a_component_of_a_record_by_its_name(shared_tmp: Path) -> None:
     """channel takes a number or a name in case files too; without it the components are listed."""
-    rows = "".join(f"{0.01 * k:.2f} {np.sin(0.3 * k):.6f} {2.0 * np.sin(0.3 * k):.6f}\n" for k in range(11))
+    rows = "".join(
+        f"{0.01 * k:.2f} {np.sin(0.3 * k):.6f} {2.0 * np.sin(0.3 * k):.6f}\n" for k in range(11)
+    )
     write(shared_tmp, "Time [s] North [g] East [g]\n" + rows, "motion.txt")
     plain = 'record = {path = "motion.txt", units = "g", processing = {pga = 4.0}}'
     for said, factor in (('"east"', 2.0), ("2", 2.0), ('"North"', 1.0)):
@@ -511,4 +728,6 @@ def test_a_component_of_a_record_by_its_name(shared_tmp: Path) -> None:
         peak = np.max(np.abs(case.problem(COMM).excitation[0].record.acceleration))
         assert peak == pytest.approx(factor * 9.80665 * np.round(np.sin(1.5), 6), rel=1e-5)
     with pytest.raises(vc.InputError, match="1: North, 2: East"):
-        read_case(write(shared_tmp, PAIR.replace(plain, 'record = {path = "motion.txt"}'))).problem(COMM)
+        read_case(write(shared_tmp, PAIR.replace(plain, 'record = {path = "motion.txt"}'))).problem(
+            COMM
+        )

@@ -65,7 +65,9 @@ def test_checks_of_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     out = tmp_path / "out"
     read_case(tmp_path / "layer.toml").run(MPI.COMM_SELF, out=out, progress=False)
     rest, active = comparisons(out)
-    assert rest.expected == pytest.approx(1e4 / 3.0, rel=1e-14) and rest.ratio == pytest.approx(1.0, rel=1e-9)
+    assert rest.expected == pytest.approx(1e4 / 3.0, rel=1e-14) and rest.ratio == pytest.approx(
+        1.0, rel=1e-9
+    )
     assert active.found == rest.found and np.isnan(active.expected) and "steeper" in active.applies
     assert main(["post", "checks", str(out)]) == 0
     said = capsys.readouterr().out
@@ -74,12 +76,18 @@ def test_checks_of_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert (out / "checks.csv").read_text(encoding="utf-8").count("\n") == 3
 
 
-@pytest.mark.parametrize(("change", "words"), [
-    (("AtRest", "Okabe"), "unknown type 'Okabe'"), (("nu = 0.25\npart", "mu = 0.25\npart"), "unknown key 'mu'"),
-    (("nu = 0.25\npart", "nu = 0.75\npart"), "nu is 0.75: give one from 0 to 0.5"),
-    (("AtRest", "mine.checks:Own"), "accepts built-in classes only"),
-])
-def test_wrong_tables_are_refused_before_the_run(tmp_path: Path, change: tuple[str, str], words: str) -> None:
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("AtRest", "Okabe"), "unknown type 'Okabe'"),
+        (("nu = 0.25\npart", "mu = 0.25\npart"), "unknown key 'mu'"),
+        (("nu = 0.25\npart", "nu = 0.75\npart"), "nu is 0.75: give one from 0 to 0.5"),
+        (("AtRest", "mine.checks:Own"), "accepts built-in classes only"),
+    ],
+)
+def test_wrong_tables_are_refused_before_the_run(
+    tmp_path: Path, change: tuple[str, str], words: str
+) -> None:
     (tmp_path / "layer.toml").write_text(LAYER.replace(*change), encoding="utf-8")
     with pytest.raises(InputError, match=rf"\[check\[1\].*{words}"):
         read_case(tmp_path / "layer.toml").check()
@@ -87,8 +95,12 @@ def test_wrong_tables_are_refused_before_the_run(tmp_path: Path, change: tuple[s
 
 def test_the_page_prints_what_it_says(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """S4.7: the case of docs/guide/checks.md, run from its text."""
-    page = (Path(vi_contact.__file__).parents[1] / "docs" / "guide" / "checks.md").read_text(encoding="utf-8")
-    case, printed = (re.findall(rf"```{kind}\n(.*?)```", page, re.DOTALL)[0] for kind in ("toml", "text"))
+    page = (Path(vi_contact.__file__).parents[1] / "docs" / "guide" / "checks.md").read_text(
+        encoding="utf-8"
+    )
+    case, printed = (
+        re.findall(rf"```{kind}\n(.*?)```", page, re.DOTALL)[0] for kind in ("toml", "text")
+    )
     (tmp_path / "layer.toml").write_text(case, encoding="utf-8")
     read_case(tmp_path / "layer.toml").run(MPI.COMM_SELF, out=tmp_path / "out", progress=False)
     assert main(["post", "checks", str(tmp_path / "out")]) == 0

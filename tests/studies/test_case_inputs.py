@@ -72,58 +72,94 @@ def said(capsys: pytest.CaptureFixture[str], arguments: list[str]) -> str:
     """The one sentence of a command that fails."""
     assert main(arguments) == 1
     captured = capsys.readouterr()
-    assert captured.out == "" and captured.err.startswith("vi-contact: ") and captured.err.count("\n") == 1
+    assert (
+        captured.out == ""
+        and captured.err.startswith("vi-contact: ")
+        and captured.err.count("\n") == 1
+    )
     return captured.err
 
 
-def test_every_path_is_relative_to_the_case_file(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                                                 capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_path_is_relative_to_the_case_file(
+    folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     """Mesh, source of a cut, record and run folder."""
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
-    cut = ('type = "read_mesh"\npath = "meshes/block.msh"',
-           'type = "Welded"\nsource = "meshes/block.msh"\nfirst = "left"\nsecond = "left"')  # changes nothing
+    cut = (
+        'type = "read_mesh"\npath = "meshes/block.msh"',
+        'type = "Welded"\nsource = "meshes/block.msh"\nfirst = "left"\nsecond = "left"',
+    )  # changes nothing
     assert main(["run", case(folder, cut), "--quiet"]) == 0
-    assert (folder / "out" / "history.csv").is_file() and not list((tmp_path / "elsewhere").iterdir())
+    assert (folder / "out" / "history.csv").is_file() and not list(
+        (tmp_path / "elsewhere").iterdir()
+    )
     capsys.readouterr()
     assert main(["run", case(folder), "--check"]) == 0 and "in order" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(("old", "new", "words"), [
-    ("meshes/block.msh", "meshes/none.msh", "none.msh does not exist"),
-    ('clamped = "bottom"', 'clamped = "botom"', "[system] clamped is 'botom', but the mesh has no group 'botom'"),
-    ('facets = "top"', 'facets = "topp"', "[contact[1]] facets is 'topp'"),
-    ('facets = "top"', 'facets = "block"', "is 'block', a cell group: give the name of a boundary group"),
-    ("motion.at2", "none.at2", "none.at2: there is no such file"),
-    ("motion.at2", "", "path is empty: give the path of a file or folder"),
-    ("motion.at2", "a\\u0000b", "contains the character NUL"),
-    ('"out"', '" "', "[run] out is empty"),
-    ("format = 1", "format = 2", "format is 2, and this version of vi_contact reads format 1"),
-    ("format = 1", 'format = "new"', "format is 'new'"),
-    ("format = 1", "format = true", "format is True"),
-    ("dt = 0.01", "dt = nan", "run.dt is nan: give a number"),
-    ("points = {top = [0.0, 1.0]}", "points = {top = [0.0, nan]}", "record.1.points.top.2 is nan"),
-    ("points = {top = [0.0, 1.0]}", "points = {}", "points"),
-    ("dt = 0.01", f"dt = 1{'0' * 400}", "whole number beyond 64 bits"),
-    ("dt = 0.01", f"dt = 1{'0' * 5000}", "whole number beyond 64 bits"),
-    ("dt = 0.01", f"dt = 0x{'f' * 5000}", "whole number beyond 64 bits"),
-    ("dt = 0.01", f"dt = {'[' * 3000}", "nested too deep"),
-    ("dt = 0.01", f"dt = {'[' * 30}{']' * 30}", "nested too deep"),
-    ("dt = 0.01", f"{'a.' * 3000}b = 1\ndt = 0.01", "nested too deep"),
-    ("dt = 0.01", f"{'a.' * 1_000_000}b = 1\ndt = 0.01", "nested too deep"),
-], ids=range(21))
-def test_check_tells_every_mistake(folder: Path, capsys: pytest.CaptureFixture[str], old: str, new: str,
-                                   words: str) -> None:
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("meshes/block.msh", "meshes/none.msh", "none.msh does not exist"),
+        (
+            'clamped = "bottom"',
+            'clamped = "botom"',
+            "[system] clamped is 'botom', but the mesh has no group 'botom'",
+        ),
+        ('facets = "top"', 'facets = "topp"', "[contact[1]] facets is 'topp'"),
+        (
+            'facets = "top"',
+            'facets = "block"',
+            "is 'block', a cell group: give the name of a boundary group",
+        ),
+        ("motion.at2", "none.at2", "none.at2: there is no such file"),
+        ("motion.at2", "", "path is empty: give the path of a file or folder"),
+        ("motion.at2", "a\\u0000b", "contains the character NUL"),
+        ('"out"', '" "', "[run] out is empty"),
+        ("format = 1", "format = 2", "format is 2, and this version of vi_contact reads format 1"),
+        ("format = 1", 'format = "new"', "format is 'new'"),
+        ("format = 1", "format = true", "format is True"),
+        ("dt = 0.01", "dt = nan", "run.dt is nan: give a number"),
+        (
+            "points = {top = [0.0, 1.0]}",
+            "points = {top = [0.0, nan]}",
+            "record.1.points.top.2 is nan",
+        ),
+        ("points = {top = [0.0, 1.0]}", "points = {}", "points"),
+        ("dt = 0.01", f"dt = 1{'0' * 400}", "whole number beyond 64 bits"),
+        ("dt = 0.01", f"dt = 1{'0' * 5000}", "whole number beyond 64 bits"),
+        ("dt = 0.01", f"dt = 0x{'f' * 5000}", "whole number beyond 64 bits"),
+        ("dt = 0.01", f"dt = {'[' * 3000}", "nested too deep"),
+        ("dt = 0.01", f"dt = {'[' * 30}{']' * 30}", "nested too deep"),
+        ("dt = 0.01", f"{'a.' * 3000}b = 1\ndt = 0.01", "nested too deep"),
+        ("dt = 0.01", f"{'a.' * 1_000_000}b = 1\ndt = 0.01", "nested too deep"),
+    ],
+    ids=range(21),
+)
+def test_check_tells_every_mistake(
+    folder: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, words: str
+) -> None:
     assert words in said(capsys, ["run", case(folder, (old, new)), "--check"])
 
 
-@pytest.mark.parametrize("setting", [f"run.dt={'[' * 3000}", f"{'a.' * 3000}b=1", f"run.dt=1{'0' * 5000}",
-                                     "run.dt=nan"], ids=range(4))
-def test_settings_are_read_as_carefully(folder: Path, capsys: pytest.CaptureFixture[str], setting: str) -> None:
+@pytest.mark.parametrize(
+    "setting",
+    [f"run.dt={'[' * 3000}", f"{'a.' * 3000}b=1", f"run.dt=1{'0' * 5000}", "run.dt=nan"],
+    ids=range(4),
+)
+def test_settings_are_read_as_carefully(
+    folder: Path, capsys: pytest.CaptureFixture[str], setting: str
+) -> None:
     assert len(said(capsys, ["run", case(folder), "--check", "--set", setting])) < 400
 
 
-def test_a_boundary_saved_without_its_body(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_boundary_saved_without_its_body(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """A .geo with Physical Curves and no Physical Surface leaves a mesh of lines, whose groups are of cells."""
     with session() as gmsh:
         geo = gmsh.model.geo
@@ -133,16 +169,30 @@ def test_a_boundary_saved_without_its_body(folder: Path, capsys: pytest.CaptureF
         gmsh.model.mesh.generate(1)
         gmsh.write(str(folder / "meshes" / "block.msh"))
     sentence = said(capsys, ["run", case(folder), "--check"])
-    assert "a cell group: give the name of a boundary group, or, if it bounds the body, the mesh has no 2D cells: " \
-           "add a Physical Surface in Gmsh" in sentence
+    assert (
+        "a cell group: give the name of a boundary group, or, if it bounds the body, the mesh has no 2D cells: "
+        "add a Physical Surface in Gmsh" in sentence
+    )
 
 
-@pytest.mark.parametrize("arguments", [
-    ["run", "CASE", "--out", ""], ["run", "CASE", "--out="], ["report", "CASE", "--out", ""],
-    ["run", "wall", "--out", "", "--steps", "1"], ["run", "a\0b"], ["motion", "info", "a\0b"],
-])
-def test_empty_names_and_nul_are_refused(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                                         capsys: pytest.CaptureFixture[str], arguments: list[str]) -> None:
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["run", "CASE", "--out", ""],
+        ["run", "CASE", "--out="],
+        ["report", "CASE", "--out", ""],
+        ["run", "wall", "--out", "", "--steps", "1"],
+        ["run", "a\0b"],
+        ["motion", "info", "a\0b"],
+    ],
+)
+def test_empty_names_and_nul_are_refused(
+    folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+) -> None:
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")
     sentence = said(capsys, [case(folder) if word == "CASE" else word for word in arguments])
@@ -159,7 +209,9 @@ def test_run_refuses_no_steps(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_a_misspelt_demand_is_told_before_the_first_run(folder: Path, tmp_path: Path) -> None:
     study = IDA(read_case(case(folder)), [folder / "motion.at2"], ["u_x_topp:max"], scales=(1.0,))
-    with pytest.raises(InputError, match="demand 'u_x_topp': the runs record no such column: did you mean u_x_top"):
+    with pytest.raises(
+        InputError, match="demand 'u_x_topp': the runs record no such column: did you mean u_x_top"
+    ):
         run_ida(study, tmp_path / "ida", say=lambda line: None)
     assert not list((tmp_path / "ida").glob("runs/*"))
 
@@ -167,22 +219,41 @@ def test_a_misspelt_demand_is_told_before_the_first_run(folder: Path, tmp_path: 
 def test_the_columns_are_those_of_a_run(folder: Path) -> None:
     one = read_case(case(folder))
     written = one.run(MPI.COMM_SELF, out=folder / "out", progress=False)
-    assert one.columns(MPI.COMM_SELF) == {name for name, values in written.history.items() if values.ndim == 1}
+    assert one.columns(MPI.COMM_SELF) == {
+        name for name, values in written.history.items() if values.ndim == 1
+    }
 
 
-def test_no_run_that_finished_is_a_failure(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                                           capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_run_that_finished_is_a_failure(
+    folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     row = {"status": "failed", "reason": "no luck"}
     monkeypatch.setattr("vi_contact.studies.ida.ida.run_ida", lambda *_, **__: [row, row])
     monkeypatch.setattr("signal.signal", lambda *_: None)
-    given = ["ida", case(folder), "--motions", str(folder / "motion.at2"), "--edp", "u_x_top", "--scales", "1",
-             "--out", str(tmp_path / "ida")]
+    given = [
+        "ida",
+        case(folder),
+        "--motions",
+        str(folder / "motion.at2"),
+        "--edp",
+        "u_x_top",
+        "--scales",
+        "1",
+        "--out",
+        str(tmp_path / "ida"),
+    ]
     assert "2 of 2 runs have failed, the first because: no luck" in said(capsys, given)
     assert "--launch" in said(capsys, [*given, "--launch", "'"])
 
 
-@pytest.mark.parametrize("text", ["[1]", "[" * 3000, "{}", '{"record": 1}', "\udcff", '{"record": "a", "status": "b"}'],
-                         ids=range(6))
+@pytest.mark.parametrize(
+    "text",
+    ["[1]", "[" * 3000, "{}", '{"record": 1}', "\udcff", '{"record": "a", "status": "b"}'],
+    ids=range(6),
+)
 def test_rows_and_studies_that_are_damaged(folder: Path, tmp_path: Path, text: str) -> None:
     (tmp_path / "ida").mkdir()
     for name in ("row.json", "ida/ida.json"):
@@ -200,12 +271,19 @@ class Petsc(RuntimeError):
     ierr = 55
 
 
-@pytest.mark.parametrize("error", [
-    MemoryError(), MemoryError("Unable to allocate 7.3 TiB for an array"), OSError(12, os.strerror(12)),
-    RuntimeError("Unable to create dataset (memory allocation failed)"), Petsc("error code 55"),
-])
-def test_out_of_memory_is_one_sentence(error: Exception, monkeypatch: pytest.MonkeyPatch,
-                                       capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    "error",
+    [
+        MemoryError(),
+        MemoryError("Unable to allocate 7.3 TiB for an array"),
+        OSError(12, os.strerror(12)),
+        RuntimeError("Unable to create dataset (memory allocation failed)"),
+        Petsc("error code 55"),
+    ],
+)
+def test_out_of_memory_is_one_sentence(
+    error: Exception, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     def fails(options: object) -> str:
         raise error
 
@@ -215,6 +293,7 @@ def test_out_of_memory_is_one_sentence(error: Exception, monkeypatch: pytest.Mon
 
 def test_other_errors_keep_their_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
     """A defect is not hidden."""
+
     def fails(options: object) -> str:
         raise KeyError(json.dumps("defect"))
 

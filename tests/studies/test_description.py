@@ -85,49 +85,77 @@ def test_numbers_of_two_blocks(shared_tmp: Path) -> None:
     assert free["bodies"][0]["material"] == {"type": "LinearElastic", "E": E, "nu": 0.0, "rho": RHO}
     assert {"name": "upper_left", "kind": "facets"} in free["groups"] and len(free["groups"]) == 10
     assert [(one["kind"], one["groups"], one["components"]) for one in free["supports"]] == [
-        ("clamped", ["lower_bottom"], ["x", "y"]), ("held", ["lower_left"], ["x"]), ("held", ["lower_right"], ["x"]),
-        ("Dashpots", ["upper_top"], ["x", "y"])]
+        ("clamped", ["lower_bottom"], ["x", "y"]),
+        ("held", ["lower_left"], ["x"]),
+        ("held", ["lower_right"], ["x"]),
+        ("Dashpots", ["upper_top"], ["x", "y"]),
+    ]
     (contact,) = free["contact"]
     assert contact["name"] == "upper_bottom on lower_top" and contact["points"] == 2
     assert contact["size"] == pytest.approx(0.25) and contact["friction"] == "Coulomb(mu=0.5)"
     c_s = np.sqrt(0.5 * E / RHO)
     for wave in free["waves"]:
         assert [wave[key] for key in ("c_s", "h", "f_max", "dt_ratio")] == pytest.approx(
-            [c_s, 0.25, c_s / 2.0, 0.002 * c_s / 0.25], rel=1e-9)
+            [c_s, 0.25, c_s / 2.0, 0.002 * c_s / 0.25], rel=1e-9
+        )
     assert free["run"] == {"dt": 0.002, "t_end": pytest.approx(0.006), "steps": 3}
     (record,) = free["records"]
-    assert record["file"] == "synthetic, seed 3" and record["scale"] == 2.0 and 1.0 < record["f_95"] < 50.0
-    assert free["rigid_motions"] == 0 and described(path, COMM, "friction=")["rigid_motions"] == 1  # it may slide
+    assert (
+        record["file"] == "synthetic, seed 3"
+        and record["scale"] == 2.0
+        and 1.0 < record["f_95"] < 50.0
+    )
+    assert (
+        free["rigid_motions"] == 0 and described(path, COMM, "friction=")["rigid_motions"] == 1
+    )  # it may slide
     closed = described(path, COMM, f"system.prescribed=[{held}]")
-    assert closed["periods"] == pytest.approx([axial(n, HEIGHT, CELLS) for n in (1, 2, 3)], rel=1e-8)
+    assert closed["periods"] == pytest.approx(
+        [axial(n, HEIGHT, CELLS) for n in (1, 2, 3)], rel=1e-8
+    )
     gap = described(path, COMM, f"system.prescribed=[{held}]", "mesh.gap=0.1")
     assert gap["rigid_motions"] == 1
     assert gap["periods"][0] == pytest.approx(axial(1, HEIGHT / 2, CELLS // 2), rel=1e-8)
-    across = described(path, COMM, f"system.prescribed=[{held}]", "mesh.gap=0.1", "contact.1.held=true")
-    assert across["periods"] == pytest.approx(closed["periods"], rel=1e-8) and across["rigid_motions"] == 0
+    across = described(
+        path, COMM, f"system.prescribed=[{held}]", "mesh.gap=0.1", "contact.1.held=true"
+    )
+    assert (
+        across["periods"] == pytest.approx(closed["periods"], rel=1e-8)
+        and across["rigid_motions"] == 0
+    )
     assert "periods" not in describe(read_case(path), COMM, most=51)
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize(("axes", "G"), [("0.3", 5e8), ("[[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]", 2e8)])
-def test_shear_in_the_plane_is_that_of_the_axes_there(shared_tmp: Path, axes: str, G: float) -> None:
+@pytest.mark.parametrize(
+    ("axes", "G"), [("0.3", 5e8), ("[[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]", 2e8)]
+)
+def test_shear_in_the_plane_is_that_of_the_axes_there(
+    shared_tmp: Path, axes: str, G: float
+) -> None:
     """The other two moduli carry no wave in the plane, however soft."""
-    timber = ('{type = "Orthotropic", E1 = 1e10, E2 = 1e9, E3 = 1e9, nu12 = 0.0, nu13 = 0.0, nu23 = 0.0, G12 = 5e8, '
-              f"G13 = 1e8, G23 = 2e8, rho = 500.0, axes = {axes}}}")
+    timber = (
+        '{type = "Orthotropic", E1 = 1e10, E2 = 1e9, E3 = 1e9, nu12 = 0.0, nu13 = 0.0, nu23 = 0.0, G12 = 5e8, '
+        f"G13 = 1e8, G23 = 2e8, rho = 500.0, axes = {axes}}}"
+    )
     model = described(written(shared_tmp), COMM, "system.dashpots=", f"material.upper={timber}")
-    assert {one["body"]: one["c_s"] for one in model["waves"]}["upper"] == pytest.approx(np.sqrt(G / 500.0), rel=1e-9)
+    assert {one["body"]: one["c_s"] for one in model["waves"]}["upper"] == pytest.approx(
+        np.sqrt(G / 500.0), rel=1e-9
+    )
 
 
 def test_any_number_of_ranks_describes_alike(shared_tmp: Path) -> None:
     path = written(shared_tmp)
     whole, alone = described(path), described(path, MPI.COMM_SELF)
-    assert [len(one["lines"]) for one in alone["outline"] if one["group"] in ("", "upper_left")] == [36, 8]
+    assert [
+        len(one["lines"]) for one in alone["outline"] if one["group"] in ("", "upper_left")
+    ] == [36, 8]
     read_case(path).run(COMM, out=shared_tmp / "run", progress=False)
     kept = json.loads((shared_tmp / "run" / "model.json").read_text("utf-8"))
     for model in (whole, kept) if COMM.rank == 0 else (whole,):
         assert model.pop("periods") == pytest.approx(alone["periods"], rel=1e-8)
         assert {key: one for key, one in model.items() if key != "outline"} == {
-            key: one for key, one in alone.items() if key not in ("outline", "periods")}
+            key: one for key, one in alone.items() if key not in ("outline", "periods")
+        }
         assert COMM.rank > 0 or model["outline"] == alone["outline"]
 
 
@@ -151,22 +179,45 @@ def test_the_model_of_a_run_is_kept(tmp_path: Path, capsys: pytest.CaptureFixtur
     path, out = str(written(tmp_path, text)), tmp_path / "out"
     assert main(["run", path, "--out", str(out), "--quiet"]) == 0
     model = (out / "model.json").read_bytes()
-    assert main(["run", path, "--out", str(out), "--quiet", "--check", "--set", "material.upper.rho=1000.0"]) == 0
+    assert (
+        main(
+            [
+                "run",
+                path,
+                "--out",
+                str(out),
+                "--quiet",
+                "--check",
+                "--set",
+                "material.upper.rho=1000.0",
+            ]
+        )
+        == 0
+    )
     told = capsys.readouterr().out
-    assert f"picture: {out / 'check' / 'model.png'}\n" in told and "\x1b" not in told and "Two \\x1b[2J blocks" in told
+    assert (
+        f"picture: {out / 'check' / 'model.png'}\n" in told
+        and "\x1b" not in told
+        and "Two \\x1b[2J blocks" in told
+    )
     assert (out / "model.json").read_bytes() == model and not (out / "model.png").exists()
     assert (out / "check" / "model.png").read_bytes()[:4] == b"\x89PNG"
 
 
 @pytest.mark.serial
-def test_the_page_shows_what_the_command_tells(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                                               capsys: pytest.CaptureFixture[str]) -> None:
-    page = (Path(__file__).resolve().parents[2] / "docs" / "guide" / "check.md").read_text(encoding="utf-8")
+def test_the_page_shows_what_the_command_tells(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs" / "guide" / "check.md").read_text(
+        encoding="utf-8"
+    )
     (shown,) = re.findall(r"^```text\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
     monkeypatch.chdir(tmp_path)
     assert main(["run", "channel", "--check", "--quiet"]) == 0
     *told, last = capsys.readouterr().out.splitlines()
-    assert told == shown.splitlines() and last.endswith("A channel buried in soil, shaken: the file is in order")
+    assert told == shown.splitlines() and last.endswith(
+        "A channel buried in soil, shaken: the file is in order"
+    )
 
 
 @pytest.mark.serial
@@ -178,15 +229,25 @@ def test_a_sketch_shows_what_holds_and_touches(tmp_path: Path, d: int) -> None:
         text = text.replace("[0.25, 2.0]", "[0.25, 2.0, 1.0]").replace("[1, 8]", "[1, 8, 2]")
         text = text.replace("direction = [0.0, 1.0]", "direction = [0.0, 1.0, 0.0]")
     if d == 1:
-        text = re.sub(r"prescribed = .*\n", "", text.replace("[0.25, 2.0]", "[2.0]").replace("[1, 8]", "[8]"))
-        text = text.replace("direction = [0.0, 1.0]", "direction = [1.0]").replace("_bottom", "_left")
-        text = text.replace("lower_top", "lower_right").replace("upper_top", "upper_right").replace("[friction]", "")
+        text = re.sub(
+            r"prescribed = .*\n", "", text.replace("[0.25, 2.0]", "[2.0]").replace("[1, 8]", "[8]")
+        )
+        text = text.replace("direction = [0.0, 1.0]", "direction = [1.0]").replace(
+            "_bottom", "_left"
+        )
+        text = (
+            text.replace("lower_top", "lower_right")
+            .replace("upper_top", "upper_right")
+            .replace("[friction]", "")
+        )
         text = text.replace('type = "Coulomb"\nmu = 0.5\n', "")
     model = described(written(tmp_path, text))
     (axis,) = sketch(model).axes
     names = [one.get_text() for one in axis.get_legend().get_texts()]
     letters = ", ".join("xyz"[:d])
-    assert names[0] == f"clamped {letters}: lower_{'left' if d == 1 else 'bottom'}" and names[-1].startswith("contact")
+    assert names[0] == f"clamped {letters}: lower_{'left' if d == 1 else 'bottom'}" and names[
+        -1
+    ].startswith("contact")
     assert len(model["outline"]) == {1: 2, 2: 9, 3: 2}[d]
     dots = axis.lines[-1]
     shown = np.array(dots.get_data_3d() if d == 3 else dots.get_xydata().T)
@@ -194,24 +255,49 @@ def test_a_sketch_shows_what_holds_and_touches(tmp_path: Path, d: int) -> None:
 
 
 RECORD = '{type = "synthetic", spectrum = {s0 = 0.01}, duration = 1.0, dt = 0.01, seed = 3}'
-SECOND = '\n[[excitation]]\ntype = "GroundMotion"\ndirection = [1.0, 0.0]\nrecord = ' + RECORD + "\n"
+SECOND = (
+    '\n[[excitation]]\ntype = "GroundMotion"\ndirection = [1.0, 0.0]\nrecord = ' + RECORD + "\n"
+)
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize(("old", "new", "said"), [
-    ('"upper_bottom"', '"uper_bottom"', "did you mean upper_bottom"),
-    ('"lower_bottom"', '"zz"', "upper: name it in Gmsh"),
-    ("[run]", SECOND.replace("dt = 0.01", "dt = 0.02") + "[run]",
-     "have samples every 0.01 and 0.02 s: bring them to one step"),
-    ("[run]", SECOND.replace("duration = 1.0", "duration = 2.0") + "[run]", "last 1 and 2 s: trim or pad one"),
-    ("dt = 0.002", "dt = 0.02", "time step of 0.02 s leaves out samples of 'synthetic, seed 3'"),
-    (RECORD, '"none.at2"', "none.at2: there is no such file"),
-    ("steps = 3", 'steps = 3\n[[record]]\ntype = "Probe"\npoints = {far = [9.0, 9.0]}', "m away from the nearest node"),
-    ("dashpots", 'loads = [{type = "Pressure", facets = "upper_top", value = "9810*(35 - z)"}]\ndashpots',
-     "[system] '9810*(35 - z)' has z, and a model of dimension 2 has only x, y"),
-], ids=range(8))
-def test_check_ends_with_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str,
-                                       said: str) -> None:
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('"upper_bottom"', '"uper_bottom"', "did you mean upper_bottom"),
+        ('"lower_bottom"', '"zz"', "upper: name it in Gmsh"),
+        (
+            "[run]",
+            SECOND.replace("dt = 0.01", "dt = 0.02") + "[run]",
+            "have samples every 0.01 and 0.02 s: bring them to one step",
+        ),
+        (
+            "[run]",
+            SECOND.replace("duration = 1.0", "duration = 2.0") + "[run]",
+            "last 1 and 2 s: trim or pad one",
+        ),
+        (
+            "dt = 0.002",
+            "dt = 0.02",
+            "time step of 0.02 s leaves out samples of 'synthetic, seed 3'",
+        ),
+        (RECORD, '"none.at2"', "none.at2: there is no such file"),
+        (
+            "steps = 3",
+            'steps = 3\n[[record]]\ntype = "Probe"\npoints = {far = [9.0, 9.0]}',
+            "m away from the nearest node",
+        ),
+        (
+            "dashpots",
+            'loads = [{type = "Pressure", facets = "upper_top", value = "9810*(35 - z)"}]\ndashpots',
+            "[system] '9810*(35 - z)' has z, and a model of dimension 2 has only x, y",
+        ),
+    ],
+    ids=range(8),
+)
+def test_check_ends_with_what_is_wrong(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, said: str
+) -> None:
     assert BLOCKS.count(old) == 1
     path = written(tmp_path, BLOCKS.replace(old, new))
     assert main(["run", str(path), "--check", "--quiet", "--out", str(tmp_path / "out")]) == 1
@@ -220,14 +306,25 @@ def test_check_ends_with_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFix
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("motion", [RECORD, f'[{{type = "GroundMotion", direction = [0.0, 1.0], record = {RECORD}}}]'],
-                         ids=["record", "excitation"])
+@pytest.mark.parametrize(
+    "motion",
+    [RECORD, f'[{{type = "GroundMotion", direction = [0.0, 1.0], record = {RECORD}}}]'],
+    ids=["record", "excitation"],
+)
 def test_motions_of_a_compliant_base_are_records(tmp_path: Path, motion: str) -> None:
     """Told once, however many boundaries it comes through, and looked at as those of excitations are."""
-    base = 'facets = "lower_bottom", normal = 0.5, motion = {direction = [0.0, 1.0], motion = ' + motion + "}}, "
-    bases = "".join(f'{{type = "CompliantBase", {one}' for one in (base, base.replace("_bottom", "_left")))
+    base = (
+        'facets = "lower_bottom", normal = 0.5, motion = {direction = [0.0, 1.0], motion = '
+        + motion
+        + "}}, "
+    )
+    bases = "".join(
+        f'{{type = "CompliantBase", {one}' for one in (base, base.replace("_bottom", "_left"))
+    )
     text = re.sub(r"\[\[excitation\]\].*?\n(?=\[run\])", "", BLOCKS, flags=re.DOTALL)
-    text = re.sub("clamped = .*\nprescribed = .*\n", "", text).replace("dashpots = [", f"dashpots = [{bases}")
+    text = re.sub("clamped = .*\nprescribed = .*\n", "", text).replace(
+        "dashpots = [", f"dashpots = [{bases}"
+    )
     model = described(written(tmp_path, text.replace("dt = 0.002", "dt = 0.02")))
     (record,) = model["records"]
     assert record["file"] == "synthetic, seed 3" and 1.0 < record["f_95"] < 50.0
@@ -240,7 +337,10 @@ def test_warnings_name_what_is_coarse(tmp_path: Path) -> None:
     """Edges too long for the record's energy, and steps longer than a twentieth of the first period."""
     soft = described(written(tmp_path, BLOCKS.replace("E = 1.8e9", "E = 1.8e4")))
     assert [one.split()[0] for one in soft["warnings"]] == ["'lower'", "'upper'"]
-    assert np.sqrt(0.5 * 1.8e4 / RHO) / 2.0 == pytest.approx(1.06, rel=1e-2) and "up to 1.06 Hz" in soft["warnings"][0]
+    assert (
+        np.sqrt(0.5 * 1.8e4 / RHO) / 2.0 == pytest.approx(1.06, rel=1e-2)
+        and "up to 1.06 Hz" in soft["warnings"][0]
+    )
     (slow,) = described(written(tmp_path), COMM, "run.dt=0.005")["warnings"]
     assert "0.005 s is longer than a twentieth of the first natural period" in slow
 
@@ -269,7 +369,9 @@ matching = {type = "DualMortar"}
 dt = 0.002
 steps = 2
 """
-EXCHANGED = RAFT.replace('1 = "upper_bottom"', '1 = "lower_top"').replace('2 = "lower_top"', '2 = "upper_bottom"')
+EXCHANGED = RAFT.replace('1 = "upper_bottom"', '1 = "lower_top"').replace(
+    '2 = "lower_top"', '2 = "upper_bottom"'
+)
 FINER = RAFT.replace("divisions = [13, 4]", "divisions = [40, 8]")
 
 
@@ -286,7 +388,11 @@ def test_contact_nodes_are_counted_and_placed(shared_tmp: Path) -> None:
         "in front of nothing": 7,
         "partly covered": 1,
     }
-    labels = sketch(model).axes[0].get_legend_handles_labels()[1] if COMM.rank == 0 else ["base: 1 partly covered"]
+    labels = (
+        sketch(model).axes[0].get_legend_handles_labels()[1]
+        if COMM.rank == 0
+        else ["base: 1 partly covered"]
+    )
     assert "base: 1 partly covered" in labels
 
 
@@ -319,15 +425,20 @@ def test_a_softer_side_2_with_longer_edges_is_told(
 
 def test_steps_are_compared_with_periods_of_open_contact(shared_tmp: Path) -> None:
     """The lower block carries the upper one: apart, the clamped one swings as it does alone, quicker than both."""
-    sides = ", ".join(f'{{facets = "{block}_{side}", components = [0]}}' for block in ("lower", "upper")
-                      for side in ("left", "right"))
+    sides = ", ".join(
+        f'{{facets = "{block}_{side}", components = [0]}}'
+        for block in ("lower", "upper")
+        for side in ("left", "right")
+    )
     model = described(written(shared_tmp), COMM, f"system.prescribed=[{sides}]")
     assert model["periods_open"] == pytest.approx([axial(1, HEIGHT / 2, CELLS // 2)], rel=1e-8)
     assert model["periods_open"][0] < 0.51 * model["periods"][0]
     model["periods"].clear()  # as where closed contact holds everything
     for dt, count in ((0.99, 0), (1.01, 1)):
         model["run"]["dt"] = dt * model["periods_open"][0] / 20.0
-        said = [one for one in _warnings(model) if "first natural period with the contact open" in one]
+        said = [
+            one for one in _warnings(model) if "first natural period with the contact open" in one
+        ]
         assert len(said) == count
     assert set(described(written(shared_tmp), COMM, "mesh.gap=0.1")) - set(model) == set()
 
@@ -339,6 +450,6 @@ amplitude = 1.0
 frequency = 250.0
 direction = [0.0, 1.0]
 """
-    text = BLOCKS.replace(BLOCKS[BLOCKS.index("[[excitation]]"):BLOCKS.index("[run]")], shaking)
+    text = BLOCKS.replace(BLOCKS[BLOCKS.index("[[excitation]]") : BLOCKS.index("[run]")], shaking)
     words = "is 1 times half the period of Harmonic of 250 Hz"
     assert sum(words in one for one in described(written(shared_tmp, text), COMM)["warnings"]) == 1

@@ -35,12 +35,15 @@ def test_narrow_brackets_are_known_capacities(count: int, width: float) -> None:
     capacity = np.exp(np.random.default_rng(count).normal(0.3, 0.4, count))
     mean, beta = np.log(capacity).mean(), np.log(capacity).std()
     for unit in (1.0, 1e-6, 1e9):
-        found = fragility_curve(unit * np.stack([capacity * (1.0 - width / 2), capacity * (1.0 + width / 2)], axis=1))
+        found = fragility_curve(
+            unit * np.stack([capacity * (1.0 - width / 2), capacity * (1.0 + width / 2)], axis=1)
+        )
         assert (found.theta, found.beta) == pytest.approx((unit * np.exp(mean), beta), rel=1e-6)
         expected = np.diag([beta**2 / count, 1.0 / (2 * count)])
         assert found.covariance == pytest.approx(expected, rel=1e-6, abs=1e-6 * expected.max())
         assert found.intervals[0] == pytest.approx(
-            found.theta * np.exp(1.959964 * beta / np.sqrt(count) * np.array([-1.0, 1.0])), rel=1e-6)
+            found.theta * np.exp(1.959964 * beta / np.sqrt(count) * np.array([-1.0, 1.0])), rel=1e-6
+        )
 
 
 def likelihood(brackets: np.ndarray, theta: np.ndarray, beta: np.ndarray) -> np.ndarray:
@@ -66,7 +69,9 @@ def test_coarse_levels_against_a_search(seed: int) -> None:
     logs, step = np.log([found.theta, found.beta]), 0.01
     near = step * np.arange(-100, 101)
     for shift in (0.0, 0.37 * step):
-        grid = likelihood(brackets, np.exp(logs[0] + shift + near)[:, None], np.exp(logs[1] + shift + near))
+        grid = likelihood(
+            brackets, np.exp(logs[0] + shift + near)[:, None], np.exp(logs[1] + shift + near)
+        )
         assert likelihood(brackets, found.theta, found.beta) >= grid.max() - 1e-12
         best = np.unravel_index(np.argmax(grid), grid.shape)
         assert np.abs(near[list(best)] + shift).max() < step
@@ -75,25 +80,46 @@ def test_coarse_levels_against_a_search(seed: int) -> None:
     def at(i: float, j: float) -> float:
         return float(likelihood(brackets, np.exp(logs[0] + i * h), np.exp(logs[1] + j * h)))
 
-    bend = np.array([[at(1, 0) - 2 * at(0, 0) + at(-1, 0), (at(1, 1) - at(1, -1) - at(-1, 1) + at(-1, -1)) / 4],
-                     [0.0, at(0, 1) - 2 * at(0, 0) + at(0, -1)]]) / h**2
+    bend = (
+        np.array(
+            [
+                [
+                    at(1, 0) - 2 * at(0, 0) + at(-1, 0),
+                    (at(1, 1) - at(1, -1) - at(-1, 1) + at(-1, -1)) / 4,
+                ],
+                [0.0, at(0, 1) - 2 * at(0, 0) + at(0, -1)],
+            ]
+        )
+        / h**2
+    )
     bend[1, 0] = bend[0, 1]
     assert found.covariance == pytest.approx(np.linalg.inv(-bend), rel=1e-4)
     low, value, high = found.probability(np.array([found.theta, found.theta * np.exp(found.beta)]))
     assert value == pytest.approx(norm.cdf([0.0, 1.0]), abs=1e-12)
-    assert low[0] == pytest.approx(norm.cdf(-1.959964 * np.sqrt(found.covariance[0, 0]) / found.beta), abs=1e-6)
+    assert low[0] == pytest.approx(
+        norm.cdf(-1.959964 * np.sqrt(found.covariance[0, 0]) / found.beta), abs=1e-6
+    )
     assert np.all(low < value) and np.all(value < high)
 
 
-@pytest.mark.parametrize(("brackets", "said"), [
-    (np.zeros((0, 2)), "0 of 0 records pass the limit"),
-    ([(9.0, INF)] * 3, "0 of 3 records pass the limit, maybe all at one intensity from 9 to inf: give oth"),
-    ([(0.0, 1.0)] * 3, "3 of 3 records .* from 0 to 1"),
-    ([(1.0, 2.0), (1.0, 3.0), (0.0, 2.0)], "from 1 to 2"),
-    ([(1.0, 2.0), (2.0, 3.0)], "from 2 to 2"),
-    ([(1.0, 2.0 - 4e-16), (2.0 + 4e-16, 3.0)], "from 2 to 2"),
-    ([(0.0, 1.0), (2.0, INF)], "the capacities of 2 records have a spread that cannot be fitted: give more"),
-])
+@pytest.mark.parametrize(
+    ("brackets", "said"),
+    [
+        (np.zeros((0, 2)), "0 of 0 records pass the limit"),
+        (
+            [(9.0, INF)] * 3,
+            "0 of 3 records pass the limit, maybe all at one intensity from 9 to inf: give oth",
+        ),
+        ([(0.0, 1.0)] * 3, "3 of 3 records .* from 0 to 1"),
+        ([(1.0, 2.0), (1.0, 3.0), (0.0, 2.0)], "from 1 to 2"),
+        ([(1.0, 2.0), (2.0, 3.0)], "from 2 to 2"),
+        ([(1.0, 2.0 - 4e-16), (2.0 + 4e-16, 3.0)], "from 2 to 2"),
+        (
+            [(0.0, 1.0), (2.0, INF)],
+            "the capacities of 2 records have a spread that cannot be fitted: give more",
+        ),
+    ],
+)
 def test_brackets_without_a_curve(brackets: list[tuple[float, float]], said: str) -> None:
     """What no curve, or a step, fits best is refused."""
     with pytest.raises(InputError, match=said):
@@ -107,13 +133,40 @@ def row(record: str, level: float | None, demand: float | None, status: str = "f
 def test_where_records_pass() -> None:
     """The first crossing counts, in any order of rows; beyond a failed run nothing is known, nor of a run whose demand
     is no number; a record without a known run is left out."""
-    rows = [row("a", 3.0, 1.0), row("a", 1.0, 0.1), row("a", 2.0, 0.5), row("b", 2.0, 0.7), row("c", 1.0, 0.2),
-            row("c", 2.0, None, "failed"), row("c", 3.0, 9.0), row("d", None, None, "failed"), row("e", 1.0, math.nan),
-            row("f", 1.0, 0.1), row("f", 2.0, 0.6), row("f", 3.0, 0.2), row("g", 1.0, 0.0), row("g", 2.0, 0.0)]
-    assert passing(rows, "u:max=0.5", "pga").tolist() == [[1, 2], [1, INF], [1, 2], [2, INF], [0, 2]]
-    assert passing(rows, "u:min=0.1", "pga").tolist() == [[0, 1], [1, INF], [0, 1], [0, 1], [2, INF]]
+    rows = [
+        row("a", 3.0, 1.0),
+        row("a", 1.0, 0.1),
+        row("a", 2.0, 0.5),
+        row("b", 2.0, 0.7),
+        row("c", 1.0, 0.2),
+        row("c", 2.0, None, "failed"),
+        row("c", 3.0, 9.0),
+        row("d", None, None, "failed"),
+        row("e", 1.0, math.nan),
+        row("f", 1.0, 0.1),
+        row("f", 2.0, 0.6),
+        row("f", 3.0, 0.2),
+        row("g", 1.0, 0.0),
+        row("g", 2.0, 0.0),
+    ]
+    assert passing(rows, "u:max=0.5", "pga").tolist() == [
+        [1, 2],
+        [1, INF],
+        [1, 2],
+        [2, INF],
+        [0, 2],
+    ]
+    assert passing(rows, "u:min=0.1", "pga").tolist() == [
+        [0, 1],
+        [1, INF],
+        [0, 1],
+        [0, 1],
+        [2, INF],
+    ]
     for wrong in ("u:max", "u:max=", "u:max=one", "u:max=nan"):
-        with pytest.raises(InputError, match=f"limit '{wrong}': give COLUMN:WAY=VALUE with a number"):
+        with pytest.raises(
+            InputError, match=f"limit '{wrong}': give COLUMN:WAY=VALUE with a number"
+        ):
             limit(wrong)
     with pytest.raises(InputError, match="demand 'u:most'"):
         limit("u:most=1")
@@ -128,18 +181,26 @@ def test_sets_of_records(tmp_path: Path) -> None:
     assert record_set(str(records)) == [[str(records / "A.AT2")], [str(records / "b.at2")]]
     (records / "more" / "x.txt").touch()
     assert record_set(str(records / "more")) == [[str(records / "more" / "x.txt")]]
-    (tmp_path / "list").write_text("# the set\nrecords/b.at2 , v.at2  # both\n\n/far/h.at2\n", encoding="utf-8")
-    assert record_set(f"@{tmp_path / 'list'}") == [[str(tmp_path / "records" / "b.at2"), str(tmp_path / "v.at2")],
-                                                  ["/far/h.at2"]]
+    (tmp_path / "list").write_text(
+        "# the set\nrecords/b.at2 , v.at2  # both\n\n/far/h.at2\n", encoding="utf-8"
+    )
+    assert record_set(f"@{tmp_path / 'list'}") == [
+        [str(tmp_path / "records" / "b.at2"), str(tmp_path / "v.at2")],
+        ["/far/h.at2"],
+    ]
     assert record_set("h.at2,v.at2") == [["h.at2", "v.at2"]]
     (tmp_path / "none").mkdir()
     (tmp_path / "binary").write_bytes(b"\xff\xfe\xff")
     (tmp_path / "half").write_text("h.at2,\n", encoding="utf-8")
     for wrong in (str(tmp_path / "none"), "h.at2,", f"@{tmp_path / 'half'}"):
-        with pytest.raises(InputError, match=r"--motions .*: give FILE or FILE,FILE, a folder, or @LIST"):
+        with pytest.raises(
+            InputError, match=r"--motions .*: give FILE or FILE,FILE, a folder, or @LIST"
+        ):
             record_set(wrong)
     for wrong in ("missing", "binary", "none"):
-        with pytest.raises(InputError, match=r"--motions @.* cannot be read .*: give a text file, one record"):
+        with pytest.raises(
+            InputError, match=r"--motions @.* cannot be read .*: give a text file, one record"
+        ):
             record_set(f"@{tmp_path / wrong}")
 
 
@@ -147,17 +208,26 @@ def test_sets_of_records(tmp_path: Path) -> None:
 def motions(tmp_path: Path) -> list[str]:
     """Six motions in files."""
     for k in range(6):
-        write_at2(Record((1.0 + k) * np.sin(0.3 * np.arange(100) * (1.0 + 0.1 * k)), 0.01), tmp_path / f"m{k}.at2", "g")
+        write_at2(
+            Record((1.0 + k) * np.sin(0.3 * np.arange(100) * (1.0 + 0.1 * k)), 0.01),
+            tmp_path / f"m{k}.at2",
+            "g",
+        )
     return [str(tmp_path / f"m{k}.at2") for k in range(6)]
 
 
 def test_the_first_period_of_the_model(motions: list[str]) -> None:
     """sa:T1 is sa:T with the body's own first period where nothing touches; a case whose motion is made of a seed, and
     has no file, gives its place to a record."""
-    case = read_case(WALL, [
-        "mesh.divisions=[2, 2]", "contact.1.obstacle.point=[6.5, 0.0]",
-        'excitation.1.record={type="synthetic", seed=1, '
-        "duration=1.0, dt=0.01, spectrum={s0=0.01}, envelope={rise=0.2, end=0.6, decay=5.0}}"])
+    case = read_case(
+        WALL,
+        [
+            "mesh.divisions=[2, 2]",
+            "contact.1.obstacle.point=[6.5, 0.0]",
+            'excitation.1.record={type="synthetic", seed=1, '
+            "duration=1.0, dt=0.01, spectrum={s0=0.01}, envelope={rise=0.2, end=0.6, decay=5.0}}",
+        ],
+    )
     study = IDA(case, motions, ["u_x_top"], scales=(1.0,), intensity="sa:T1")
     period = 1.0 / lowest_frequency(case.parts(alone()).system)
     expected, record = intensity(f"sa:{period}"), study.shakings[0].record(case)
@@ -184,17 +254,26 @@ def test_a_study_ends_in_curves_and_goes_on(
     case = read_case(WALL, ["mesh.divisions=[1, 1]"])
     factors = dict(zip((f"m{k}" for k in range(6)), (0.9, 1.3, 2.3, 3.1, 4.4, 6.5), strict=True))
 
-    def history(folder: Path, wanted: tuple[str, ...]) -> tuple[dict[str, np.ndarray], dict[str, tuple[str, str]]]:
+    def history(
+        folder: Path, wanted: tuple[str, ...]
+    ) -> tuple[dict[str, np.ndarray], dict[str, tuple[str, str]]]:
         name, _, level = folder.name.partition("_pga")
-        return {one: np.array([0.0, factors[name] * float(level)]) for one in wanted}, dict.fromkeys(wanted, ("m", "u"))
+        return {
+            one: np.array([0.0, factors[name] * float(level)]) for one in wanted
+        }, dict.fromkeys(wanted, ("m", "u"))
 
     monkeypatch.setattr("vi_contact.studies.ida.ida.executed", executed)
     monkeypatch.setattr("vi_contact.studies.ida.ida._history", history)
     said: list[str] = []
     for levels in ((1.0, 2.0, 4.0), (1.0, 1.5, 2.0, 3.0, 4.0)):
         made.clear()
-        study = IDA(case, motions, ["u_x_top:max"], levels=levels,
-                    limits=("u_x_top:max=4", "u_y_top:max=5", "u_x_top:max=99"))
+        study = IDA(
+            case,
+            motions,
+            ["u_x_top:max"],
+            levels=levels,
+            limits=("u_x_top:max=4", "u_y_top:max=5", "u_x_top:max=99"),
+        )
         rows = run_ida(study, tmp_path / "study", say=said.append)
         assert len(made) == 6 * (3 if len(levels) == 3 else 2) and len(rows) == 6 * len(levels)
         assert [one["pga"] for one in rows] == pytest.approx([*levels] * 6)
@@ -206,16 +285,24 @@ def test_a_study_ends_in_curves_and_goes_on(
             place = np.searchsorted(every, value / np.array(list(factors.values())))
             expected = fragility_curve(np.stack([every[place - 1], every[place]], axis=1))
             assert [float(one[name]) for name in ("theta", "beta", "records")] == pytest.approx(
-                [expected.theta, expected.beta, 6], rel=1e-6)
-            assert [float(one[f"{name}_{side}"]) for name in ("theta", "beta") for side in ("low", "high")
-                    ] == pytest.approx(expected.intervals.ravel(), rel=1e-6)
+                [expected.theta, expected.beta, 6], rel=1e-6
+            )
+            assert [
+                float(one[f"{name}_{side}"])
+                for name in ("theta", "beta")
+                for side in ("low", "high")
+            ] == pytest.approx(expected.intervals.ravel(), rel=1e-6)
         assert said[-1].startswith("fragility of u_x_top:max=99: 0 of 6 records pass the limit")
-        assert said[-3].startswith(f"fragility of u_x_top:max=4: median {float(table[0]['theta']):.4g} (")
+        assert said[-3].startswith(
+            f"fragility of u_x_top:max=4: median {float(table[0]['theta']):.4g} ("
+        )
         for name in ("fragility.png", "ida.png"):
             assert (tmp_path / "study" / name).read_bytes().startswith(b"\x89PNG")
 
 
-def test_the_picture_has_its_intensities_in_g(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_picture_has_its_intensities_in_g(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """What is drawn up to 1.2 times the highest level: curve, band, and brackets that end there."""
     from matplotlib.figure import Figure
 
@@ -223,11 +310,17 @@ def test_the_picture_has_its_intensities_in_g(tmp_path: Path, monkeypatch: pytes
     monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
     levels = np.array([(0.0, 9.80665), (9.80665, 19.6133), (19.6133, INF)])
     found = fragility_curve(levels)
-    plot_fragility({"u $max": (found.probability, levels)}, tmp_path / "f.png", intensity="PGA", unit="m/s²")
+    plot_fragility(
+        {"u $max": (found.probability, levels)}, tmp_path / "f.png", intensity="PGA", unit="m/s²"
+    )
     (axis,) = drawn[0].axes
-    line, (lines, band) = axis.lines[0], sorted(axis.collections, key=lambda one: len(one.get_paths()))[::-1]
+    line, (lines, band) = (
+        axis.lines[0],
+        sorted(axis.collections, key=lambda one: len(one.get_paths()))[::-1],
+    )
     assert axis.get_xlabel() == "PGA [g]" and axis.get_xlim() == pytest.approx((0.0, 2.4))
     assert np.interp(found.theta / 9.80665, *line.get_data()) == pytest.approx(0.5, abs=1e-4)
     assert [path.vertices[:, 0].tolist() for path in lines.get_paths()] == [
-        pytest.approx(ends) for ends in ([0.0, 1.0], [1.0, 2.0], [2.0, 2.4])]
+        pytest.approx(ends) for ends in ([0.0, 1.0], [1.0, 2.0], [2.0, 2.4])
+    ]
     assert len(band.get_paths()) == 1 and axis.get_legend().get_texts()[0].get_text() == r"u \$max"

@@ -59,10 +59,20 @@ def example(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     (folder / "wall.toml").write_text(case, encoding="utf-8")
     (folder / "make.py").write_text(make, encoding="utf-8")
     (folder / "read.py").write_text(read, encoding="utf-8")
-    lines = ["set -e", 'vi-contact() { "$0" -m vi_contact "$@"; }', '"$0" make.py', *commands, '"$0" read.py']
+    lines = [
+        "set -e",
+        'vi-contact() { "$0" -m vi_contact "$@"; }',
+        '"$0" make.py',
+        *commands,
+        '"$0" read.py',
+    ]
     done = subprocess.run(
-        ["bash", "-c", "\n".join(lines), sys.executable], cwd=folder, capture_output=True, encoding="utf-8",
-        timeout=600, env=os.environ | {"PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "utf-8"},
+        ["bash", "-c", "\n".join(lines), sys.executable],
+        cwd=folder,
+        capture_output=True,
+        encoding="utf-8",
+        timeout=600,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "utf-8"},
     )
     assert done.returncode == 0, done.stderr
     return folder, done.stdout
@@ -84,10 +94,15 @@ def again(folder: Path, **more: object) -> tuple[list[dict[str, object]], list[s
     """The study of the example from Python: (rows, what it says)."""
     said: list[str] = []
     asked: dict[str, object] = {
-        "motions": MOTIONS, "demands": DEMANDS, "scales": (1.0, 2.0), "intensity": "sa:0.1",
+        "motions": MOTIONS,
+        "demands": DEMANDS,
+        "scales": (1.0, 2.0),
+        "intensity": "sa:0.1",
     }
     running = {key: more.pop(key) for key in ("jobs", "part", "launch", "wall_time") if key in more}
-    return run_ida(IDA(read_case("wall.toml"), **(asked | more)), folder, say=said.append, **running), said
+    return run_ida(
+        IDA(read_case("wall.toml"), **(asked | more)), folder, say=said.append, **running
+    ), said
 
 
 @pytest.mark.slow
@@ -97,22 +112,40 @@ def test_the_example_gives_a_tidy_table(example: tuple[Path, str]) -> None:
     assert "wall.toml: A wall beside the ground: the file is in order" in printed
     assert "4 runs, 0 of them failed" in printed and "4 runs, 4 finished" in printed
     rows = table(folder / "results" / "ida")
-    assert list(rows[0]) == ["record", "scale", "sa_0.1", "contact_uplift_max", "u_x_top_min", "certificate",
-                             "energy_created", "steps", "status", "reason"]
+    assert list(rows[0]) == [
+        "record",
+        "scale",
+        "sa_0.1",
+        "contact_uplift_max",
+        "u_x_top_min",
+        "certificate",
+        "energy_created",
+        "steps",
+        "status",
+        "reason",
+    ]
     assert [(row["record"], float(row["scale"])) for row in rows] == [
         (f"motion_{seed}", scale) for seed in (1, 2) for scale in (1.0, 2.0)
     ]
     for row in rows:
         record = tapered(read_record(folder / f"{row['record']}.at2"), fraction=0.05)
-        assert float(row["sa_0.1"]) == pytest.approx(float(row["scale"]) * psa(record, 0.1), rel=1e-12)
+        assert float(row["sa_0.1"]) == pytest.approx(
+            float(row["scale"]) * psa(record, 0.1), rel=1e-12
+        )
         run = folder / "results" / "ida" / "runs" / f"{row['record']}_x{float(row['scale'])}"
         history = np.genfromtxt(run / "history.csv", delimiter=",", names=True)
         assert float(row["u_x_top_min"]) == history["u_x_top"].min() < 0.0
-        assert np.abs(history["a_g_x"]).max() == pytest.approx(float(row["scale"]) * pga(record), rel=1e-12)
+        assert np.abs(history["a_g_x"]).max() == pytest.approx(
+            float(row["scale"]) * pga(record), rel=1e-12
+        )
         assert 0.0 < float(row["certificate"]) < 1e-9 and 0.0 <= float(row["energy_created"]) < 0.01
         assert row["steps"] == "400" and row["status"] == "finished"
     units = json.loads((folder / "results" / "ida" / "columns.json").read_text(encoding="utf-8"))
-    assert list(units) == list(rows[0]) and units["u_x_top_min"]["unit"] == "m" and units["sa_0.1"]["unit"] == "m/s²"
+    assert (
+        list(units) == list(rows[0])
+        and units["u_x_top_min"]["unit"] == "m"
+        and units["sa_0.1"]["unit"] == "m/s²"
+    )
     assert (folder / "results" / "ida" / "ida.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -128,11 +161,29 @@ def test_finished_runs_are_kept(study: Path) -> None:
 def test_a_failed_run_is_a_row_and_a_status(study: Path, tmp_path: Path, capsys: Any) -> None:
     """The command ends with 1 and says so, with the reason of the first failed run; the others keep their rows."""
     (tmp_path / "bad.txt").write_text("0 1\n0.1 x\n")
-    asked = ["ida", "wall.toml", "--motions", *MOTIONS, str(tmp_path / "bad.txt"), "--scales", "1,2", "--im", "sa:0.1",
-             "--edp", *DEMANDS, "--fragility", "u_x_top:min=-1e9", "--out", str(study)]
+    asked = [
+        "ida",
+        "wall.toml",
+        "--motions",
+        *MOTIONS,
+        str(tmp_path / "bad.txt"),
+        "--scales",
+        "1,2",
+        "--im",
+        "sa:0.1",
+        "--edp",
+        *DEMANDS,
+        "--fragility",
+        "u_x_top:min=-1e9",
+        "--out",
+        str(study),
+    ]
     assert main(asked) == 1
     printed = capsys.readouterr()
-    assert "2 of 6 runs have failed, the first because: " in printed.err and f"are in {study}/ida.csv" in printed.err
+    assert (
+        "2 of 6 runs have failed, the first because: " in printed.err
+        and f"are in {study}/ida.csv" in printed.err
+    )
     assert "bad.txt, line 2: 'x' is not a number" in printed.err
     assert "fragility of u_x_top:min=-1e9: 0 of 2 records pass the limit" in printed.out
     assert [row["status"] for row in table(study)] == ["failed"] * 2 + ["finished"] * 4
@@ -144,7 +195,9 @@ def test_other_demands_and_measures_need_no_runs(study: Path) -> None:
     assert said[-1].endswith("4 finished already")
     assert rows[1]["arias"] == pytest.approx(4.0 * rows[0]["arias"], rel=1e-9)
     assert rows[1]["contact_resultant_max"] > rows[0]["contact_resultant_max"] > 0.0
-    with pytest.raises(InputError, match="the run has no column 'u_y_foot': record it, or choose one of t, "):
+    with pytest.raises(
+        InputError, match="the run has no column 'u_y_foot': record it, or choose one of t, "
+    ):
         again(study, demands=("u_y_foot",))
 
 
@@ -156,7 +209,9 @@ def test_an_interrupted_run_goes_on_and_failures_are_rows(study: Path, tmp_path:
     expected = np.genfromtxt(folder / "history.csv", delimiter=",", names=True)
     for path in folder.iterdir():
         path.unlink() if path.is_file() else shutil.rmtree(path)
-    settings = Shaking("motion_1", (Path("motion_1.at2").resolve(),)).settings(read_case("wall.toml"))
+    settings = Shaking("motion_1", (Path("motion_1.at2").resolve(),)).settings(
+        read_case("wall.toml")
+    )
     set_words = [word for setting in (*settings, "run.steps=200") for word in ("--set", setting)]
     assert main(["run", "wall.toml", "--quiet", "--out", str(folder), *set_words]) == 0
     (folder / "summary.json").unlink()
@@ -167,12 +222,26 @@ def test_an_interrupted_run_goes_on_and_failures_are_rows(study: Path, tmp_path:
     assert bad["record"] == "bad" and bad["u_x_top_min"] is None and bad["sa_0.1"] is None
     assert "bad.txt, line 2: 'x' is not a number" in bad["reason"]
     assert any(line.endswith("] motion_1 x 1: finished") for line in said)
-    assert json.loads((folder / "summary.json").read_text(encoding="utf-8"))["restarted_from_step"] == 200
+    assert (
+        json.loads((folder / "summary.json").read_text(encoding="utf-8"))["restarted_from_step"]
+        == 200
+    )
     found = np.genfromtxt(folder / "history.csv", delimiter=",", names=True)
-    for name in ("t", "u_x_top", "contact_resultant", "contact_uplift", "energy_strain", "loss_friction"):
-        assert found[name] == pytest.approx(expected[name], abs=1e-10 * np.abs(expected[name]).max()), name
+    for name in (
+        "t",
+        "u_x_top",
+        "contact_resultant",
+        "contact_uplift",
+        "energy_strain",
+        "loss_friction",
+    ):
+        assert found[name] == pytest.approx(
+            expected[name], abs=1e-10 * np.abs(expected[name]).max()
+        ), name
     assert table(study)[0]["reason"] == bad["reason"] and table(study)[0]["u_x_top_min"] == ""
-    assert again(study, motions=(tmp_path / "bad.txt",), scales=(1.0,))[1][0].endswith("0 finished already")
+    assert again(study, motions=(tmp_path / "bad.txt",), scales=(1.0,))[1][0].endswith(
+        "0 finished already"
+    )
 
 
 def test_parts_levels_and_runs_that_die(study: Path) -> None:
@@ -183,7 +252,9 @@ def test_parts_levels_and_runs_that_die(study: Path) -> None:
     (row,) = (row for row in rows if row["status"] == "failed")
     assert said[1] == f"[1/1] motion_1 x {row['scale']:g}: failed: ended with status 1"
     record = scaled(tapered(read_record("motion_1.at2"), fraction=0.05), factor=row["scale"])
-    assert row["arias"] == pytest.approx(4.0, rel=1e-12) and arias(record) == pytest.approx(4.0, rel=1e-12)
+    assert row["arias"] == pytest.approx(4.0, rel=1e-12) and arias(record) == pytest.approx(
+        4.0, rel=1e-12
+    )
     rows, said = again(study, part=(2, 3), launch=("sh", "-c", "kill -9 $$"), **asked)
     assert said[1].endswith("failed: ended by SIGKILL") and len(rows) == 5
     with pytest.raises(InputError, match="'no-such-program' cannot be started"):
@@ -193,10 +264,16 @@ def test_parts_levels_and_runs_that_die(study: Path) -> None:
 def test_stopping_stops_the_runs(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C between two rows: processes that go on are stopped, also where SIGINT is ignored, and leave no row."""
     monkeypatch.setattr("vi_contact.studies.ida.processes.PATIENCE", 1.0)
-    case, shaking, going = read_case("wall.toml"), Shaking("motion_1", (Path("motion_1.at2"),)), study / "going"
+    case, shaking, going = (
+        read_case("wall.toml"),
+        Shaking("motion_1", (Path("motion_1.at2"),)),
+        study / "going",
+    )
     long, short = (OneRun(case, shaking, 1.0, study / "runs" / name) for name in ("long", "short"))
-    words = (f"case \"$*\" in */short*) until [ -s '{going}' ]; do sleep 0.1; done; exit 1;; esac; "
-             f"trap '' INT; echo $$ > '{going}'; sleep 3600")
+    words = (
+        f"case \"$*\" in */short*) until [ -s '{going}' ]; do sleep 0.1; done; exit 1;; esac; "
+        f"trap '' INT; echo $$ > '{going}'; sleep 3600"
+    )
     start = time.monotonic()
     rows = executed([long, short], 2, ("sh", "-c", words), WallTime())
     assert next(rows)["reason"] == "ended with status 1"
@@ -210,26 +287,48 @@ def test_stopping_stops_the_runs(study: Path, monkeypatch: pytest.MonkeyPatch) -
 def test_runs_of_a_body_keep_their_own_books(study: Path, tmp_path: Path) -> None:
     """Runs that share a process share the body, and none of their recorders: the ledger of each is its own."""
     shaking = Shaking("motion_1", (Path("motion_1.at2").resolve(),))
-    case = read_case(located("wall"), [
-        'excitation={type="GroundMotion", record="x.at2", direction=[1, 0]}', "run.dt=0.005", "run.steps=20", "impact=",
-        "scheme=", "solver=", "escalation=", "fields=", "system.base_inertia=true"])
+    case = read_case(
+        located("wall"),
+        [
+            'excitation={type="GroundMotion", record="x.at2", direction=[1, 0]}',
+            "run.dt=0.005",
+            "run.steps=20",
+            "impact=",
+            "scheme=",
+            "solver=",
+            "escalation=",
+            "fields=",
+            "system.base_inertia=true",
+        ],
+    )
     runs = [OneRun(case, shaking, scale, tmp_path / f"x{scale}") for scale in (1.0, 2.0)]
     shares: list[float] = []
-    ends = dict(results(json.loads(command(runs, (), WallTime())[-1]), MPI.COMM_SELF, shares.append))
+    ends = dict(
+        results(json.loads(command(runs, (), WallTime())[-1]), MPI.COMM_SELF, shares.append)
+    )
     assert shares[-1] == 1.0
     for number, run in enumerate(runs):
-        alone = read_case(case.path, run.settings).run(MPI.COMM_SELF, out=tmp_path / "alone", progress=False)
+        alone = read_case(case.path, run.settings).run(
+            MPI.COMM_SELF, out=tmp_path / "alone", progress=False
+        )
         together = ends[number]
         assert isinstance(together, Solution) and together.facts["energy_defect"] < 1e-10
         for name in ("work_input", "energy_strain", "loss_contact"):
             expected = alone.history[name]
-            assert together.history[name] == pytest.approx(expected, abs=1e-10 * np.abs(expected).max())
+            assert together.history[name] == pytest.approx(
+                expected, abs=1e-10 * np.abs(expected).max()
+            )
 
 
-def test_what_a_process_that_died_has_left_runs_alone(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_a_process_that_died_has_left_runs_alone(
+    study: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The first process ends one of three runs and dies; each of the others gets its own, and one of these dies too."""
     case = read_case("wall.toml")
-    runs = [OneRun(case, Shaking(f"m{k}", (Path("motion_1.at2"),)), 1.0, study / "runs" / f"m{k}") for k in range(3)]
+    runs = [
+        OneRun(case, Shaking(f"m{k}", (Path("motion_1.at2"),)), 1.0, study / "runs" / f"m{k}")
+        for k in range(3)
+    ]
     made: list[list[str]] = []
 
     def started(asked: Sequence[OneRun], *_: object) -> subprocess.Popen[str]:
@@ -245,20 +344,45 @@ def test_what_a_process_that_died_has_left_runs_alone(study: Path, monkeypatch: 
     found = list(executed(runs, 1, (), WallTime()))
     rows = {row["record"]: row for row in found if not isinstance(row, float)}
     assert made == [["m0", "m1", "m2"], ["m1"], ["m2"]] and found[0] == 1.5
-    assert [rows[name]["status"] for name in ("m0", "m1", "m2")] == ["finished", "failed", "finished"]
+    assert [rows[name]["status"] for name in ("m0", "m1", "m2")] == [
+        "finished",
+        "failed",
+        "finished",
+    ]
     assert rows["m1"]["reason"] == "no memory"
 
 
-def test_a_wall_time_ends_a_study(study: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+def test_a_wall_time_ends_a_study(
+    study: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
     """Every run gets what is left; one that ends with status 75 leaves no row, and without time left none is begun."""
     monkeypatch.setattr("vi_contact.run.wall_time.age", lambda: 100.0)
-    run = OneRun(read_case("wall.toml"), Shaking("motion_1", (Path("motion_1.at2"),)), 1.0, study / "runs" / "long")
+    run = OneRun(
+        read_case("wall.toml"),
+        Shaking("motion_1", (Path("motion_1.at2"),)),
+        1.0,
+        study / "runs" / "long",
+    )
     assert json.loads(command([run], (), WallTime("5"))[-1])["wall_time"] == "3:15"
-    with pytest.raises(OutOfTime, match="200 s left of the wall time 5 ended the study: give the same command again"):
+    with pytest.raises(
+        OutOfTime,
+        match="200 s left of the wall time 5 ended the study: give the same command again",
+    ):
         list(executed([run], 1, ("sh", "-c", "exit 75"), WallTime("5")))
     assert not (run.folder / "row.json").exists()
     before = table(study)
-    asked = ["ida", "wall.toml", "--motions", *MOTIONS, "--scales", "1,3", "--edp", *DEMANDS, "--out", str(study)]
+    asked = [
+        "ida",
+        "wall.toml",
+        "--motions",
+        *MOTIONS,
+        "--scales",
+        "1,3",
+        "--edp",
+        *DEMANDS,
+        "--out",
+        str(study),
+    ]
     assert main([*asked, "--wall-time", "1:45"]) == 75
     assert "5 s left of the wall time 1:45" in capsys.readouterr().err and table(study) == before
     with pytest.raises(InputError, match="the wall time is .*: give minutes"):
@@ -273,28 +397,35 @@ def test_one_study_at_a_time_in_a_folder(study: Path) -> None:
 
 
 def test_another_study_is_refused(study: Path) -> None:
-    with pytest.raises(InputError, match="holds runs from before the case was changed: choose another folder"):
-        run_ida(IDA(read_case("wall.toml", ["friction.mu=0.4"]), MOTIONS, DEMANDS, scales=(1.0,)), study)
+    with pytest.raises(
+        InputError, match="holds runs from before the case was changed: choose another folder"
+    ):
+        run_ida(
+            IDA(read_case("wall.toml", ["friction.mu=0.4"]), MOTIONS, DEMANDS, scales=(1.0,)), study
+        )
     shutil.copy("motion_2.at2", study / "motion_1.at2")
     with pytest.raises(InputError, match="before the record 'motion_1' was changed"):
         again(study, motions=(study / "motion_1.at2",))
 
 
-@pytest.mark.parametrize(("more", "said"), [
-    ({"scales": ()}, "either scales or levels"),
-    ({"levels": (1.0,)}, "either scales or levels"),
-    ({"scales": (1.0, 1.0)}, "different positive numbers"),
-    ({"scales": (-1.0,)}, "different positive numbers"),
-    ({"demands": ()}, "demands is empty"),
-    ({"demands": ("u:most",)}, "WAY one of max, min, absmax, last"),
-    ({"motions": ()}, "motions is empty"),
-    ({"motions": ("a/m.at2", "b/m.at2")}, "two motions are called 'm'"),
-    ({"motions": (("h.at2", "v.at2"),)}, "the case has 1 ground motion: give"),
-    ({"intensity": "pgx"}, "unknown intensity 'pgx': choose one of pga"),
-    ({"intensity": "sa:x"}, "give the period after the colon"),
-    ({"jobs": 0}, "one job or more"),
-    ({"part": (3, 2)}, "1 <= i <= n"),
-])
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ({"scales": ()}, "either scales or levels"),
+        ({"levels": (1.0,)}, "either scales or levels"),
+        ({"scales": (1.0, 1.0)}, "different positive numbers"),
+        ({"scales": (-1.0,)}, "different positive numbers"),
+        ({"demands": ()}, "demands is empty"),
+        ({"demands": ("u:most",)}, "WAY one of max, min, absmax, last"),
+        ({"motions": ()}, "motions is empty"),
+        ({"motions": ("a/m.at2", "b/m.at2")}, "two motions are called 'm'"),
+        ({"motions": (("h.at2", "v.at2"),)}, "the case has 1 ground motion: give"),
+        ({"intensity": "pgx"}, "unknown intensity 'pgx': choose one of pga"),
+        ({"intensity": "sa:x"}, "give the period after the colon"),
+        ({"jobs": 0}, "one job or more"),
+        ({"part": (3, 2)}, "1 <= i <= n"),
+    ],
+)
 def test_wrong_studies(study: Path, more: dict[str, object], said: str) -> None:
     with pytest.raises(InputError, match=said):
         again(study, **more)
@@ -317,15 +448,23 @@ def test_two_motions_and_their_settings(tmp_path: Path) -> None:
     (one,) = IDA(case, [("h.at2", "v.at2")], ["contact_uplift"], scales=(2.0,)).shakings
     h, v = (Path(name).resolve() for name in ("h.at2", "v.at2"))
     assert one.name == "h" and one.settings(case, 2.0) == (
-        f'excitation.1.record="{h}"', "excitation.1.scale=2.0", f'excitation.2.record="{v}"', "excitation.2.scale=1.0"
+        f'excitation.1.record="{h}"',
+        "excitation.1.scale=2.0",
+        f'excitation.2.record="{v}"',
+        "excitation.2.scale=1.0",
     )
     made = read_case(case.path, (*case.settings, *one.settings(case, 2.0)))
     assert [table["scale"] for table in made.tables["excitation"]] == [2.0, 1.0]
     single = tmp_path / "single.toml"
-    single.write_text('[mesh]\ntype = "WallMesh"\n[excitation]\ntype = "GroundMotion"\nrecord = {path = "r"}\n'
-                      "[run]\ndt = 1\n")
+    single.write_text(
+        '[mesh]\ntype = "WallMesh"\n[excitation]\ntype = "GroundMotion"\nrecord = {path = "r"}\n'
+        "[run]\ndt = 1\n"
+    )
     (one,) = IDA(read_case(single), ["h.at2"], ["t"], scales=(2.0,)).shakings
-    assert one.settings(read_case(single)) == (f'excitation.record.path="{h}"', "excitation.scale=1.0")
+    assert one.settings(read_case(single)) == (
+        f'excitation.record.path="{h}"',
+        "excitation.scale=1.0",
+    )
 
 
 def test_measures() -> None:
@@ -344,7 +483,10 @@ def test_measures() -> None:
 
 def test_fractiles_of_straight_curves() -> None:
     """EDP = c IM with c = 1, 2, 3: median 2 IM, fractiles linear between the records (numpy's quantile): 1.32, 2.68."""
-    curves = {str(c): (np.array([3.0, 1.0, 2.0 + c]), c * np.array([3.0, 1.0, 2.0 + c])) for c in (1, 2, 3)}
+    curves = {
+        str(c): (np.array([3.0, 1.0, 2.0 + c]), c * np.array([3.0, 1.0, 2.0 + c]))
+        for c in (1, 2, 3)
+    }
     levels, values = fractiles(curves, (0.16, 0.5, 0.84))
     assert levels.tolist() == [1.0, 3.0]
     assert values == pytest.approx(np.outer(levels, [1.32, 2.0, 2.68]))
@@ -356,9 +498,13 @@ def test_fractiles_of_straight_curves() -> None:
 def test_the_picture_of_many_records(tmp_path: Path) -> None:
     """Without names where records are many, with crosses for failed runs, also when there is nothing to scale."""
     curves = {str(k): (np.arange(3.0), k * np.arange(3.0)) for k in range(8)}
-    panels = [DemandPanel("a", "m", curves, *fractiles(curves, (0.16, 0.5, 0.84)), (1.5,)),
-              DemandPanel("b", "-", {"0": (np.ones(1), np.zeros(1))}, np.zeros(0), np.zeros((0, 3)))]
-    assert plot_ida(panels, tmp_path / "ida.png", intensity="PGA", unit="m/s²").stat().st_size > 4_000
+    panels = [
+        DemandPanel("a", "m", curves, *fractiles(curves, (0.16, 0.5, 0.84)), (1.5,)),
+        DemandPanel("b", "-", {"0": (np.ones(1), np.zeros(1))}, np.zeros(0), np.zeros((0, 3))),
+    ]
+    assert (
+        plot_ida(panels, tmp_path / "ida.png", intensity="PGA", unit="m/s²").stat().st_size > 4_000
+    )
 
 
 def test_paths_are_quoted_for_toml() -> None:

@@ -31,40 +31,61 @@ def settings(name: str) -> list[str]:
     """The options of the quick run in the head of a case, as settings."""
     head = (STARTERS / f"{name}.toml").read_text("utf-8").split("title =")[0]
     assert f"vi-contact run {name}.toml --set {LARGE} --steps 200" in head
-    return [LARGE, "run.steps=200", "run.t_end=", "fields=", "excitation.1.record.envelope.rise=0.2"]  # strong at once
+    return [
+        LARGE,
+        "run.steps=200",
+        "run.t_end=",
+        "fields=",
+        "excitation.1.record.envelope.rise=0.2",
+    ]  # strong at once
 
 
 def run(name: str, out: Path, *more: str) -> Any:
     """The history of the quick size; certificate, ledger and what friction may carry hold in every step."""
-    found = read_case(STARTERS / f"{name}.toml", [*settings(name), *more]).run(MPI.COMM_SELF, out=out, progress=False)
+    found = read_case(STARTERS / f"{name}.toml", [*settings(name), *more]).run(
+        MPI.COMM_SELF, out=out, progress=False
+    )
     history = found.history
     assert len(history["t"]) == 201 and history["certificate"].max() < 1e-10
-    energy = max(np.abs(history[name]).max() for name in ("energy_strain", "energy_kinetic", "work_input"))
+    energy = max(
+        np.abs(history[name]).max() for name in ("energy_strain", "energy_kinetic", "work_input")
+    )
     assert np.abs(history["energy_defect"]).max() < 1e-10 * energy
     assert history["contact_min_gap"].min() >= 0.0 and history["work_input"].max() > 0.0
     return history
 
 
 @pytest.mark.parametrize("name", ["wall", "dam", "culvert"])
-def test_starter_is_written_and_checked(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_starter_is_written_and_checked(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """``new`` copies case and script into any folder, and --check reads them there."""
     assert main(["new", name, str(tmp_path / "mine")]) == 0
-    assert sorted(one.name for one in (tmp_path / "mine").iterdir()) == [f"{name}.geo", f"{name}.toml"]
+    assert sorted(one.name for one in (tmp_path / "mine").iterdir()) == [
+        f"{name}.geo",
+        f"{name}.toml",
+    ]
     case = str(tmp_path / "mine" / f"{name}.toml")
     assert main(["run", case, "--check", "--set", LARGE, "--out", str(tmp_path / "checked")]) == 0
     assert "contact" in capsys.readouterr().out
 
 
-def test_from_new_to_report_in_four_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                                             capsys: pytest.CaptureFixture[str]) -> None:
+def test_from_new_to_report_in_four_commands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Those that ``new`` prints, in the quick size, in any folder."""
     monkeypatch.chdir(tmp_path)
     assert main(["new", "pier"]) == 0
-    commands = [line.split()[1:] for line in capsys.readouterr().out.split("next:")[1].splitlines() if line]
+    commands = [
+        line.split()[1:] for line in capsys.readouterr().out.split("next:")[1].splitlines() if line
+    ]
     quick = ["--quiet", "--set", LARGE, "--set", "fields="]
     assert main([*commands[0], *quick]) == 0
     assert main([*commands[1], *quick, "--set", "run.t_end=", "--steps", "20"]) == 0
-    assert main(commands[2]) == 0 and (tmp_path / "results" / "pier" / "report.pdf").stat().st_size > 10_000
+    assert (
+        main(commands[2]) == 0
+        and (tmp_path / "results" / "pier" / "report.pdf").stat().st_size > 10_000
+    )
 
 
 def test_wall_stands_between_active_pressure_and_that_at_rest(tmp_path: Path) -> None:
@@ -78,14 +99,30 @@ def test_wall_stands_between_active_pressure_and_that_at_rest(tmp_path: Path) ->
     assert abs(across[0]) < EXACT * wall and up[0] == pytest.approx(wall, rel=EXACT)
     assert history["reaction_y_rock"][0] == pytest.approx(whole, rel=EXACT)
     soil = 0.5 * 1900.0 * G * 5.4**2
-    assert np.tan(np.radians(25.0)) ** 2 * soil < history["N_stem"][0] < 0.3 / 0.7 * soil  # phi = 40 degrees
-    assert 0.1 * 5.4 < history["height_stem"][0] < 5.4 / 3.0  # the elastic fill leans back from the top of the stem
+    assert (
+        np.tan(np.radians(25.0)) ** 2 * soil < history["N_stem"][0] < 0.3 / 0.7 * soil
+    )  # phi = 40 degrees
+    assert (
+        0.1 * 5.4 < history["height_stem"][0] < 5.4 / 3.0
+    )  # the elastic fill leans back from the top of the stem
     assert np.all(np.abs(history["T_base"]) <= 0.5 * history["N_base"] * (1.0 + 1e-9))
     assert history["N_stem"].max() > 1.05 * history["N_stem"][0]
     found = {one.name: one for one in comparisons(tmp_path)}
-    assert list(found) == ["AtRest", "Rankine", "Coulomb", "MononobeOkabe", "Wood", "VeletsosYounan"]
-    assert found["Rankine"].expected == pytest.approx(np.tan(np.radians(28.0)) ** 2 * soil, rel=1e-9)
-    assert found["Rankine"].found == history["N_stem"][0] and found["MononobeOkabe"].found == history["N_stem"].max()
+    assert list(found) == [
+        "AtRest",
+        "Rankine",
+        "Coulomb",
+        "MononobeOkabe",
+        "Wood",
+        "VeletsosYounan",
+    ]
+    assert found["Rankine"].expected == pytest.approx(
+        np.tan(np.radians(28.0)) ** 2 * soil, rel=1e-9
+    )
+    assert (
+        found["Rankine"].found == history["N_stem"][0]
+        and found["MononobeOkabe"].found == history["N_stem"].max()
+    )
 
 
 def test_wall_shares_its_gravity_stage_and_its_matrices_over_records() -> None:
@@ -107,7 +144,9 @@ def test_dam_has_the_resultant_of_weight_water_and_uplift(tmp_path: Path) -> Non
     assert history["N_joint"][0] == pytest.approx(n, rel=EXACT)
     assert history["T_joint"][0] == pytest.approx(-water, rel=EXACT)
     assert history["e_joint"][0] == pytest.approx(e, rel=1e-8) and 0.0 < e < 5.0  # within the kern
-    assert 1.0 / (1.0 - history["margin_joint"][0]) == pytest.approx(0.75 * n / water, rel=1e-8)  # 1.32 against sliding
+    assert 1.0 / (1.0 - history["margin_joint"][0]) == pytest.approx(
+        0.75 * n / water, rel=1e-8
+    )  # 1.32 against sliding
     assert history["sliding_joint"][-1] - history["sliding_joint"][0] > 1e-4
     assert history["margin_joint"].min() < 1e-9
 
@@ -117,11 +156,23 @@ def test_pier_rocks_within_the_moment_that_overturns_it(tmp_path: Path) -> None:
     foot and with stiff raft and deck it has the frequency of a beam with shear, consistent mass and a rigid deck."""
     history = run("pier", tmp_path, "excitation.1.scale=3.0")
     weight = (2500.0 * (7.0 * 1.5 + 2.0 * 9.0) + 6000.0 * 6.0 * 1.5) * G
-    assert history["N_raft"][0] == pytest.approx(weight, rel=EXACT) and abs(history["e_raft"][0]) < 1e-6 * 7.0
+    assert (
+        history["N_raft"][0] == pytest.approx(weight, rel=EXACT)
+        and abs(history["e_raft"][0]) < 1e-6 * 7.0
+    )
     assert np.all(np.abs(history["M_raft"]) <= 3.5 * history["N_raft"] * (1.0 + 1e-9))
     assert history["uplift_raft"].max() > 0.1 and np.abs(history["theta_raft"]).max() > 1e-4
-    clamped = [LARGE, "contact=", "friction=", "gravity=", "record=", "fields=", "material.raft.E=3e14",
-               "material.deck.E=3e14", 'system.clamped=["rock", "raft_bottom"]']
+    clamped = [
+        LARGE,
+        "contact=",
+        "friction=",
+        "gravity=",
+        "record=",
+        "fields=",
+        "material.raft.E=3e14",
+        "material.deck.E=3e14",
+        'system.clamped=["rock", "raft_bottom"]',
+    ]
     system = read_case(STARTERS / "pier.toml", clamped).parts(MPI.COMM_SELF).system
     assert engineering.lowest_frequency(system) == pytest.approx(beam_with_deck(), rel=0.01)
 
@@ -130,9 +181,17 @@ def beam_with_deck() -> float:
     """The lowest frequency [Hz] of the pier, clamped at its foot, in deflection and rotation of its top."""
     length, width, stiff, shear = 9.0, 2.0, 3e10 / (1.0 - 0.2**2), 3e10 / 2.4
     bending, deck = stiff * width**3 / 12.0, 6000.0 * 6.0 * 1.5
-    flexibility = np.array([[length**3 / 3.0, length**2 / 2.0], [length**2 / 2.0, length]]) / bending
+    flexibility = (
+        np.array([[length**3 / 3.0, length**2 / 2.0], [length**2 / 2.0, length]]) / bending
+    )
     flexibility[0, 0] += length / (5.0 / 6.0 * shear * width)
-    beam = 2500.0 * width * length / 420.0 * np.array([[156.0, -22.0 * length], [-22.0 * length, 4.0 * length**2]])
+    beam = (
+        2500.0
+        * width
+        * length
+        / 420.0
+        * np.array([[156.0, -22.0 * length], [-22.0 * length, 4.0 * length**2]])
+    )
     raised = deck * np.array([[1.0, 0.75], [0.75, 0.75**2 + (1.5**2 + 6.0**2) / 12.0]])
     squares = np.linalg.eigvals(np.linalg.solve(beam + raised, np.linalg.inv(flexibility)))
     return float(np.sqrt(squares.min()) / (2.0 * np.pi))
@@ -158,20 +217,32 @@ def test_culvert_racks_with_the_ground(tmp_path: Path) -> None:
     than the soil. Shaken, it carries its weight all the while it accelerates with the ground."""
     history = run("culvert", tmp_path / "run")
     weight = 2500.0 * G * (6.0 * 4.0 - 5.0 * 3.0)
-    assert history["contact_force_y"][0] + history["friction_force_y"][0] == pytest.approx(weight, rel=EXACT)
+    assert history["contact_force_y"][0] + history["friction_force_y"][0] == pytest.approx(
+        weight, rel=EXACT
+    )
     (found,) = comparisons(tmp_path / "run")
-    assert found.expected == pytest.approx(0.965, abs=1e-3) and 0.3 < found.found < 1.0  # it slips at first
+    assert (
+        found.expected == pytest.approx(0.965, abs=1e-3) and 0.3 < found.found < 1.0
+    )  # it slips at first
     head, _ = (STARTERS / "culvert.toml").read_text("utf-8").split('[[stage]]\nname = "motion"')
-    _, records = (STARTERS / "culvert.toml").read_text("utf-8").split("# What is written of every step")
+    _, records = (
+        (STARTERS / "culvert.toml").read_text("utf-8").split("# What is written of every step")
+    )
     (tmp_path / "culvert.geo").write_text((STARTERS / "culvert.geo").read_text("utf-8"), "utf-8")
     size = float(np.hypot(1.0, 0.1))
     text = head + "#" + records + PUSHED % (G * size, 0.1 / size, -1.0 / size)
     (tmp_path / "culvert.toml").write_text(text, "utf-8")
     read_case(tmp_path / "culvert.toml", [LARGE, "fields="]).run(
-        MPI.COMM_SELF, out=tmp_path / "out", progress=False)
+        MPI.COMM_SELF, out=tmp_path / "out", progress=False
+    )
     folders = tmp_path / "out" / "stages" / "1_gravity", tmp_path / "out"
     before, after = (vc.read_run(folder).history for folder in folders)
-    sheared, racked = (float(after[f"racking_{one}"][0] - before[f"racking_{one}"][0]) for one in ("free_field", "box"))
+    sheared, racked = (
+        float(after[f"racking_{one}"][0] - before[f"racking_{one}"][0])
+        for one in ("free_field", "box")
+    )
     strain = 1900.0 * 0.1 * G * 7.0 / (111e6 / 2.6)
-    assert sheared == pytest.approx(strain, rel=0.08)  # 20 m from the box, which disturbs it by some per cent
+    assert sheared == pytest.approx(
+        strain, rel=0.08
+    )  # 20 m from the box, which disturbs it by some per cent
     assert 0.6 * sheared < racked < 0.9 * sheared

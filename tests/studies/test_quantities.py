@@ -24,13 +24,34 @@ COMM = MPI.COMM_WORLD
 ROOT = Path(__file__).resolve().parents[2]
 WALL = ROOT / "demos" / "cases" / "wall.toml"
 VALUES = {
-    ("30 MPa", "Pa"): 30e6, ("2.1e4 N/mm2", "Pa"): 2.1e10, ("3 kN/cm^2", "Pa"): 3e7, ("5 kN m-2", "Pa"): 5e3,
-    ("2400 kg/m3", "kg/m3"): 2400.0, ("2.4 t/m³", "kg/m3"): 2400.0, ("0.35 g", "m/s2"): 0.35 * 9.80665,
-    ("35 cm/s2", "m/s2"): 0.35, ("100 cm/s/s", "m/s2"): 1.0, ("25 kN/m3", "N/m3"): 25e3, ("6 m", "m"): 6.0,
-    ("-12 mm", "m"): -0.012, ("7mm", "m"): 0.007, ("3 µm", "m"): 3e-6, ("5 %", "1"): 0.05, ("0.3", "1"): 0.3,
-    ("90 deg", "rad"): math.pi / 2, ("45 °", "rad"): math.pi / 4, ("2 kHz", "Hz"): 2000.0, ("3 1/s", "1/s"): 3.0,
-    ("5 ms", "s"): 0.005, ("40 MPa*s", "Pa*s"): 4e7, ("2 kPa·s", "Pa*s"): 2e3, ("2*9.81", "m/s2"): 19.62,
-    ("100 kPa/mm", "Pa/m"): 1e8, ("12 rad/s", "rad/s"): 12.0, ("1e-2 m2/s3", "m2/s3"): 0.01, ("1/200", None): 0.005,
+    ("30 MPa", "Pa"): 30e6,
+    ("2.1e4 N/mm2", "Pa"): 2.1e10,
+    ("3 kN/cm^2", "Pa"): 3e7,
+    ("5 kN m-2", "Pa"): 5e3,
+    ("2400 kg/m3", "kg/m3"): 2400.0,
+    ("2.4 t/m³", "kg/m3"): 2400.0,
+    ("0.35 g", "m/s2"): 0.35 * 9.80665,
+    ("35 cm/s2", "m/s2"): 0.35,
+    ("100 cm/s/s", "m/s2"): 1.0,
+    ("25 kN/m3", "N/m3"): 25e3,
+    ("6 m", "m"): 6.0,
+    ("-12 mm", "m"): -0.012,
+    ("7mm", "m"): 0.007,
+    ("3 µm", "m"): 3e-6,
+    ("5 %", "1"): 0.05,
+    ("0.3", "1"): 0.3,
+    ("90 deg", "rad"): math.pi / 2,
+    ("45 °", "rad"): math.pi / 4,
+    ("2 kHz", "Hz"): 2000.0,
+    ("3 1/s", "1/s"): 3.0,
+    ("5 ms", "s"): 0.005,
+    ("40 MPa*s", "Pa*s"): 4e7,
+    ("2 kPa·s", "Pa*s"): 2e3,
+    ("2*9.81", "m/s2"): 19.62,
+    ("100 kPa/mm", "Pa/m"): 1e8,
+    ("12 rad/s", "rad/s"): 12.0,
+    ("1e-2 m2/s3", "m2/s3"): 0.01,
+    ("1/200", None): 0.005,
 }
 
 
@@ -46,13 +67,22 @@ def test_values_are_those_of_si(text: str, unit: str) -> None:
 
 WRONG = {
     ("٣ m", "m"): "'٣' in it does not belong to arithmetic",
-    ("2400 kg/m3", "Pa"): "'kg/m3' is not a unit of it: give it in Pa", ("30 MPa", "1"): "give it in % or as a plain",
-    ("5 %", "Pa"): "'%' is not a unit of it", ("12 Hz", "rad/s"): "'Hz' is not a unit of it: give it in rad/s",
-    ("1.8 g/cm3", "kg/m3"): "'g/cm3' is not a unit of it: give it in kg", ("3 mPaa", "Pa"): "'mPaa' is not a unit here",
-    ("30 MPa", None): "no unit is known for it here: leave 'MPa' out", ("30 Mpa", "Pa"): "'Mpa' is not a unit here",
-    ("3 N//m2", "Pa"): "is not a unit: write one as", ("30 MPa + 1", "Pa"): "give a number, one with its unit, or",
-    ("1/0", "Pa"): "which is inf: give a finite number", ("1e999", "Pa"): "which is inf", ("log(0)", "Pa"): "is -inf",
-    ("sqrt(-1)", "Pa"): "which is nan", ("exp(1000)", "1"): "which is inf", ("1e999 Pa", "Pa"): "'inf' in it is no",
+    ("2400 kg/m3", "Pa"): "'kg/m3' is not a unit of it: give it in Pa",
+    ("30 MPa", "1"): "give it in % or as a plain",
+    ("5 %", "Pa"): "'%' is not a unit of it",
+    ("12 Hz", "rad/s"): "'Hz' is not a unit of it: give it in rad/s",
+    ("1.8 g/cm3", "kg/m3"): "'g/cm3' is not a unit of it: give it in kg",
+    ("3 mPaa", "Pa"): "'mPaa' is not a unit here",
+    ("30 MPa", None): "no unit is known for it here: leave 'MPa' out",
+    ("30 Mpa", "Pa"): "'Mpa' is not a unit here",
+    ("3 N//m2", "Pa"): "is not a unit: write one as",
+    ("30 MPa + 1", "Pa"): "give a number, one with its unit, or",
+    ("1/0", "Pa"): "which is inf: give a finite number",
+    ("1e999", "Pa"): "which is inf",
+    ("log(0)", "Pa"): "is -inf",
+    ("sqrt(-1)", "Pa"): "which is nan",
+    ("exp(1000)", "1"): "which is inf",
+    ("1e999 Pa", "Pa"): "'inf' in it is no",
     ("stiff", "Pa"): "give a number, one with its unit",
     ("y", "Pa"): "give a number, one with its unit",
 }
@@ -64,7 +94,9 @@ def test_what_does_not_fit_is_refused(text: str, unit: str) -> None:
     with pytest.raises(InputError) as caught:
         text_node(text, [float], spot(unit))
     said = str(caught.value)
-    assert said.startswith(f"wall.toml: [material.soil] E is '{text}'") and WRONG[text, unit] in said, said
+    assert (
+        said.startswith(f"wall.toml: [material.soil] E is '{text}'") and WRONG[text, unit] in said
+    ), said
 
 
 def given(node: Any) -> Any:
@@ -81,8 +113,11 @@ def test_a_case_with_units_is_the_case_without(tmp_path: Path) -> None:
     """demos/cases/wall.toml, its numbers as texts: the same values, also by --set."""
     text = WALL.read_text(encoding="utf-8")
     for old, new in (
-        ("height = 9.0", 'height = "900 cm"'), ("E = 2.0e10", 'E = "20 GPa"'), ("rho = 2400.0", 'rho = "2.4 t/m3"'),
-        ("thickness = 0.20", 'thickness = "200 mm"'), ("dt = 0.0017857142857142857", 'dt = "1/560"'),
+        ("height = 9.0", 'height = "900 cm"'),
+        ("E = 2.0e10", 'E = "20 GPa"'),
+        ("rho = 2400.0", 'rho = "2.4 t/m3"'),
+        ("thickness = 0.20", 'thickness = "200 mm"'),
+        ("dt = 0.0017857142857142857", 'dt = "1/560"'),
     ):
         assert old in text, old
         text = text.replace(old, new)
@@ -92,7 +127,9 @@ def test_a_case_with_units_is_the_case_without(tmp_path: Path) -> None:
     found, plain = read_case(path, settings), read_case(WALL, ["run.steps=6"])
     for name in ("mesh", "material", "system", "contact", "run"):
         assert given(found.nodes[name]) == given(plain.nodes[name]), name
-    with pytest.raises(InputError, match=r"\[mesh\] height is '9 s': 's' is not a unit of it: give it in m"):
+    with pytest.raises(
+        InputError, match=r"\[mesh\] height is '9 s': 's' is not a unit of it: give it in m"
+    ):
         read_case(path, ["mesh.height=9 s"])
     with pytest.raises(InputError, match=r"\[run\] steps is '5/2', which is 2.5: give"):
         read_case(path, ["run.steps=5/2"])
@@ -162,26 +199,41 @@ def test_expressions_are_the_functions_of_the_interface(tmp_path_factory: Any) -
         path.write_text(BLOCK, encoding="utf-8")
     COMM.Barrier()
     parts = read_case(path).parts(COMM)
-    lean = meshes.BlockMesh(lengths=(4.0, 6.0), divisions=(2, 3), corner=(-2.0, 0.0),
-                            deform=lambda p: np.column_stack([p[:, 0] + 0.2 * p[:, 1], p[:, 1]]))
+    lean = meshes.BlockMesh(
+        lengths=(4.0, 6.0),
+        divisions=(2, 3),
+        corner=(-2.0, 0.0),
+        deform=lambda p: np.column_stack([p[:, 0] + 0.2 * p[:, 1], p[:, 1]]),
+    )
     mesh, tags = fem.build_mesh(lean, COMM)
     loads = [
-        fem.Pressure(tags["left"], lambda p, t: 9810.0 * np.maximum(0.0, 5.0 - p[:, 1]), lambda t: min(1.0, 0.5 * t)),
+        fem.Pressure(
+            tags["left"],
+            lambda p, t: 9810.0 * np.maximum(0.0, 5.0 - p[:, 1]),
+            lambda t: min(1.0, 0.5 * t),
+        ),
         fem.Traction(tags["top"], (0.0, -1e3)),
-        fem.Traction(tags["right"], lambda p, t: np.column_stack([1e3 * t * p[:, 1], np.full(len(p), 2e3)])),
+        fem.Traction(
+            tags["right"], lambda p, t: np.column_stack([1e3 * t * p[:, 1], np.full(len(p), 2e3)])
+        ),
         fem.InitialStrain(lambda p, t: 1e-5 * (10.0 + p[:, 1]) * t),
         fem.InitialStrain(3e-4, lambda t: t**2, tags["block"]),
         fem.InitialStrain([[3e-4, -5e-5], [0.0, 2e-4]]),
     ]
     system = fem.assemble(
-        mesh, fem.Heterogeneous(lambda x: 30e6 + 2e6 * x[1], 0.3, 1800.0), clamped=tags["bottom"], loads=loads,
-        initial_velocity=lambda p: np.column_stack([0.1 * p[:, 1], np.zeros(len(p))]))
+        mesh,
+        fem.Heterogeneous(lambda x: 30e6 + 2e6 * x[1], 0.3, 1800.0),
+        clamped=tags["bottom"],
+        loads=loads,
+        initial_velocity=lambda p: np.column_stack([0.1 * p[:, 1], np.zeros(len(p))]),
+    )
     obstacle = core.AnalyticGap(lambda p: 0.01 + 1e-3 * p[:, 1] ** 2)
     surface = fem.contact_surface(system, tags["right"], obstacle=obstacle)
     for t in (0.0, 0.5, 3.0):
         assert np.allclose(parts.system.load(t), system.load(t), rtol=1e-13, atol=1e-9)
     assert np.array_equal(parts.system.v0, system.v0) and np.allclose(
-        parts.surface.gap(0.0), surface.gap(0.0), rtol=1e-14, atol=0.0)
+        parts.surface.gap(0.0), surface.gap(0.0), rtol=1e-14, atol=0.0
+    )
     ones = np.ones(len(system.v0))
     assert np.allclose(parts.system.K @ ones, system.K @ ones, rtol=1e-10, atol=1e-4)
 
@@ -190,15 +242,47 @@ def test_expressions_are_the_functions_of_the_interface(tmp_path_factory: Any) -
 def test_expressions_where_none_belongs_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "block.toml"
     for old, new, said in (
-        ("30e6 + 2e6*y", "30e6 + 2e6*t", r"\[material.soil\] E is '30e6 \+ 2e6\*t': give a number, .* x, y, z; 't'"),
-        ("min(1, t/2)", "x", r"history is 'x': give a number, one with its unit, or arithmetic of t; 'x' in it"),
-        ('["0.1*y", "0"]', '["0.1*y", "0 m"]', r"initial_velocity\[2\] is '0 m': 'm' is not a unit of it: give"),
-        ('["0.1*y", "0"]', '["0.1*y*t", 0]', r"initial_velocity\[1\] is '0.1\*y\*t': .*'t' in it is not a number"),
-        ('["0", "-1 kPa"]', '"-1 kPa"', r"value is '-1 kPa': give a list of numbers or expressions of x, y, z, t"),
-        ("2e-4]]", '"1e-4*t"]]', r"value\[2\]\[2\] is '1e-4\*t': give a number, .*'t' in it is not a number"),
-        ('"1e-5*(10 + y)*t"', '["1e-5*t", "0"]', r"value\[1\] is '1e-5\*t': give a list of numbers"),
-        ('"9810*max(0, 5 - y)"', '["9810*y", "0"]', "value is a list: give a number or an expression or a function"),
-        ('divisions = [2, 3]', 'divisions = [2, "x"]', r"divisions\[2\] is 'x': give a number"),
+        (
+            "30e6 + 2e6*y",
+            "30e6 + 2e6*t",
+            r"\[material.soil\] E is '30e6 \+ 2e6\*t': give a number, .* x, y, z; 't'",
+        ),
+        (
+            "min(1, t/2)",
+            "x",
+            r"history is 'x': give a number, one with its unit, or arithmetic of t; 'x' in it",
+        ),
+        (
+            '["0.1*y", "0"]',
+            '["0.1*y", "0 m"]',
+            r"initial_velocity\[2\] is '0 m': 'm' is not a unit of it: give",
+        ),
+        (
+            '["0.1*y", "0"]',
+            '["0.1*y*t", 0]',
+            r"initial_velocity\[1\] is '0.1\*y\*t': .*'t' in it is not a number",
+        ),
+        (
+            '["0", "-1 kPa"]',
+            '"-1 kPa"',
+            r"value is '-1 kPa': give a list of numbers or expressions of x, y, z, t",
+        ),
+        (
+            "2e-4]]",
+            '"1e-4*t"]]',
+            r"value\[2\]\[2\] is '1e-4\*t': give a number, .*'t' in it is not a number",
+        ),
+        (
+            '"1e-5*(10 + y)*t"',
+            '["1e-5*t", "0"]',
+            r"value\[1\] is '1e-5\*t': give a list of numbers",
+        ),
+        (
+            '"9810*max(0, 5 - y)"',
+            '["9810*y", "0"]',
+            "value is a list: give a number or an expression or a function",
+        ),
+        ("divisions = [2, 3]", 'divisions = [2, "x"]', r"divisions\[2\] is 'x': give a number"),
     ):
         assert old in BLOCK
         path.write_text(BLOCK.replace(old, new), encoding="utf-8")
@@ -211,7 +295,10 @@ def test_amplitudes_with_units_are_scaled() -> None:
     tables = {"excitation": {"type": "Harmonic", "amplitude": "0.5 g", "frequency": 1.0}}
     assert ShortOptions(scale=2.0).settings(tables) == ["excitation.amplitude=9.80665"]
     tables["excitation"]["amplitude"] = "0.5 m"
-    with pytest.raises(InputError, match=r"--scale: \[excitation\[1\]\] amplitude is '0.5 m': 'm' is not a unit of it"):
+    with pytest.raises(
+        InputError,
+        match=r"--scale: \[excitation\[1\]\] amplitude is '0.5 m': 'm' is not a unit of it",
+    ):
         ShortOptions(scale=2.0).settings(tables)
 
 
@@ -219,5 +306,7 @@ def test_amplitudes_with_units_are_scaled() -> None:
 def test_the_guide_has_the_table_of_units() -> None:
     text = (ROOT / "docs" / "guide" / "studies.md").read_text(encoding="utf-8")
     for unit, keys in KEYS.items():
-        row = f"| {'none, or %' if unit == '1' else unit} | {', '.join(f'`{key}`' for key in keys)} |"
+        row = (
+            f"| {'none, or %' if unit == '1' else unit} | {', '.join(f'`{key}`' for key in keys)} |"
+        )
         assert row in text or not unit

@@ -62,7 +62,9 @@ def written(folder: Path) -> Path:
     return path
 
 
-def test_both_columns_and_their_difference(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_both_columns_and_their_difference(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Twice the elements along each side, twice the steps, of the same duration; the table has their numbers; nothing
     that is there is computed again; another case is. Paths stay relative to the case that was run (V11.3)."""
     case, out = written(tmp_path), tmp_path / "out" / "run"
@@ -70,7 +72,9 @@ def test_both_columns_and_their_difference(tmp_path: Path, capsys: pytest.Captur
     assert base_folder(out / "case.toml") == tmp_path
     assert main(["report", str(out), "--refine", "--out", str(tmp_path / "page.pdf")]) == 0
     said = capsys.readouterr().out
-    base, fine, short = (read_run(folder) for folder in (out, out / "refined" / "h", out / "refined" / "dt"))
+    base, fine, short = (
+        read_run(folder) for folder in (out, out / "refined" / "h", out / "refined" / "dt")
+    )
     assert base.contact is not None and fine.contact is not None
     assert (len(base.contact.points), len(fine.contact.points)) == (2, 4)  # the corner is clamped
     assert fine.facts["steps"] == base.facts["steps"] == 20 and short.facts["steps"] == 40
@@ -91,7 +95,10 @@ def test_both_columns_and_their_difference(tmp_path: Path, capsys: pytest.Captur
     assert refine(out, MPI.COMM_SELF, progress=False) == {}
     assert (out / "refined" / "h" / "history.csv").stat().st_mtime_ns == stamp
     assert "fields" not in read_copy(out / "refined" / "h")
-    assert main(["run", str(case), "--out", str(out), "--quiet", "--set", "material.rubber.E=2e6"]) == 0
+    assert (
+        main(["run", str(case), "--out", str(out), "--quiet", "--set", "material.rubber.E=2e6"])
+        == 0
+    )
     assert not refinement(read_run(out), {}).tables  # those were of another case
     assert "was not measured" in refinement(read_run(out), {}).sentences[-1]
 

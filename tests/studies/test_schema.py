@@ -35,8 +35,11 @@ def test_the_schema_is_that_of_the_signatures() -> None:
 
 def test_every_key_of_the_table_of_units_is_one_of_case_files() -> None:
     rules = json.loads(FILE.read_text(encoding="utf-8"))
-    known = {f"{name.partition('.')[2]}.{key}"
-             for name, one in rules["definitions"].items() for key in one["properties"]}
+    known = {
+        f"{name.partition('.')[2]}.{key}"
+        for name, one in rules["definitions"].items()
+        for key in one["properties"]
+    }
     for table, call in (("system", "assemble"), ("run", "simulate"), ("gravity", "with_weight")):
         known |= {f"{call}.{key}" for key in rules["properties"][table]["properties"]}
     for unit, keys in KEYS.items():
@@ -48,14 +51,25 @@ def valid(value: Any, rule: Any, whole: Any) -> bool:
     """Whether a value keeps to a rule of JSON schema, of the words that ours has."""
     if "$ref" in rule:
         return valid(value, whole["definitions"][rule["$ref"].rpartition("/")[2]], whole)
-    kinds = {"object": dict, "array": list, "string": str, "boolean": bool, "integer": int, "number": (int, float)}
+    kinds = {
+        "object": dict,
+        "array": list,
+        "string": str,
+        "boolean": bool,
+        "integer": int,
+        "number": (int, float),
+    }
     wanted = rule.get("type", [])
     if wanted and not any(
         isinstance(value, kinds[one]) and (one == "boolean" or not isinstance(value, bool))
         for one in ([wanted] if isinstance(wanted, str) else wanted)
     ):
         return False
-    if "const" in rule and value != rule["const"] or not all(valid(value, one, whole) for one in rule.get("allOf", [])):
+    if (
+        "const" in rule
+        and value != rule["const"]
+        or not all(valid(value, one, whole) for one in rule.get("allOf", []))
+    ):
         return False
     if "pattern" in rule and rule["pattern"] not in value:
         return False
@@ -67,11 +81,16 @@ def valid(value: Any, rule: Any, whole: Any) -> bool:
         return True
     known, more = rule.get("properties", {}), rule.get("additionalProperties", {})
     return all(one in value for one in rule.get("required", [])) and all(
-        valid(one, known[key], whole) if key in known else more is not False and valid(one, more, whole)
-        for key, one in value.items())
+        valid(one, known[key], whole)
+        if key in known
+        else more is not False and valid(one, more, whole)
+        for key, one in value.items()
+    )
 
 
-def test_the_schema_takes_the_cases_that_run_and_no_others(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_schema_takes_the_cases_that_run_and_no_others(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     assert main(["schema"]) == 0
     rules = json.loads(capsys.readouterr().out)
     folders = (FILE.parent / "builtin", FILE.parents[1] / "starters", ROOT / "demos" / "cases")
@@ -81,13 +100,31 @@ def test_the_schema_takes_the_cases_that_run_and_no_others(capsys: pytest.Captur
         assert valid(read_toml(path), rules, rules), path
     tables = read_toml(WALL)
     for setting in ("friction.type=Coulomb", "mesh.height=9 m", "scheme.type=package.module:Own"):
-        assert valid(with_settings(tables, [setting, "friction.mu=0.5"] if "friction" in setting else [setting]), rules,
-                     rules), setting
-    for setting in ("scheme.phj=1", "material.concrete.E=", "system.clamped=3", "run.steps=[1]", "solver.type=Condenst",
-                    "contct.facets=face", "mesh=", "contact.1.obstacle.points=[0.0, 0.0]"):
+        assert valid(
+            with_settings(
+                tables, [setting, "friction.mu=0.5"] if "friction" in setting else [setting]
+            ),
+            rules,
+            rules,
+        ), setting
+    for setting in (
+        "scheme.phj=1",
+        "material.concrete.E=",
+        "system.clamped=3",
+        "run.steps=[1]",
+        "solver.type=Condenst",
+        "contct.facets=face",
+        "mesh=",
+        "contact.1.obstacle.points=[0.0, 0.0]",
+    ):
         assert not valid(with_settings(tables, [setting]), rules, rules), setting
     staged = read_toml(ROOT / "demos" / "cases" / "raft.toml")
-    for setting in ("stage.1.type=statc", "stage.1.sistem.clamped=base", "stage.2.release=1", "stage.2.name="):
+    for setting in (
+        "stage.1.type=statc",
+        "stage.1.sistem.clamped=base",
+        "stage.2.release=1",
+        "stage.2.name=",
+    ):
         assert not valid(with_settings(staged, [setting]), rules, rules), setting
     try:
         import jsonschema

@@ -80,21 +80,43 @@ def written(folder: Path, text: str = CASE) -> Path:
 
 def by_hand() -> Any:
     """The same in Python."""
-    lower, upper = BlockMesh(lengths=(8.0, 4.0), divisions=(4, 3)), BlockMesh(lengths=(2.0, 2.0), divisions=(1, 1))
+    lower, upper = (
+        BlockMesh(lengths=(8.0, 4.0), divisions=(4, 3)),
+        BlockMesh(lengths=(2.0, 2.0), divisions=(1, 1)),
+    )
     mesh, tags = fem.build_mesh(TwoBlocks(lower=lower, upper=upper, offset=(2.0, 0.0)), COMM)
-    materials = [(tags["lower"], vc.LinearElastic(E=8e7, nu=0.3, rho=1900.0)),
-                 (tags["upper"], vc.LinearElastic(E=2e9, nu=0.2, rho=2000.0))]
-    curves = [(tags["lower"], soil.SoilCurves.vucetic_dobry(15)), (tags["upper"], soil.SoilCurves.linear(0.02))]
+    materials = [
+        (tags["lower"], vc.LinearElastic(E=8e7, nu=0.3, rho=1900.0)),
+        (tags["upper"], vc.LinearElastic(E=2e9, nu=0.2, rho=2000.0)),
+    ]
+    curves = [
+        (tags["lower"], soil.SoilCurves.vucetic_dobry(15)),
+        (tags["upper"], soil.SoilCurves.linear(0.02)),
+    ]
 
     def run(material: Any, strain: Any) -> Any:
-        system = vc.with_weight(fem.assemble(mesh, material, damping=vc.DampingRatio(6.0, 20.0),
-                                             clamped=tags["lower_bottom"],
-                                             tied=fem.Tied(tags["lower_left"], tags["lower_right"])),
-                                direction=(0.0, -1.0))
+        system = vc.with_weight(
+            fem.assemble(
+                mesh,
+                material,
+                damping=vc.DampingRatio(6.0, 20.0),
+                clamped=tags["lower_bottom"],
+                tied=fem.Tied(tags["lower_left"], tags["lower_right"]),
+            ),
+            direction=(0.0, -1.0),
+        )
         contact = fem.contact_pair(system, tags["upper_bottom"], tags["lower_top"])
-        problem = vc.ContactProblem(system, contact, friction=vc.Coulomb(0.5), excitation=vc.Ricker(3.0, 4.0))
-        return vc.simulate(problem, state=vc.static_equilibrium(problem), dt=0.01, steps=35, progress=False,
-                           record=(vc.Energy(), vc.Contact(), strain))
+        problem = vc.ContactProblem(
+            system, contact, friction=vc.Coulomb(0.5), excitation=vc.Ricker(3.0, 4.0)
+        )
+        return vc.simulate(
+            problem,
+            state=vc.static_equilibrium(problem),
+            dt=0.01,
+            steps=35,
+            progress=False,
+            record=(vc.Energy(), vc.Contact(), strain),
+        )
 
     return soil.strain_compatible(mesh, materials, curves, run)
 
@@ -114,24 +136,33 @@ def test_a_case_is_the_calls_of_python(tmp_path):
     changes = json.loads((out / "strain_compatible.json").read_text())["changes"]
     assert np.allclose(changes, expected.changes, rtol=1e-5) and changes[-1] < 0.01
     assert json.loads((out / "summary.json").read_text())["status"] == "finished"
-    first, last = (np.loadtxt(path / "history.csv", delimiter=",", skiprows=1, usecols=1)
-                   for path in (out / "iterations" / "1", out))
+    first, last = (
+        np.loadtxt(path / "history.csv", delimiter=",", skiprows=1, usecols=1)
+        for path in (out / "iterations" / "1", out)
+    )
     assert len(first) == len(last) == 36
 
 
 def test_units_of_curves(tmp_path):
     curves = 'type = "SoilCurves.darendeli", mean_stress = "100 kPa", plasticity = 15'
-    text = CASE.replace('type = "SoilCurves.vucetic_dobry", plasticity = 15', curves).replace("20.0}", '"20 Hz"}')
+    text = CASE.replace('type = "SoilCurves.vucetic_dobry", plasticity = 15', curves).replace(
+        "20.0}", '"20 Hz"}'
+    )
     case = read_case(written(tmp_path, text))
     _, tags = case.meshed(COMM)
     asked = build(case.nodes["strain_compatible"], {"tags": tags})
-    assert asked["curves"][0] == (tags["lower"], soil.SoilCurves.darendeli(mean_stress=1e5, plasticity=15))
+    assert asked["curves"][0] == (
+        tags["lower"],
+        soil.SoilCurves.darendeli(mean_stress=1e5, plasticity=15),
+    )
 
 
 def test_with_stages_the_last_one_tells_the_strains(tmp_path):
     """Gravity as a stage of its own: the same run, its folders within those of the runs."""
     plain = read_case(written(tmp_path)).run(COMM, progress=False)
-    staged = read_case(written(tmp_path, CASE + STAGES)).run(COMM, out=tmp_path / "out", progress=False)
+    staged = read_case(written(tmp_path, CASE + STAGES)).run(
+        COMM, out=tmp_path / "out", progress=False
+    )
     for name in ("contact_resultant", "largest_shear_strain"):
         scale = np.abs(plain.history[name]).max()
         assert np.abs(staged.history[name] - plain.history[name]).max() < 1e-6 * scale
@@ -139,25 +170,43 @@ def test_with_stages_the_last_one_tells_the_strains(tmp_path):
     assert (tmp_path / "out" / "iterations" / "1" / "stages" / "1_gravity").is_dir()
 
 
-@pytest.mark.parametrize(("old", "new", "words"), [
-    ('["upper", {', '["uper", {', "uper"),
-    ("plasticity = 15", "plasticity = 300", "end at 200 %"),
-    ("SoilCurves.vucetic_dobry", "SoilCurves.vucetic", "vucetic_dobry"),
-    ('["upper", {', '["lower", {', "some cells have two curves"),
-    ('"DampingRatio", frequency = 6.0, second = 20.0', '"Rayleigh", alpha = 0.1, beta = 0.0', "DampingRatio"),
-    ('damping = {type = "DampingRatio", frequency = 6.0, second = 20.0}', "", "gives every cell its damping ratio"),
-    ("[strain_compatible]\n", "[strain_compatible]\nfrequency = 2.0\n", "unknown key 'frequency'"),
-])
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('["upper", {', '["uper", {', "uper"),
+        ("plasticity = 15", "plasticity = 300", "end at 200 %"),
+        ("SoilCurves.vucetic_dobry", "SoilCurves.vucetic", "vucetic_dobry"),
+        ('["upper", {', '["lower", {', "some cells have two curves"),
+        (
+            '"DampingRatio", frequency = 6.0, second = 20.0',
+            '"Rayleigh", alpha = 0.1, beta = 0.0',
+            "DampingRatio",
+        ),
+        (
+            'damping = {type = "DampingRatio", frequency = 6.0, second = 20.0}',
+            "",
+            "gives every cell its damping ratio",
+        ),
+        (
+            "[strain_compatible]\n",
+            "[strain_compatible]\nfrequency = 2.0\n",
+            "unknown key 'frequency'",
+        ),
+    ],
+)
 def test_what_is_refused(tmp_path, old, new, words):
     assert old in CASE
     with pytest.raises(ViContactError, match=words):
         read_case(written(tmp_path, CASE.replace(old, new, 1))).run(COMM, progress=False)
 
 
-@pytest.mark.parametrize(("old", "new", "words"), [
-    ("amplitude = 3.0", "amplitude = 300.0", "and 'Vucetic-Dobry PI 15' ends at 1 %"),
-    ("[strain_compatible]\n", "[strain_compatible]\nmost = 2\n", "after 2 runs"),
-])
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("amplitude = 3.0", "amplitude = 300.0", "and 'Vucetic-Dobry PI 15' ends at 1 %"),
+        ("[strain_compatible]\n", "[strain_compatible]\nmost = 2\n", "after 2 runs"),
+    ],
+)
 def test_a_folder_without_compatible_soil_looks_unfinished(tmp_path, old, new, words):
     """It is refused; the last run stands with the others, and the folder holds no summary; a later run is not
     disturbed."""
@@ -165,16 +214,24 @@ def test_a_folder_without_compatible_soil_looks_unfinished(tmp_path, old, new, w
     with pytest.raises(ViContactError, match=words):
         read_case(written(tmp_path, CASE.replace(old, new, 1))).run(COMM, out=out, progress=False)
     assert [one.name for one in out.iterdir()] == ["iterations"]
-    folders = [out / "iterations" / f"{number}" for number in range(1, 1 + len(list((out / "iterations").iterdir())))]
+    folders = [
+        out / "iterations" / f"{number}"
+        for number in range(1, 1 + len(list((out / "iterations").iterdir())))
+    ]
     assert len(folders) > 1
-    assert all(json.loads((one / "summary.json").read_text())["status"] == "finished" for one in folders)
+    assert all(
+        json.loads((one / "summary.json").read_text())["status"] == "finished" for one in folders
+    )
 
 
 def test_no_restart_no_static_end_and_no_study(tmp_path):
     case = read_case(written(tmp_path))
     with pytest.raises(InputError, match="cannot be continued: run it from the start"):
         case.run(COMM, out=tmp_path / "out", restart=True)
-    with pytest.raises(InputError, match="leave it out of stages and studies"), case.call(case.parts(COMM), None):
+    with (
+        pytest.raises(InputError, match="leave it out of stages and studies"),
+        case.call(case.parts(COMM), None),
+    ):
         pass
     with pytest.raises(InputError, match="the last stage, which is static"):
         read_case(written(tmp_path, CASE + STAGES.replace("dynamic", "static"))).run(COMM)
@@ -182,5 +239,18 @@ def test_no_restart_no_static_end_and_no_study(tmp_path):
 
 def test_the_command_runs_it(tmp_path, capsys):
     assert main(["run", str(written(tmp_path)), "--check", "--out", str(tmp_path / "checked")]) == 0
-    assert main(["run", str(written(tmp_path)), "--out", str(tmp_path / "out"), "--quiet", "--steps", "30"]) == 0
+    assert (
+        main(
+            [
+                "run",
+                str(written(tmp_path)),
+                "--out",
+                str(tmp_path / "out"),
+                "--quiet",
+                "--steps",
+                "30",
+            ]
+        )
+        == 0
+    )
     assert (tmp_path / "out" / "iterations" / "1" / "summary.json").is_file()

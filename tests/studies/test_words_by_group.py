@@ -77,15 +77,29 @@ DAMPINGS = {
 def build(damping: Any, xi: float) -> Any:
     """The system of the case in Python."""
     names = ("soft", "fibre", "layered", "damped")
-    blocks = {name: BlockMesh(lengths=(2.0, 1.0), divisions=(4, 2), corner=(3.0 * k, 0.0))
-              for k, name in enumerate(names)}
+    blocks = {
+        name: BlockMesh(lengths=(2.0, 1.0), divisions=(4, 2), corner=(3.0 * k, 0.0))
+        for k, name in enumerate(names)
+    }
     mesh, tags = fem.build_mesh(Blocks(blocks), COMM)
     axes = ((0.8, 0.6, 0.0), (-0.6, 0.8, 0.0), (0.0, 0.0, 1.0))
     materials = (
         vc.LinearElastic.from_wave_speeds(400.0, 200.0, 2000.0),
-        vc.Orthotropic(E1=1e10, E2=5e8, E3=5e8, nu12=0.3, nu13=0.3, nu23=0.4, G12=5e8, G13=5e8, G23=1e8, rho=600.0,
-                       axes=axes),
-        fem.Heterogeneous(lambda x: 1e8 + 2e8 * x[1], 0.3, 1800.0), fem.Heterogeneous(1e9, 0.25, 1900.0, xi),
+        vc.Orthotropic(
+            E1=1e10,
+            E2=5e8,
+            E3=5e8,
+            nu12=0.3,
+            nu13=0.3,
+            nu23=0.4,
+            G12=5e8,
+            G13=5e8,
+            G23=1e8,
+            rho=600.0,
+            axes=axes,
+        ),
+        fem.Heterogeneous(lambda x: 1e8 + 2e8 * x[1], 0.3, 1800.0),
+        fem.Heterogeneous(1e9, 0.25, 1900.0, xi),
     )
     cells = [(tags[name], one) for name, one in zip(names, materials, strict=True)]
     return fem.assemble(mesh, cells, damping=damping)
@@ -97,19 +111,28 @@ def test_materials_and_damping_by_cell_group(shared_tmp: Path, words: str) -> No
     belongs to the material of its group, and the others have none."""
     file = shared_tmp / "groups.toml"
     if COMM.rank == 0:
-        case = CASE.replace("RATIO", "xi = 0.05" if "Ratio" in words else "")  # other laws do not read it
+        case = CASE.replace(
+            "RATIO", "xi = 0.05" if "Ratio" in words else ""
+        )  # other laws do not read it
         file.write_text(case + f'[system]\ndamping = {{type = "{words}\n', encoding="utf-8")
     COMM.Barrier()
-    found, expected = read_case(file).problem(COMM).system, build(DAMPINGS[words], 0.05 if "Ratio" in words else 0.0)
+    found, expected = (
+        read_case(file).problem(COMM).system,
+        build(DAMPINGS[words], 0.05 if "Ratio" in words else 0.0),
+    )
     w = np.cos(found.space.coordinates @ [7.0, 3.0]) + 0.1 * (np.asarray(found.space.ids) % 2)
     for name in ("M", "C", "K"):
         one, other = (getattr(system, name) @ w for system in (found, expected))
         size = COMM.allreduce(float(np.abs(other).max(initial=0.0)), MPI.MAX)
-        assert COMM.allreduce(float(np.abs(one - other).max(initial=0.0)), MPI.MAX) < 1e-12 * size, name
+        assert (
+            COMM.allreduce(float(np.abs(one - other).max(initial=0.0)), MPI.MAX) < 1e-12 * size
+        ), name
     if "Ratio" in words:
         body = found.space.bodies
         share = np.abs(found.C @ w)
-        damped = [COMM.allreduce(float(share[body == k].max(initial=0.0)), MPI.MAX) for k in range(4)]
+        damped = [
+            COMM.allreduce(float(share[body == k].max(initial=0.0)), MPI.MAX) for k in range(4)
+        ]
         assert damped[3] > 0.0 and max(damped[:3]) == 0.0
 
 
@@ -117,11 +140,34 @@ def test_materials_and_damping_by_cell_group(shared_tmp: Path, words: str) -> No
 def test_every_public_recorder_has_a_word() -> None:
     """What the rooms list and ``simulate`` takes as a recorder is a type of [[record]]."""
     recorders = set()
-    for room in ("core", "fem", "laws", "run", "engineering", "soil", "ground_motion", "solvers", "schemes", "studies"):
+    for room in (
+        "core",
+        "fem",
+        "laws",
+        "run",
+        "engineering",
+        "soil",
+        "ground_motion",
+        "solvers",
+        "schemes",
+        "studies",
+    ):
         listed = import_module(f"vi_contact.{room}")
         for name in listed.__all__:
             one = getattr(listed, name)
-            if isclass(one) and one is not Recorder and all(hasattr(one, part) for part in ("columns", "start", "row")):
+            if (
+                isclass(one)
+                and one is not Recorder
+                and all(hasattr(one, part) for part in ("columns", "start", "row"))
+            ):
                 recorders.add(name)
-    assert recorders >= {"Energy", "Contact", "Probe", "Resultants", "Racking", "Reactions", "SectionForces"}
+    assert recorders >= {
+        "Energy",
+        "Contact",
+        "Probe",
+        "Resultants",
+        "Racking",
+        "Reactions",
+        "SectionForces",
+    }
     assert recorders == set(names_of(Recorder))

@@ -22,7 +22,9 @@ from vi_contact.run.march import march
 from vi_contact.solvers.condensed import Condensed
 
 
-def bar_matrices(n: int, *, length: float, E: float, rho: float, lumped: bool = False) -> tuple[Any, Any]:
+def bar_matrices(
+    n: int, *, length: float, E: float, rho: float, lumped: bool = False
+) -> tuple[Any, Any]:
     """(M, K) of n + 1 nodes: rho h/6 tridiag(1, 4, 1) or its row sums, E/h tridiag(-1, 2, -1), halved at the ends."""
     h = length / n
     ends = np.full(n + 1, 2.0)
@@ -53,8 +55,14 @@ def bar(
     M, K = bar_matrices(n, length=length, E=E, rho=rho, lumped=lumped)
     x = np.linspace(0.0, length, n + 1)
     system = vc.system_from_arrays(
-        M, damping * K if damping else None, K, coordinates=x[:, None], clamped=[n] if clamped else (),
-        load=-gravity * np.asarray(M.sum(axis=1)).ravel(), u0=u0(x), v0=v0(x),
+        M,
+        damping * K if damping else None,
+        K,
+        coordinates=x[:, None],
+        clamped=[n] if clamped else (),
+        load=-gravity * np.asarray(M.sum(axis=1)).ravel(),
+        u0=u0(x),
+        v0=v0(x),
     )
     foot = vc.contact_points(system, [0], [-1.0], gap0=gap)
     return ContactProblem(system, foot, **({"mass": ConsistentMass()} | problem))
@@ -79,7 +87,9 @@ def run(
     problem: ContactProblem, scheme: Any, *, dt: float, steps: int, solver: Any = None, **more: Any
 ) -> Iterator[Report]:
     """The reports of a march, with the condensed solver unless told otherwise."""
-    for _, report in march(problem, scheme=scheme, solver=solver or Condensed(), dt=dt, steps=steps, **more):
+    for _, report in march(
+        problem, scheme=scheme, solver=solver or Condensed(), dt=dt, steps=steps, **more
+    ):
         yield report
 
 

@@ -10,7 +10,9 @@ from vi_contact.bem import BoundaryMesh, Galerkin, OperatorMatrices, Orders, Tim
 
 def laplace(mesh: BoundaryMesh, s: complex, orders: Orders = Orders()) -> OperatorMatrices:
     """S(s) = (M/2 + K)ᵀ V⁻¹ (M/2 + K) - D maps nodal displacements to nodal forces."""
-    return Galerkin(mesh, MATERIAL.c_s, orders).assemble(LaplaceKernels(s, MATERIAL.c_p, MATERIAL.c_s))
+    return Galerkin(mesh, MATERIAL.c_s, orders).assemble(
+        LaplaceKernels(s, MATERIAL.c_p, MATERIAL.c_s)
+    )
 
 
 def in_time(mesh: BoundaryMesh, t: float, orders: Orders = Orders()) -> OperatorMatrices:

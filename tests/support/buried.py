@@ -93,12 +93,21 @@ class LinedBox:
             points = np.concatenate([points, points])
         used, cells = np.unique(cells, return_inverse=True)
         cells, points = cells.reshape(-1, 4), points[used]
-        return MeshArrays("quadrilateral", points, cells, {"lining": lining, "soil": ~lining},
-                          self.sides(points, cells, lining))
+        return MeshArrays(
+            "quadrilateral",
+            points,
+            cells,
+            {"lining": lining, "soil": ~lining},
+            self.sides(points, cells, lining),
+        )
 
-    def sides(self, points: np.ndarray, cells: np.ndarray, lining: np.ndarray) -> dict[str, np.ndarray]:
+    def sides(
+        self, points: np.ndarray, cells: np.ndarray, lining: np.ndarray
+    ) -> dict[str, np.ndarray]:
         edges = np.concatenate([cells[:, [k, (k + 1) % 4]] for k in range(4)])
-        _, first, count = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
+        _, first, count = np.unique(
+            np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
+        )
         outer = first[count == 1]
         edges, own = edges[outer], np.tile(lining, 4)[outer]
         middle = points[edges].mean(axis=1)
@@ -106,7 +115,11 @@ class LinedBox:
         def on(axis: int, value: float) -> np.ndarray:
             return np.abs(middle[:, axis] - value) < 1e-9
 
-        sides = {"axis_x": on(1, 0.0), "axis_y": on(0, 0.0), "far": on(0, self.far) | on(1, self.far)}
+        sides = {
+            "axis_x": on(1, 0.0),
+            "axis_y": on(0, 0.0),
+            "far": on(0, self.far) | on(1, self.far),
+        }
         if self.slip:
             for axis, name in enumerate(("right", "top")):
                 face = on(axis, self.outside[axis])
@@ -140,7 +153,12 @@ def racking(box: LinedBox, flexibility: float, *, nu: float = 0.3) -> float:
     surface: ContactSurface = empty_surface(system.algebra.comm, 2)
     if box.slip:
         pairs = [
-            fem.contact_pair(system, tags[f"lining_{name}"], tags[f"soil_{name}"], points=box.contact_points(name))
+            fem.contact_pair(
+                system,
+                tags[f"lining_{name}"],
+                tags[f"soil_{name}"],
+                points=box.contact_points(name),
+            )
             for name in ("right", "top")
         ]
         surface = fem.joined_surfaces(*pairs).bilateral_everywhere()

@@ -36,7 +36,12 @@ from vi_contact.meshes.block import BlockMesh
 from vi_contact.meshes.extract import MeshArrays, add_arrays, arrays_from_script
 from vi_contact.meshes.two_blocks import Blocks
 
-EVEN, DEEP, REACH, GROWTH = 1.25, 0.6, 4.0, 1.2  # in a: cells of 1/n up to EVEN along the surface and to DEEP below it,
+EVEN, DEEP, REACH, GROWTH = (
+    1.25,
+    0.6,
+    4.0,
+    1.2,
+)  # in a: cells of 1/n up to EVEN along the surface and to DEEP below it,
 # where stress changes as fast; (1 + GROWTH y)/n at a distance y from there; the box ends at REACH
 LOWEST = (0, "x", "left"), (2, "z", "back")  # the sides of a block where x and z are lowest
 Motion = Callable[[Array, float], Array]
@@ -59,7 +64,11 @@ class Cap:
     def sagitta(self, points: Array) -> Array:
         """How far its surface lies behind the tangent plane [m]."""
         square = points[:, 0] ** 2 + points[:, 2] ** 2
-        return square / (self.radius + np.sqrt(self.radius**2 - square)) if np.isfinite(self.radius) else 0.0 * square
+        return (
+            square / (self.radius + np.sqrt(self.radius**2 - square))
+            if np.isfinite(self.radius)
+            else 0.0 * square
+        )
 
 
 def stretched(cells: float, even: float) -> Array:
@@ -84,17 +93,29 @@ class CapMesh:
 
     def build(self, gmsh: Any) -> None:
         both = dict(zip(("upper", "lower"), self.caps, strict=False))
-        one = arrays_from_script(Blocks({name: self._block(cap, name == "lower") for name, cap in both.items()}))
+        one = arrays_from_script(
+            Blocks({name: self._block(cap, name == "lower") for name, cap in both.items()})
+        )
         facets: dict[str, Array] = {}
         for name, reach in zip(both, (1.3, 1.7), strict=False):
             near, far = ("bottom", "top") if name == "upper" else ("top", "bottom")
             rows = one.facet_groups[f"{name}_{near}"]
             middle = one.points[rows].mean(axis=1)
             facets[f"{name}_foot"] = rows[np.hypot(middle[:, 0], middle[:, 2]) < reach * self.a]
-            away = [far, "right", "front", *(side for axis, _, side in LOWEST if axis in self.whole)]
-            facets[f"{name}_far"] = np.concatenate([one.facet_groups[f"{name}_{side}"] for side in away])
-            facets |= {f"{name}_{axis}": one.facet_groups[f"{name}_{side}"]
-                       for number, axis, side in LOWEST if number not in self.whole}
+            away = [
+                far,
+                "right",
+                "front",
+                *(side for axis, _, side in LOWEST if axis in self.whole),
+            ]
+            facets[f"{name}_far"] = np.concatenate(
+                [one.facet_groups[f"{name}_{side}"] for side in away]
+            )
+            facets |= {
+                f"{name}_{axis}": one.facet_groups[f"{name}_{side}"]
+                for number, axis, side in LOWEST
+                if number not in self.whole
+            }
         gmsh.clear()
         add_arrays(gmsh, MeshArrays(one.cell, one.points, one.cells, one.cell_groups, facets))
 
@@ -104,15 +125,23 @@ class CapMesh:
         axes.insert(1, -depth[::-1] if below else depth)
 
         def placed(points: Array) -> Array:
-            x = np.column_stack([self.a * np.interp(points[:, i], np.linspace(0.0, 1.0, len(nodes)), nodes)
-                                 for i, nodes in enumerate(axes)])
+            x = np.column_stack(
+                [
+                    self.a * np.interp(points[:, i], np.linspace(0.0, 1.0, len(nodes)), nodes)
+                    for i, nodes in enumerate(axes)
+                ]
+            )
             c, s = np.cos(cap.turn), np.sin(cap.turn)
             x[:, 0], x[:, 2] = c * x[:, 0] + s * x[:, 2], c * x[:, 2] - s * x[:, 0]
             x[:, 1] += (-1.0 if below else 1.0) * cap.sagitta(x)
             return x
 
-        return BlockMesh(lengths=(1.0, 1.0, 1.0), divisions=tuple(len(nodes) - 1 for nodes in axes),
-                         simplices=self.simplices, deform=placed)
+        return BlockMesh(
+            lengths=(1.0, 1.0, 1.0),
+            divisions=tuple(len(nodes) - 1 for nodes in axes),
+            simplices=self.simplices,
+            deform=placed,
+        )
 
 
 @dataclass(frozen=True)
@@ -202,7 +231,11 @@ class Caps:
                 exact = self.exact_at(key[1])
                 kept[key] = under_hertz(own, key[1], np.array([0.0, exact.force, 0.0]), G=G, nu=nu)
                 kept[key][:, 1] -= exact.approach * cap.compliance * exact.modulus
-            return (kept[key] + (self.motions[number](own, t) if self.motions else 0.0)) * [1.0, sign, 1.0]
+            return (kept[key] + (self.motions[number](own, t) if self.motions else 0.0)) * [
+                1.0,
+                sign,
+                1.0,
+            ]
 
         return motion
 
@@ -211,11 +244,21 @@ class Caps:
         """Without friction."""
         mesh, tags = build_mesh(CapMesh(self.caps, self.a, self.whole, self.simplices), self.comm)
         names = ("upper", "lower")[: len(self.caps)]
-        hold = [Prescribed(tags[f"{name}_far"], displacement=self._far(i)) for i, name in enumerate(names)]
-        hold += [Prescribed(tags[f"{name}_{axis}"], components=(c,))
-                 for name in names for c, axis in ((0, "x"), (2, "z")) if c not in self.whole]
-        system = assemble(mesh, [(tags[name], cap.material) for name, cap in zip(names, self.caps, strict=True)],
-                          prescribed=hold)
+        hold = [
+            Prescribed(tags[f"{name}_far"], displacement=self._far(i))
+            for i, name in enumerate(names)
+        ]
+        hold += [
+            Prescribed(tags[f"{name}_{axis}"], components=(c,))
+            for name in names
+            for c, axis in ((0, "x"), (2, "z"))
+            if c not in self.whole
+        ]
+        system = assemble(
+            mesh,
+            [(tags[name], cap.material) for name, cap in zip(names, self.caps, strict=True)],
+            prescribed=hold,
+        )
         return ContactProblem(system, self._surface(system, tags))
 
     def _surface(self, system: Any, tags: Any) -> ContactSurface:
@@ -232,6 +275,10 @@ class Caps:
         friction = np.zeros_like(surface.points)
         if state.r_t is not None:
             for i in (0, 1):
-                friction += state.r_t[:, i, None] * blocks[np.arange(surface.count), :, columns[:, i]]
+                friction += (
+                    state.r_t[:, i, None] * blocks[np.arange(surface.count), :, columns[:, i]]
+                )
         whole, state = surface.whole(), gathered(surface, state)
-        return Contact(whole.points, whole.weights, state.r_n, surface.everywhere(friction), self.share)
+        return Contact(
+            whole.points, whole.weights, state.r_n, surface.everywhere(friction), self.share
+        )

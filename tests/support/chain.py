@@ -48,10 +48,14 @@ def chain_system(
     force = np.zeros(n)
     force[-1] = constant
     points = np.arange(1.0, n + 1.0)[:, None]
-    return vc.system_from_arrays(M, damping * K if damping else None, K, coordinates=points, load=force, u0=u0, v0=v0)
+    return vc.system_from_arrays(
+        M, damping * K if damping else None, K, coordinates=points, load=force, u0=u0, v0=v0
+    )
 
 
-def chain_surface(n: int, *, gap: float = 0.0, left_gap: float | None = None, weight: float = 0.5) -> ContactSurface:
+def chain_surface(
+    n: int, *, gap: float = 0.0, left_gap: float | None = None, weight: float = 0.5
+) -> ContactSurface:
     """The wall on the right of mass n and, when ``left_gap`` is given, the wall on the left of mass 1 (condition 1)."""
     ends = [n - 1] if left_gap is None else [n - 1, 0]
     direction = np.ones(n)
@@ -85,5 +89,9 @@ def chain_problem(
     """The chain between its walls; other keywords go to ``chain_system``."""
     surface = chain_surface(n, gap=gap, left_gap=left_gap)
     return ContactProblem(
-        chain_system(n, **system), surface, impact=impact, excitation=excitation, mass=ConsistentMass()
+        chain_system(n, **system),
+        surface,
+        impact=impact,
+        excitation=excitation,
+        mass=ConsistentMass(),
     )

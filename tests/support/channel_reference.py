@@ -82,7 +82,9 @@ def bodies() -> Bodies:
         held[2 * node + 1] |= x in (0.0, WIDTH)
     free, shake = ~held, M @ np.tile((1.0, 0.0), len(number))
     G = openings(number, size)
-    return Bodies(K[free][:, free], M[free][:, free], G[:, free], shake[free], weight[free], number, free)
+    return Bodies(
+        K[free][:, free], M[free][:, free], G[:, free], shake[free], weight[free], number, free
+    )
 
 
 def openings(number: dict[tuple[str, float, float], int], size: int) -> Any:
@@ -137,7 +139,9 @@ def run(steps: int, *, amplitude: float = 2.0, dt: float = 1.0 / 80.0) -> tuple[
         new = free + A.solve(b.G.T @ p)
         v = 2.0 * (new - u) / dt - v
         u, hit = new, p > 0.0
-        if hit.any():  # the closed points stop: an impulse that leaves the other openings' rates to the mass
+        if (
+            hit.any()
+        ):  # the closed points stop: an impulse that leaves the other openings' rates to the mass
             v = v - impulses[:, hit] @ np.linalg.solve(delassus[np.ix_(hit, hit)], (b.G @ v)[hit])
         gaps.append(b.G @ u)
         points.append(u[corners])

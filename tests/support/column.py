@@ -24,15 +24,27 @@ UNIT = LinearElastic(E=2.0, nu=0.0, rho=1.0)  # c_S = 1, c_P = √2
 
 
 def two_component_system(
-    M: Any, K_x: Any, K_y: Any, heights: Array, *, load: Any = (0.0, 0.0), u0: Any = (0.0, 0.0), v0: Any = (0.0, 0.0)
+    M: Any,
+    K_x: Any,
+    K_y: Any,
+    heights: Array,
+    *,
+    load: Any = (0.0, 0.0),
+    u0: Any = (0.0, 0.0),
+    v0: Any = (0.0, 0.0),
 ) -> SemiDiscreteSystem:
     """Matrices (n, n) of both components into one system; nodal load, u0 and v0 uniform over the nodes."""
     n = len(heights)
     x, y = sp.csr_matrix([[1.0, 0.0], [0.0, 0.0]]), sp.csr_matrix([[0.0, 0.0], [0.0, 1.0]])
     every = [np.tile(np.asarray(one, dtype=float), n) for one in (load, u0, v0)]
     return vc.system_from_arrays(
-        sp.kron(M, sp.identity(2)), None, sp.kron(K_x, x) + sp.kron(K_y, y),
-        coordinates=np.column_stack([np.zeros(n), heights]), load=every[0], u0=every[1], v0=every[2],
+        sp.kron(M, sp.identity(2)),
+        None,
+        sp.kron(K_x, x) + sp.kron(K_y, y),
+        coordinates=np.column_stack([np.zeros(n), heights]),
+        load=every[0],
+        u0=every[1],
+        v0=every[2],
     )
 
 
@@ -43,7 +55,13 @@ def base(system: SemiDiscreteSystem, *, bilateral: bool = False) -> ContactSurfa
 
 
 def column(
-    n: int = 100, *, v0: Any, height: float = 1.0, material: LinearElastic = UNIT, held: bool = False, **problem: Any
+    n: int = 100,
+    *,
+    v0: Any,
+    height: float = 1.0,
+    material: LinearElastic = UNIT,
+    held: bool = False,
+    **problem: Any,
 ) -> ContactProblem:
     """The column with the uniform initial velocity v0 (x, y); other keywords go to ContactProblem."""
     M, K_x = bar_matrices(n, length=height, E=material.shear_modulus, rho=material.rho)
@@ -53,11 +71,21 @@ def column(
 
 
 def rubbing_mass(
-    *, u0: float, kilograms: float = 1.0, stiffness: float = 1.0e4, normal_force: float = 1.0, **problem: Any
+    *,
+    u0: float,
+    kilograms: float = 1.0,
+    stiffness: float = 1.0e4,
+    normal_force: float = 1.0,
+    **problem: Any,
 ) -> ContactProblem:
     """One mass on a horizontal spring, pressed onto its base (V2.7 iii)."""
     one = sp.csr_matrix([[1.0]])
     system = two_component_system(
-        kilograms * one, stiffness * one, stiffness * one, np.zeros(1), load=(0.0, -normal_force), u0=(u0, 0.0)
+        kilograms * one,
+        stiffness * one,
+        stiffness * one,
+        np.zeros(1),
+        load=(0.0, -normal_force),
+        u0=(u0, 0.0),
     )
     return ContactProblem(system, base(system), **problem)

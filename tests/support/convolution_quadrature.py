@@ -51,7 +51,9 @@ class Frequencies:
         number("convolution quadrature", "the time step dt", self.dt, positive=True, unit="s")
         whole("convolution quadrature", "the number of time steps", self.steps, least=1)
         z = self._radius * np.exp(-2j * np.pi * np.arange(self.steps // 2 + 1) / self.steps)
-        values, vectors = np.linalg.eig(np.linalg.inv(RADAU + (z / (1.0 - z))[:, None, None] * RADAU[-1]))
+        values, vectors = np.linalg.eig(
+            np.linalg.inv(RADAU + (z / (1.0 - z))[:, None, None] * RADAU[-1])
+        )
         for name, value in (("z", z), ("s", values / self.dt), ("vectors", vectors)):
             object.__setattr__(self, name, value)
 
@@ -64,21 +66,27 @@ class Frequencies:
 
     def backward(self, transform: NDArray) -> Array:
         """Return the real history (N, ...) of which (N/2 + 1, ...) are the sums over n of z^n history[n]."""
-        return np.asarray(np.fft.irfft(transform, n=self.steps, axis=0) / self._powers(transform.ndim))
+        return np.asarray(
+            np.fft.irfft(transform, n=self.steps, axis=0) / self._powers(transform.ndim)
+        )
 
     @cached_property
     def held_factors(self) -> NDArray:
         """Return (N/2 + 1, 2) a_i: û = sum_i a_i C(s_i) ĝ at the end of the step, for g held in each step."""
         z = self.z[:, None]
         impulse = self.dt * (STAGES + z / (1.0 - z))
-        return self.vectors[:, -1] * self.s * np.linalg.solve(self.vectors, impulse[..., None])[..., 0]
+        return (
+            self.vectors[:, -1] * self.s * np.linalg.solve(self.vectors, impulse[..., None])[..., 0]
+        )
 
     def impulses(self, means: Array) -> NDArray:
         """Return (N/2 + 1, 2, ...) X⁻¹ Ĵ of real means between stages (N, 2, ...); (N, 1, ...) if held."""
         pieces = means * (WIDTHS * self.dt).reshape(-1, *[1] * (means.ndim - 2))
         summed = np.cumsum(pieces.reshape(-1, *means.shape[2:]), axis=0).reshape(pieces.shape)
         transform = np.fft.rfft(summed * self._powers(summed.ndim), axis=0)
-        return np.linalg.solve(self.vectors, transform.reshape(*transform.shape[:2], -1)).reshape(transform.shape)
+        return np.linalg.solve(self.vectors, transform.reshape(*transform.shape[:2], -1)).reshape(
+            transform.shape
+        )
 
     def at_ends(self, modes: NDArray) -> Array:
         """Return (N, ...) values at the ends of the steps of modes (N/2 + 1, 2, ...)."""
@@ -94,10 +102,17 @@ class Frequencies:
         forces is, for example, `lambda dt, steps: traction_forces(mesh, traction, dt=dt, steps=steps)`. With these
         instead of means over whole steps the method keeps its order 3 in time.
         """
-        function("substep_means", "forces", forces, "give a function (dt, steps) that returns means over steps")
+        function(
+            "substep_means",
+            "forces",
+            forces,
+            "give a function (dt, steps) that returns means over steps",
+        )
         fine = forces(self.dt / 3, self.steps * 3)
         if not shape_of(fine) or len(fine) != self.steps * 3:
-            raise InputError(f"substep_means: forces(dt, {self.steps * 3}) has shape {shape_of(fine)}; return one "
-                             "mean for each step")
+            raise InputError(
+                f"substep_means: forces(dt, {self.steps * 3}) has shape {shape_of(fine)}; return one "
+                "mean for each step"
+            )
         first, second, third = np.moveaxis(fine.reshape(self.steps, 3, *fine.shape[1:]), 1, 0)
         return np.stack([first, (second + third) / 2.0], axis=1)

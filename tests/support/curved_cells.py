@@ -24,10 +24,30 @@ MIDDLES = {  # Gmsh's number of a type of second order, and the vertices whose m
     "triangle": (9, [(0, 1), (1, 2), (2, 0)]),
     "quadrilateral": (10, [(0, 1), (1, 2), (2, 3), (3, 0), (0, 1, 2, 3)]),
     "tetrahedron": (11, [(0, 1), (1, 2), (0, 2), (0, 3), (2, 3), (1, 3)]),
-    "hexahedron": (12, [
-        (0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7), (0, 1, 2, 3),
-        (0, 1, 4, 5), (0, 3, 4, 7), (1, 2, 5, 6), (2, 3, 6, 7), (4, 5, 6, 7), (0, 1, 2, 3, 4, 5, 6, 7),
-    ]),
+    "hexahedron": (
+        12,
+        [
+            (0, 1),
+            (0, 3),
+            (0, 4),
+            (1, 2),
+            (1, 5),
+            (2, 3),
+            (2, 6),
+            (3, 7),
+            (4, 5),
+            (4, 7),
+            (5, 6),
+            (6, 7),
+            (0, 1, 2, 3),
+            (0, 1, 4, 5),
+            (0, 3, 4, 7),
+            (1, 2, 5, 6),
+            (2, 3, 6, 7),
+            (4, 5, 6, 7),
+            (0, 1, 2, 3, 4, 5, 6, 7),
+        ],
+    ),
 }
 
 
@@ -42,7 +62,9 @@ class Curved:
     def build(self, gmsh: Any) -> None:
         arrays = self.mesh if isinstance(self.mesh, MeshArrays) else arrays_from_script(self.mesh)
         d, known, points = arrays.points.shape[1], {}, list(arrays.points)
-        side = {"tetrahedron": "triangle", "hexahedron": "quadrilateral"}.get(arrays.cell, "interval")
+        side = {"tetrahedron": "triangle", "hexahedron": "quadrilateral"}.get(
+            arrays.cell, "interval"
+        )
 
         def raised(rows: Any, cell: str) -> Any:
             for row in rows.tolist():
@@ -54,16 +76,23 @@ class Curved:
                     row.append(known[key])
                 yield row
 
-        parts = [(d, arrays.cell, name, list(raised(arrays.cells[mask], arrays.cell)))
-                 for name, mask in arrays.cell_groups.items()]
-        parts += [(d - 1, side, name, list(raised(rows, side))) for name, rows in arrays.facet_groups.items()]
+        parts = [
+            (d, arrays.cell, name, list(raised(arrays.cells[mask], arrays.cell)))
+            for name, mask in arrays.cell_groups.items()
+        ]
+        parts += [
+            (d - 1, side, name, list(raised(rows, side)))
+            for name, rows in arrays.facet_groups.items()
+        ]
         places = np.zeros((len(points), 3))
         places[:, :d] = self.move(np.array(points))
         home = gmsh.model.addDiscreteEntity(d)
         gmsh.model.mesh.addNodes(d, home, 1 + np.arange(len(points)), places.ravel())
         for dim, cell, name, rows in parts:
             entity = gmsh.model.addDiscreteEntity(dim)
-            gmsh.model.mesh.addElementsByType(entity, MIDDLES[cell][0], [], 1 + np.array(rows).ravel())
+            gmsh.model.mesh.addElementsByType(
+                entity, MIDDLES[cell][0], [], 1 + np.array(rows).ravel()
+            )
             gmsh.model.setPhysicalName(dim, gmsh.model.addPhysicalGroup(dim, [entity]), name)
 
 

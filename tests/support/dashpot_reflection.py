@@ -13,7 +13,12 @@ from vi_contact.laws.materials import LinearElastic
 
 
 def dashpot_reflection(
-    material: LinearElastic, angle: float, *, wave: str, normal: float = 1.0, tangential: float = 1.0
+    material: LinearElastic,
+    angle: float,
+    *,
+    wave: str,
+    normal: float = 1.0,
+    tangential: float = 1.0,
 ) -> tuple[float, float]:
     """Return (|A_P|, |A_S|) of the waves reflected by dashpots, for one of amplitude 1 that arrives at ``angle`` [rad].
 
@@ -24,7 +29,9 @@ def dashpot_reflection(
     (p, ±eta_p) c_P, S waves (±eta_s, -p) c_S with the vertical slownesses eta (+ travels towards the boundary).
     """
     if wave not in ("P", "S") or not 0.0 <= angle < 0.5 * math.pi:
-        raise InputError(f"dashpot reflection of wave {wave!r} at {angle!r} rad: give 'P' or 'S' and 0 <= angle < pi/2")
+        raise InputError(
+            f"dashpot reflection of wave {wave!r} at {angle!r} rad: give 'P' or 'S' and 0 <= angle < pi/2"
+        )
     c_p, c_s, rho = material.c_p, material.c_s, material.rho
     p = math.sin(angle) / (c_p if wave == "P" else c_s)
     eta_p, eta_s = (complex(np.emath.sqrt(1.0 / c**2 - p**2)) for c in (c_p, c_s))
@@ -50,10 +57,17 @@ def dashpot_reflection(
 
 
 def dashpot_energy(
-    material: LinearElastic, angle: float, *, wave: str, normal: float = 1.0, tangential: float = 1.0
+    material: LinearElastic,
+    angle: float,
+    *,
+    wave: str,
+    normal: float = 1.0,
+    tangential: float = 1.0,
 ) -> float:
     """Return reflected over incident energy flux at right angles to the boundary; see ``dashpot_reflection``."""
-    amplitudes = dashpot_reflection(material, angle, wave=wave, normal=normal, tangential=tangential)
+    amplitudes = dashpot_reflection(
+        material, angle, wave=wave, normal=normal, tangential=tangential
+    )
     speeds = material.c_p, material.c_s
     speed = speeds["PS".index(wave)]
     p = math.sin(angle) / speed

@@ -16,5 +16,13 @@ def drawn_run(comm: Comm, folder: Path, steps: int = 6, *, frames_per_file: int 
 
     from vi_contact.fem.output.fields import XDMF
 
-    return simulate(shaken_wall(comm), scheme=ZienkiewiczWoodTaylor(), dt=1e-3, steps=steps, out=folder,
-                    record=[Energy(), Contact()], fields=XDMF(every=2, frames_per_file=frames_per_file), progress=False)
+    return simulate(
+        shaken_wall(comm),
+        scheme=ZienkiewiczWoodTaylor(),
+        dt=1e-3,
+        steps=steps,
+        out=folder,
+        record=[Energy(), Contact()],
+        fields=XDMF(every=2, frames_per_file=frames_per_file),
+        progress=False,
+    )

@@ -35,7 +35,13 @@ class Course:
 
 
 def course(
-    problem: ContactProblem, scheme: Any, *, dt: float, steps: int, state: State | None = None, **more: Any
+    problem: ContactProblem,
+    scheme: Any,
+    *,
+    dt: float,
+    steps: int,
+    state: State | None = None,
+    **more: Any,
 ) -> Course:
     """The energies of a run; other keywords go to ``bar.run``."""
     surface, state = problem.surface, state or initial_state(problem)

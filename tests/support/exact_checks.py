@@ -20,10 +20,14 @@ def wave_defect(u: Field, *, length: float, c: float, until: float, force: float
     x, t, k = random.random((3, 4000))
     x, t = length * x, until * t
     k = np.minimum(k * np.minimum(x, length - x) / c, t)
-    return np.abs(u(x, t + k) + u(x, t - k) - u(x + c * k, t) - u(x - c * k, t) - force * k**2).max()
+    return np.abs(
+        u(x, t + k) + u(x, t - k) - u(x + c * k, t) - u(x - c * k, t) - force * k**2
+    ).max()
 
 
-def derivative_defect(u: Field, rate: Field, *, x: Array, t: Array, h: tuple[float, float]) -> float:
+def derivative_defect(
+    u: Field, rate: Field, *, x: Array, t: Array, h: tuple[float, float]
+) -> float:
     """Largest difference of `rate` and the central difference of u with the step (dx, dt) = h; one of them is 0.
 
     Points where the rate jumps within the step are left out, but most of the (x, t) must remain.
@@ -37,8 +41,18 @@ def derivative_defect(u: Field, rate: Field, *, x: Array, t: Array, h: tuple[flo
 
 
 def energies(
-    u: Field, v: Field, strain: Field, *, length: float, E: float, rho: float, t: Array, g: float = 0.0
+    u: Field,
+    v: Field,
+    strain: Field,
+    *,
+    length: float,
+    E: float,
+    rho: float,
+    t: Array,
+    g: float = 0.0,
 ) -> Array:
     """Kinetic, strain and weight energy at the times t by the midpoint rule on 20000 cells; u = 0 is the zero level."""
     x = (np.arange(20000) + 0.5)[:, np.newaxis] * length / 20000
-    return length * (0.5 * rho * v(x, t) ** 2 + 0.5 * E * strain(x, t) ** 2 + rho * g * u(x, t)).mean(axis=0)
+    return length * (
+        0.5 * rho * v(x, t) ** 2 + 0.5 * E * strain(x, t) ** 2 + rho * g * u(x, t)
+    ).mean(axis=0)

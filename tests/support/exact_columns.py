@@ -77,7 +77,9 @@ class ObliqueImpact:
     @property
     def slip_speed(self) -> float:
         """Return v_b [m/s] >= 0, 0 when the base sticks."""
-        return max(0.0, self.speed_t - self.mu * self.material.c_p / self.material.c_s * self.speed_n)
+        return max(
+            0.0, self.speed_t - self.mu * self.material.c_p / self.material.c_s * self.speed_n
+        )
 
     @property
     def impulses(self) -> tuple[float, float]:
@@ -107,8 +109,12 @@ class ObliqueImpact:
         y, t = np.asarray(y, dtype=float), np.asarray(t, dtype=float)
         c_p, c_s, rho = self.material.c_p, self.material.c_s, self.material.rho
         normal = self.speed_n * reflected(pulse, y / c_p, t, crossing=self.height / c_p)
-        tangential = self.traction / (rho * c_s) * reflected(pulse, y / c_s, t, crossing=self.height / c_s)
-        return np.stack([normal - self.speed_n * rigid(t), self.speed_t * rigid(t) - tangential], axis=-1)
+        tangential = (
+            self.traction / (rho * c_s) * reflected(pulse, y / c_s, t, crossing=self.height / c_s)
+        )
+        return np.stack(
+            [normal - self.speed_n * rigid(t), self.speed_t * rigid(t) - tangential], axis=-1
+        )
 
 
 @dataclass(frozen=True)
@@ -176,7 +182,11 @@ class ShearColumn:
         t = np.asarray(t, dtype=float)
         trip = np.floor(t / (2.0 * self.crossing)).astype(int)
         slips = len(self.slip_speeds)
-        held = self.impedance * (self.speed - 2.0 * slips * self.delta) * np.where((trip - slips) % 2, -1.0, 1.0)
+        held = (
+            self.impedance
+            * (self.speed - 2.0 * slips * self.delta)
+            * np.where((trip - slips) % 2, -1.0, 1.0)
+        )
         return np.where(t < 0.0, 0.0, np.where(trip < slips, self.tau_y, held))
 
     def displacement(self, y: ArrayLike, t: ArrayLike) -> Array:
@@ -196,5 +206,7 @@ class ShearColumn:
         """Return the integral of the traction from 0 to t [Pa s], 0 for t < 0."""
         after = np.maximum(t - self.stick_time, 0.0)
         trip = 2.0 * self.crossing
-        held = self.traction(np.asarray(self.stick_time + 0.5 * trip)) * (trip - np.abs(after % (2.0 * trip) - trip))
+        held = self.traction(np.asarray(self.stick_time + 0.5 * trip)) * (
+            trip - np.abs(after % (2.0 * trip) - trip)
+        )
         return self.tau_y * np.clip(t, 0.0, self.stick_time) + held

@@ -40,7 +40,12 @@ BODIES = {
     "quadrilaterals": {"lengths": (2.0, 1.5), "divisions": (5, 4)},
     "triangles": {"lengths": (2.0, 1.5), "divisions": (5, 4), "simplices": True, "angle": 0.4},
     "hexahedra": {"lengths": (2.0, 1.5, 1.2), "divisions": (3, 2, 3)},
-    "tetrahedra": {"lengths": (2.0, 1.5, 1.2), "divisions": (3, 2, 3), "simplices": True, "angle": 0.4},
+    "tetrahedra": {
+        "lengths": (2.0, 1.5, 1.2),
+        "divisions": (3, 2, 3),
+        "simplices": True,
+        "angle": 0.4,
+    },
 }
 
 
@@ -82,13 +87,19 @@ def dense(comm: Any, system: SemiDiscreteSystem, matrix: Any) -> Array:
     """A matrix of a system as a dense array over its free unknowns in ascending ids, on every rank."""
     mat = as_petsc(matrix).mat
     first, last = mat.getOwnershipRange()
-    rows = np.array([mat.getValues([row], range(mat.getSize()[1]))[0] for row in range(first, last)])
-    parts = comm.allgather((np.asarray(system.space.ids), rows.reshape(last - first, mat.getSize()[1])))
+    rows = np.array(
+        [mat.getValues([row], range(mat.getSize()[1]))[0] for row in range(first, last)]
+    )
+    parts = comm.allgather(
+        (np.asarray(system.space.ids), rows.reshape(last - first, mat.getSize()[1]))
+    )
     order = np.argsort(np.concatenate([ids for ids, _ in parts]))
     return np.vstack([part for _, part in parts])[np.ix_(order, order)]
 
 
-def field(system: SemiDiscreteSystem, u: Array, t: float = 0.0, derivative: int = 0) -> tuple[Array, Array]:
+def field(
+    system: SemiDiscreteSystem, u: Array, t: float = 0.0, derivative: int = 0
+) -> tuple[Array, Array]:
     """(points, values), each (nodes, d), of a Cartesian vector of free unknowns, all nodes in input numbering."""
     space = system.space
     count = int(total(space.comm, len(space.nodes)))
@@ -117,8 +128,14 @@ class Run:
 
 
 def run(
-    problem: ContactProblem, *, dt: float, steps: int, scheme: Scheme | None = None, solver: Solver | None = None,
-    state: State | None = None, nodes: Array | None = None,
+    problem: ContactProblem,
+    *,
+    dt: float,
+    steps: int,
+    scheme: Scheme | None = None,
+    solver: Solver | None = None,
+    state: State | None = None,
+    nodes: Array | None = None,
 ) -> Run:
     """March, keeping Cartesian displacements of nodes (all by default), reactions and contact sets of every step."""
     system = problem.system
@@ -126,18 +143,33 @@ def run(
         nodes = np.arange(len(field(system, system.u0)[0]))
     rows = []
     for new, report in march(
-        problem, scheme=scheme or ZienkiewiczWoodTaylor(), solver=solver or Condensed(), dt=dt, steps=steps, state=state
+        problem,
+        scheme=scheme or ZienkiewiczWoodTaylor(),
+        solver=solver or Condensed(),
+        dt=dt,
+        steps=steps,
+        state=state,
     ):
         u = system.space.sample(problem.cartesian(new.u), nodes, new.t)
         r_n, active = (problem.surface.everywhere(values) for values in (new.r_n, new.active))
         rows.append((u, r_n, active, report.result.iterations, report.certificate.worst))
-    u, r_n, active, iterations, certificate = (np.array(column) for column in zip(*rows, strict=True))
+    u, r_n, active, iterations, certificate = (
+        np.array(column) for column in zip(*rows, strict=True)
+    )
     return Run(u, r_n, active, iterations, certificate, new)
 
 
 def shaken_wall(
-    comm: Any, *, angle: float = 0.0, metre: float = 1.0, divisions: tuple[int, int] = (4, 6), simplices: bool = False,
-    nu: float = 0.2, contacts: Sequence[float] | None = None, springs: float | None = None, gap: float = 0.0,
+    comm: Any,
+    *,
+    angle: float = 0.0,
+    metre: float = 1.0,
+    divisions: tuple[int, int] = (4, 6),
+    simplices: bool = False,
+    nu: float = 0.2,
+    contacts: Sequence[float] | None = None,
+    springs: float | None = None,
+    gap: float = 0.0,
 ) -> ContactProblem:
     """The wall of seed 000, coarser, turned by ``angle`` and written in a length unit of which a metre has ``metre``.
 
@@ -150,29 +182,41 @@ def shaken_wall(
     system = assemble(mesh, material, section=PlaneStress(0.2 * metre), clamped=tags["bottom"])
     foot = turned((lengths[0] + gap * metre, 0.0), angle)
     ground = HalfSpace(point=tuple(foot), normal=tuple(turned((-1.0, 0.0), angle)))
-    points = None if contacts is None else [turned((lengths[0], y * metre), angle) for y in contacts]
+    points = (
+        None if contacts is None else [turned((lengths[0], y * metre), angle) for y in contacts]
+    )
     surface = contact_surface(system, tags["right"], obstacle=ground, points=points)
     if springs is not None:
         surface = surface.on_springs(springs / metre**2)
     shake = Harmonic(3.0 * metre, 14.0, direction=tuple(turned((1.0, 0.0), angle)))
-    return ContactProblem(system, surface, impact=Inelastic(), excitation=shake, mass=ConsistentMass())
+    return ContactProblem(
+        system, surface, impact=Inelastic(), excitation=shake, mass=ConsistentMass()
+    )
 
 
 WALL_DT = 1.0 / (40.0 * 14.0)
 
 
 def thrown_box(
-    comm: Any, *, simplices: bool = False, angle: float = 0.0, divisions: tuple[int, ...] = (3, 2, 3)
+    comm: Any,
+    *,
+    simplices: bool = False,
+    angle: float = 0.0,
+    divisions: tuple[int, ...] = (3, 2, 3),
 ) -> ContactProblem:
     """A soft box in three dimensions, thrown obliquely onto a plane that may be inclined about the z axis."""
     material = LinearElastic(E=1.0e6, nu=0.3, rho=1000.0)
-    mesh, tags = block(comm, lengths=(1.5, 1.0, 1.2), divisions=divisions, simplices=simplices, angle=angle)
+    mesh, tags = block(
+        comm, lengths=(1.5, 1.0, 1.2), divisions=divisions, simplices=simplices, angle=angle
+    )
     down, along = turned((0.0, -1.0), angle), turned((1.0, 0.0), angle)
 
     def throw(x: Array) -> Array:
         return np.column_stack([2.0 * np.outer(1.0 + 0.2 * x[:, 2], down), 0.3 * x[:, :2] @ along])
 
-    system = assemble(mesh, material, loads=BodyForce((*(9.81e3 * down), 0.0)), initial_velocity=throw)
+    system = assemble(
+        mesh, material, loads=BodyForce((*(9.81e3 * down), 0.0)), initial_velocity=throw
+    )
     plane = HalfSpace(point=(*(1e-3 * down), 0.0), normal=(*(-down), 0.0))
     surface = contact_surface(system, tags["bottom"], obstacle=plane)
     return ContactProblem(system, surface, mass=ConsistentMass())
@@ -183,7 +227,9 @@ BOX_DT = 1.0e-3
 
 def held_by(tags: Any, name: str, motion: Callable[[Array], Array], *components: int) -> Prescribed:
     """A displacement constant in time on a named boundary, in all components or in the given ones."""
-    return Prescribed(tags[name], displacement=lambda x, t: motion(x), components=components or None)
+    return Prescribed(
+        tags[name], displacement=lambda x, t: motion(x), components=components or None
+    )
 
 
 def signorini_field(
@@ -224,8 +270,14 @@ class Errors:
 
 
 def field_errors(
-    points: Array, values: Array, divisions: tuple[int, int], exact: Callable[[Array], Array], *,
-    lame: float, shear: float, simplices: bool = False,
+    points: Array,
+    values: Array,
+    divisions: tuple[int, int],
+    exact: Callable[[Array], Array],
+    *,
+    lame: float,
+    shear: float,
+    simplices: bool = False,
 ) -> Errors:
     """Gauss quadrature over an evenly divided rectangle of Q1 or P1 cells, nodes in BlockMesh's order (x fastest).
 
@@ -243,7 +295,8 @@ def field_errors(
         x = low + np.column_stack([i + a, j + b]) * size
         u, u_a, u_b = _interpolated(corners, a, b, simplices)
         e_x, e_y = (
-            (exact(x + h * np.eye(2)[k]) - exact(x - h * np.eye(2)[k])) / (2.0 * h) for k, h in enumerate(1e-6 * size)
+            (exact(x + h * np.eye(2)[k]) - exact(x - h * np.eye(2)[k])) / (2.0 * h)
+            for k, h in enumerate(1e-6 * size)
         )
         d_x, d_y, weight = u_a / size[0] - e_x, u_b / size[1] - e_y, w * size.prod()
         l2 += weight * float(np.sum((u - exact(x)) ** 2))
@@ -263,7 +316,9 @@ def _quadrature(simplices: bool, order: int = 6) -> list[tuple[float, float, flo
     return below + [(b, a, weight) for a, b, weight in below]
 
 
-def _interpolated(corners: list[Array], a: float, b: float, simplices: bool) -> tuple[Array, Array, Array]:
+def _interpolated(
+    corners: list[Array], a: float, b: float, simplices: bool
+) -> tuple[Array, Array, Array]:
     """(u, du/da, du/db) in every cell, from its corners (0,0), (1,0), (0,1), (1,1)."""
     c00, c10, c01, c11 = corners
     if simplices:

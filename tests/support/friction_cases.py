@@ -34,7 +34,9 @@ def rubbing(c: Case, law: Any, slip0: Any, tangents: int = 1) -> Case:
     step = c.step
     places = step.surface.owned[:, None] + np.arange(1, 1 + tangents)
     surface = replace(step.surface, tangents=places)
-    slip0 = np.broadcast_to(np.asarray(slip0, dtype=float), (surface.total, tangents))[surface.slots]
+    slip0 = np.broadcast_to(np.asarray(slip0, dtype=float), (surface.total, tangents))[
+        surface.slots
+    ]
     law = replace(law, **{name: mine(value, surface) for name, value in vars(law).items()})
     return replace(c, step=replace(step, surface=surface, friction=law, slip0=slip0))
 
@@ -44,7 +46,9 @@ def mine(value: Any, surface: Any) -> Any:
     return tuple(np.array(value)[surface.slots]) if isinstance(value, tuple) else value
 
 
-def random_case(law: Any, *, seed: int = 2, parallel: bool = False, length: float = 1.0, **options: Any) -> Case:
+def random_case(
+    law: Any, *, seed: int = 2, parallel: bool = False, length: float = 1.0, **options: Any
+) -> Case:
     """pushed_block with friction, from points that have slid before."""
     before = 0.1 * length * np.random.default_rng(seed).normal(size=(M, 1))
     c = rubbing(pushed_block(seed=seed, parallel=parallel, length=length, **options), law, before)

@@ -57,7 +57,9 @@ class Fuzz:
         files = sorted(self.folder.glob("*.json"))
         return [(f"fixed/{self.folder.name}/{path.name}", read_input(path)) for path in files]
 
-    def each(self, count: int, make: Callable[[random.Random], T], check: Callable[[T], object]) -> None:
+    def each(
+        self, count: int, make: Callable[[random.Random], T], check: Callable[[T], object]
+    ) -> None:
         """Check the fixed inputs and so many new ones. The first that fails is kept, and named in the failure."""
         for label, value in self.fixed():
             with self.keeping(label, value, new=False):
@@ -80,7 +82,9 @@ class Fuzz:
                 error.add_note(f"it was written to {self.folder / label}.json")
             raise
 
-    def property(self, *, examples: int = 100, **strategies: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    def property(
+        self, *, examples: int = 100, **strategies: Any
+    ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
         """Make a property test of hypothesis: arguments by name -> strategy. Skipped where hypothesis is missing.
 
         With seed 0 its examples are those that follow from the test alone (derandomize); else those of the seed. The
@@ -88,11 +92,18 @@ class Fuzz:
         hypothesis = pytest.importorskip("hypothesis")
 
         def made(test: Callable[..., Any]) -> Callable[..., Any]:
-            settings = hypothesis.settings(max_examples=examples, deadline=None, database=None, derandomize=SEED == 0,
-                                           suppress_health_check=list(hypothesis.HealthCheck))
+            settings = hypothesis.settings(
+                max_examples=examples,
+                deadline=None,
+                database=None,
+                derandomize=SEED == 0,
+                suppress_health_check=list(hypothesis.HealthCheck),
+            )
 
             def kept(**values: Any) -> None:
-                with self.keeping(f"seed-{SEED}", values):  # the last one that is tried is the smallest that fails
+                with self.keeping(
+                    f"seed-{SEED}", values
+                ):  # the last one that is tried is the smallest that fails
                     test(**values)
 
             kept.__name__ = test.__name__

@@ -30,7 +30,9 @@ def growing(h: float, length: float, *, growth: float = 1.15) -> Array:
 def even_then_growing(h: float, even: float, length: float, *, growth: float = 1.15) -> Array:
     """Nodes on [0, length]: cells of about h as far as ``even``, then growing."""
     count = round(even / h)
-    return np.append(np.linspace(0.0, even, count + 1), even + growing(h, length - even, growth=growth)[1:])
+    return np.append(
+        np.linspace(0.0, even, count + 1), even + growing(h, length - even, growth=growth)[1:]
+    )
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,14 @@ class Pressed:
 
 
 def pressed_half(
-    comm: Any, x: Array, y: Array, *, material: LinearElastic, obstacle: Obstacle, force: float, simplices: bool = False
+    comm: Any,
+    x: Array,
+    y: Array,
+    *,
+    material: LinearElastic,
+    obstacle: Obstacle,
+    force: float,
+    simplices: bool = False,
 ) -> Pressed:
     """One half (x > 0) of a plane strain body between its obstacle (below) and a uniform pressure on its top.
 
@@ -56,16 +65,23 @@ def pressed_half(
     """
 
     def placed(points: Array) -> Array:
-        axes = [np.interp(points[:, i], np.linspace(0.0, 1.0, len(nodes)), nodes) for i, nodes in enumerate((x, y))]
+        axes = [
+            np.interp(points[:, i], np.linspace(0.0, 1.0, len(nodes)), nodes)
+            for i, nodes in enumerate((x, y))
+        ]
         return np.column_stack(axes)
 
     mesh, tags = block(comm, divisions=(len(x) - 1, len(y) - 1), simplices=simplices, deform=placed)
     system = assemble(
-        mesh, material, prescribed=Prescribed(tags["left"], components=(0,)),
+        mesh,
+        material,
+        prescribed=Prescribed(tags["left"], components=(0,)),
         loads=Traction(tags["top"], (0.0, -0.5 * force / x[-1])),
     )
     surface = contact_surface(system, tags["bottom"], obstacle=obstacle)
     state = static_equilibrium(ContactProblem(system, surface), solver=Condensed())
     every = surface.whole()
     order = np.argsort(every.points[:, 0])
-    return Pressed(every.points[order, 0], every.weights[order], surface.everywhere(state.r_n)[order])
+    return Pressed(
+        every.points[order, 0], every.weights[order], surface.everywhere(state.r_n)[order]
+    )

@@ -40,8 +40,12 @@ def under_point_loads(points: Array, places: Array, forces: Array, *, G: float, 
     rho = np.sqrt(x * x + y * y + z * z)
     deep, along = rho + y, fx * x + fz * z
     both = 1.0 / rho + local / deep
-    outward = along * (1.0 / rho**3 - local / (rho * deep**2)) + fy * (y / rho**3 - local / (rho * deep))
-    down = along * (y / rho**3 + local / (rho * deep)) + fy * (y * y / rho**3 + 2.0 * (1.0 - nu) / rho)
+    outward = along * (1.0 / rho**3 - local / (rho * deep**2)) + fy * (
+        y / rho**3 - local / (rho * deep)
+    )
+    down = along * (y / rho**3 + local / (rho * deep)) + fy * (
+        y * y / rho**3 + 2.0 * (1.0 - nu) / rho
+    )
     u = [fx * both + x * outward, down, fz * both + z * outward]
     return np.column_stack([one.sum(axis=1) for one in u]) / (4.0 * np.pi * G)
 
@@ -51,7 +55,9 @@ def under_hertz(points: Array, a: float, force: Array, *, G: float, nu: float) -
     theta, weight = gauss(0.0, 0.5 * np.pi, order=8)
     angle = 2.0 * np.pi * np.arange(16) / 16
     share = np.repeat(3.0 * np.cos(theta) ** 2 * np.sin(theta) * weight, 16) / 16
-    places = a * np.column_stack([np.outer(np.sin(theta), f(angle)).reshape(-1) for f in (np.cos, np.sin)])
+    places = a * np.column_stack(
+        [np.outer(np.sin(theta), f(angle)).reshape(-1) for f in (np.cos, np.sin)]
+    )
     return under_point_loads(points, places, np.outer(share, force), G=G, nu=nu)
 
 
@@ -137,7 +143,9 @@ class Lubkin:
 
     def density(self, t: Array, c: float) -> Array:
         """φ(t)."""
-        return np.asarray(4.0 * self.twist(c) / np.pi * t * _gap(np.maximum(t, c), self.a) / _gap(c, self.a))
+        return np.asarray(
+            4.0 * self.twist(c) / np.pi * t * _gap(np.maximum(t, c), self.a) / _gap(c, self.a)
+        )
 
     def over(self, function: Callable[[Array], Array], c: float) -> Array:
         """∫_0^a φ(t) function(t) dt; the last axis of what the function returns is t's."""
@@ -151,8 +159,14 @@ class Lubkin:
     def traction(self, r: Array, c: float) -> Array:
         """τ [Pa] at each radius: -(G/r) ∫_r^a φ'(t) t/√(t² - r²) dt, for φ(a) = 0 and φ' = (2 μ p0/π G) (K - 2 E)
         beyond c."""
-        return np.array([self._stress(one, c) if one < c else self.limit * np.sqrt(max(1.0 - (one / self.a) ** 2, 0.0))
-                         for one in np.asarray(r, dtype=float)])
+        return np.array(
+            [
+                self._stress(one, c)
+                if one < c
+                else self.limit * np.sqrt(max(1.0 - (one / self.a) ** 2, 0.0))
+                for one in np.asarray(r, dtype=float)
+            ]
+        )
 
     def _stress(self, r: float, c: float) -> float:
         t, w = gauss(0.0, 1.0)
@@ -180,7 +194,7 @@ def turned(points: Array, twist: float) -> Array:
 def _disks(points: Array, t: Array) -> Array:
     """v (k, n) about the axis of φ that is a unit pulse at each t:
 
-        ∫ exp(-s y) J1(s r) sin(s t) ds = -Im[ζ/√(ζ² + r²)]/r,   ζ = y - i t
+    ∫ exp(-s y) J1(s r) sin(s t) ds = -Im[ζ/√(ζ² + r²)]/r,   ζ = y - i t
     """
     r, zeta = np.hypot(points[:, 0], points[:, 2])[:, None], points[:, 1, None] - 1j * t
     inside = np.maximum(r, 1e-9 * t.max())

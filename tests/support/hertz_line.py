@@ -46,7 +46,9 @@ class HertzLine:
 
     def pressure(self, x: ArrayLike) -> Array:
         """Return p(x) [Pa] at the distance x from the centre line, 0 outside the contact."""
-        return self.peak * np.sqrt(np.maximum(1.0 - (np.asarray(x, dtype=float) / self.half_width) ** 2, 0.0))
+        return self.peak * np.sqrt(
+            np.maximum(1.0 - (np.asarray(x, dtype=float) / self.half_width) ** 2, 0.0)
+        )
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Kills a run of several ranks at random instants, restarts it, and compares the end with the straight run.
 
-    python3 tests/support/kill_nine.py [KILLS] [RANKS]      # 20 on 3 ranks; needs mpirun
+python3 tests/support/kill_nine.py [KILLS] [RANKS]      # 20 on 3 ranks; needs mpirun
 """
 
 from __future__ import annotations
@@ -34,10 +34,14 @@ def started(folder: Path, steps: int, ranks: int) -> subprocess.Popen[bytes]:
     """The run under mpirun, from its checkpoint where there is one; in an environment without what MPI put there."""
     mpi = ("OMPI_COMM", "OMPI_UNIVERSE", "PMIX_", "PMI_", "OMPI_MCA_ess", "OMPI_MCA_orte")
     environment = {name: value for name, value in os.environ.items() if not name.startswith(mpi)}
-    environment["PYTHONPATH"] = os.pathsep.join([str(TESTS.parents[1]), environment.get("PYTHONPATH", "")])
+    environment["PYTHONPATH"] = os.pathsep.join(
+        [str(TESTS.parents[1]), environment.get("PYTHONPATH", "")]
+    )
     code = CODE.format(tests=str(TESTS), folder=str(folder), steps=steps)
     command = ["mpirun", "-n", str(ranks), sys.executable, "-c", code]
-    return subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    return subprocess.Popen(
+        command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
 
 
 def ranks_of(launcher: int) -> list[int]:
@@ -79,7 +83,8 @@ def check(folder: Path, kills: int, ranks: int, seed: int = 0) -> tuple[int, flo
     assert started(folder / "killed", steps, ranks).wait(PATIENCE) == 0
     run_wall(MPI.COMM_SELF, folder / "straight", steps)
     one, other = (
-        np.genfromtxt(folder / name / "history.csv", delimiter=",", names=True) for name in ("killed", "straight")
+        np.genfromtxt(folder / name / "history.csv", delimiter=",", names=True)
+        for name in ("killed", "straight")
     )
     assert one["k"].tolist() == other["k"].tolist() == list(range(steps + 1))
     worst = 0.0
@@ -96,4 +101,6 @@ if __name__ == "__main__":
     sys.path.insert(0, str(TESTS.parents[1]))
     with tempfile.TemporaryDirectory() as scratch:
         done, difference = check(Path(scratch), *numbers)
-    print(f"{numbers[0]} kills of a run on {numbers[1]} ranks: {done} steps, histories within {difference:.1e}")
+    print(
+        f"{numbers[0]} kills of a run on {numbers[1]} ranks: {done} steps, histories within {difference:.1e}"
+    )

@@ -33,11 +33,16 @@ class LaplaceKernels:
 
     def __post_init__(self) -> None:
         check_speeds(self)
-        if isinstance(self.s, bool) or not isinstance(self.s, Number) or not np.isfinite(complex(self.s)) or (
-            not complex(self.s).real > 0.0
+        if (
+            isinstance(self.s, bool)
+            or not isinstance(self.s, Number)
+            or not np.isfinite(complex(self.s))
+            or (not complex(self.s).real > 0.0)
         ):
-            raise InputError(f"LaplaceKernels: the frequency s is {shown(self.s)}; give a complex number with a "
-                             "positive real part [1/s]")
+            raise InputError(
+                f"LaplaceKernels: the frequency s is {shown(self.s)}; give a complex number with a "
+                "positive real part [1/s]"
+            )
 
     def __call__(self, r: Array) -> KernelSet:
         """Evaluate the seven functions that all three operators share."""

@@ -28,17 +28,26 @@ NEWMARK = LinearMultistep.newmark(beta=0.3025, gamma=0.6)
 def chain(**more: Any) -> ContactProblem:
     """The shaken, damped chain between two walls."""
     settings: dict[str, Any] = {
-        "gap": 1e-3, "left_gap": 2e-3, "excitation": Harmonic(3.0, 2.0, direction=(1.0,)),
-        "impact": Inelastic(), "consistent": True, "damping": 1e-4,
+        "gap": 1e-3,
+        "left_gap": 2e-3,
+        "excitation": Harmonic(3.0, 2.0, direction=(1.0,)),
+        "impact": Inelastic(),
+        "consistent": True,
+        "damping": 1e-4,
     }
     return chain_problem(5, **(settings | more))
 
 
-def run(out: Path | None, steps: int = 250, *, problem: ContactProblem | None = None, **more: Any) -> Solution:
+def run(
+    out: Path | None, steps: int = 250, *, problem: ContactProblem | None = None, **more: Any
+) -> Solution:
     """A run of the chain with all recorders."""
     settings: dict[str, Any] = {
-        "scheme": ZienkiewiczWoodTaylor(), "solver": Condensed(), "dt": 5e-3,
-        "record": [Energy(), Contact(), Probe({12: (5.0,)}, velocity=True, acceleration=True)], "checkpoint_every": 50,
+        "scheme": ZienkiewiczWoodTaylor(),
+        "solver": Condensed(),
+        "dt": 5e-3,
+        "record": [Energy(), Contact(), Probe({12: (5.0,)}, velocity=True, acceleration=True)],
+        "checkpoint_every": 50,
     }
     return simulate(problem or chain(), steps=steps, out=out, **(settings | more))
 
@@ -51,7 +60,10 @@ def difference(one: State, other: State) -> float:
     if one.r_t is not None and other.r_t is not None:
         pairs.append((one.r_t, other.r_t))
     pairs += [(one.memory[name], other.memory[name]) for name in other.memory]
-    return max(float(np.max(np.abs(a - b), initial=0.0)) / (np.max(np.abs(b), initial=0.0) or 1.0) for a, b in pairs)
+    return max(
+        float(np.max(np.abs(a - b), initial=0.0)) / (np.max(np.abs(b), initial=0.0) or 1.0)
+        for a, b in pairs
+    )
 
 
 def round_off(comm: Any) -> float:
@@ -65,7 +77,9 @@ def equal_files(one: Path, other: Path) -> bool:
         return False
     with h5py.File(one / "history.h5") as a, h5py.File(other / "history.h5") as b:
         return set(a) == set(b) and all(
-            np.array_equal(a[name][()], b[name][()], equal_nan=name != "active") for name in a if name != "contact"
+            np.array_equal(a[name][()], b[name][()], equal_nan=name != "active")
+            for name in a
+            if name != "contact"
         )
 
 
@@ -81,7 +95,12 @@ def run_wall(
 ) -> Solution:
     """The wall with all recorders."""
     record = [Energy(), Contact(), Probe({7: (5.0, 4.0)}, velocity=True)]
-    settings: dict[str, Any] = {"scheme": NEWMARK, "solver": Condensed(), "dt": 1.0 / 560.0, "record": record}
+    settings: dict[str, Any] = {
+        "scheme": NEWMARK,
+        "solver": Condensed(),
+        "dt": 1.0 / 560.0,
+        "record": record,
+    }
     return simulate(problem or wall(comm), steps=steps, out=out, **(settings | more))
 
 

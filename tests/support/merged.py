@@ -19,11 +19,15 @@ class Merged:
         arrays = arrays_of(self.source)
         target = np.arange(len(arrays.points))
         for node in np.flatnonzero(self.where(arrays.points.T)):
-            alike = np.flatnonzero(np.linalg.norm(arrays.points - arrays.points[node], axis=1) < 1e-9)
+            alike = np.flatnonzero(
+                np.linalg.norm(arrays.points - arrays.points[node], axis=1) < 1e-9
+            )
             target[node] = alike[0]
         kept, number = np.unique(target, return_inverse=True)
         groups = {name: number[rows] for name, rows in arrays.facet_groups.items()}
-        return MeshArrays(arrays.cell, arrays.points[kept], number[arrays.cells], arrays.cell_groups, groups)
+        return MeshArrays(
+            arrays.cell, arrays.points[kept], number[arrays.cells], arrays.cell_groups, groups
+        )
 
     def build(self, gmsh: Any) -> None:
         add_arrays(gmsh, self.arrays())

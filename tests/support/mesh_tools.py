@@ -17,7 +17,9 @@ NAMES = [(2, 1, "body"), (1, 2, "base")]
 
 def integral(mesh, density, measure):
     one = dolfinx.fem.Constant(mesh, 1.0)  # keeps the mesh in the form when the density is a number
-    return mesh.comm.allreduce(dolfinx.fem.assemble_scalar(compat.compile_form(one * density * measure)))
+    return mesh.comm.allreduce(
+        dolfinx.fem.assemble_scalar(compat.compile_form(one * density * measure))
+    )
 
 
 def size(group):
@@ -64,5 +66,10 @@ def msh(nodes, elements, names=()):
         f"{number} {kind} 2 {physical} {entity} {' '.join(map(str, vertices))}"
         for number, (kind, physical, entity, vertices) in enumerate(elements, start=1)
     ]
-    lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", *(section("PhysicalNames", named) if named else [])]
+    lines = [
+        "$MeshFormat",
+        "2.2 0 8",
+        "$EndMeshFormat",
+        *(section("PhysicalNames", named) if named else []),
+    ]
     return "\n".join([*lines, *section("Nodes", placed), *section("Elements", linked), ""])

@@ -57,13 +57,19 @@ class SlidingBlock:
             u[n + 1], v[n + 1] = self._interval(u[n], v[n], a[n], a[n + 1], t[n + 1] - t[n])
         return u, v
 
-    def _interval(self, u: float, v: float, a: float, a_end: float, length: float) -> tuple[float, float]:
+    def _interval(
+        self, u: float, v: float, a: float, a_end: float, length: float
+    ) -> tuple[float, float]:
         """Return (u, u') after an interval [s] in which the acceleration goes linearly from a to a_end."""
         slope = (a_end - a) / length if length > 0.0 else 0.0
         while length > 0.0:
             sign = math.copysign(1.0, v) if v else self._onset(a, slope)
             if sign == 0.0:  # sticks until |a| reaches mu g, if it does
-                wait = (math.copysign(self.onset_acceleration, slope) - a) / slope if slope else math.inf
+                wait = (
+                    (math.copysign(self.onset_acceleration, slope) - a) / slope
+                    if slope
+                    else math.inf
+                )
                 if wait >= length:
                     break
                 a, length = math.copysign(self.onset_acceleration, slope), length - wait
@@ -78,5 +84,7 @@ class SlidingBlock:
     def _onset(self, a: float, slope: float) -> float:
         """Return the direction in which a block at rest starts to slide: 1, -1, or 0 if it sticks."""
         side = math.copysign(1.0, a)  # of ±0 too, for a block without friction
-        slides = abs(a) > self.onset_acceleration or (abs(a) == self.onset_acceleration and side * slope > 0.0)
+        slides = abs(a) > self.onset_acceleration or (
+            abs(a) == self.onset_acceleration and side * slope > 0.0
+        )
         return -side if slides else 0.0

@@ -23,7 +23,11 @@ def space(on: Any, element: tuple[str, int], width: int = 1) -> Any:
     """A space of values at points, with so many components."""
     if compat.VERSION >= (0, 7):
         return fem.functionspace(on, element if width == 1 else (*element, (width,)))
-    return fem.FunctionSpace(on, element) if width == 1 else fem.VectorFunctionSpace(on, element, dim=width)
+    return (
+        fem.FunctionSpace(on, element)
+        if width == 1
+        else fem.VectorFunctionSpace(on, element, dim=width)
+    )
 
 
 def square(comm: Any, n: int, cell: str = "triangle") -> Any:
@@ -34,7 +38,9 @@ def square(comm: Any, n: int, cell: str = "triangle") -> Any:
 def clamped(V: Any, value: Any = None) -> Any:
     """A Dirichlet condition on the whole boundary: that of a Function, or zero."""
     on = V.mesh
-    facets = mesh.locate_entities_boundary(on, on.topology.dim - 1, lambda x: np.full(x.shape[1], True))
+    facets = mesh.locate_entities_boundary(
+        on, on.topology.dim - 1, lambda x: np.full(x.shape[1], True)
+    )
     g = fem.Function(V) if value is None else value
     return fem.dirichletbc(g, fem.locate_dofs_topological(V, on.topology.dim - 1, facets))
 
@@ -49,7 +55,11 @@ class Known:
 
     def __init__(self, V: Any, N: Form, *, tiny: float = 1.0, force: float = 1.0) -> None:
         self.V, on, width = V, V.mesh, V.dofmap.index_map_bs
-        each = (lambda f: f) if width == 1 else (lambda f: lambda x: np.vstack([f(x) * (c + 1) for c in range(width)]))
+        each = (
+            (lambda f: f)
+            if width == 1
+            else (lambda f: lambda x: np.vstack([f(x) * (c + 1) for c in range(width)]))
+        )
         self.exact, self.lower, self.upper, self.u = (fem.Function(V) for _ in range(4))
         self.exact.interpolate(each(lambda x: tiny * wavy(x)))
         constant = space(on, ("DG", 0))
@@ -66,7 +76,10 @@ class Known:
         scale = fem.Constant(on, force / tiny)
         self.F = scale * (N(self.u, v) - N(self.exact, v)) + force * (low - high) * both * ufl.dx
         w = ufl.TrialFunction(V)
-        self.linear = scale * N(w, v), scale * N(self.exact, v) - force * (low - high) * both * ufl.dx
+        self.linear = (
+            scale * N(w, v),
+            scale * N(self.exact, v) - force * (low - high) * both * ufl.dx,
+        )
         self.bc = clamped(V, self.exact)
         inner = np.ones(len(self.u.x.array), dtype=bool)
         inner[compat.bc_values(self.bc, len(inner))[0]] = False
@@ -80,12 +93,17 @@ class Known:
     def check(self, result: Any, *, error: float, weak: float = 0.0) -> None:
         """The answer, the active sets and the multipliers are the known ones; ``weak``: pushes that may be missed."""
         n, size = len(self.push[0]), float(np.max(np.abs(self.exact.x.array)))
-        largest = self.V.mesh.comm.allreduce(max(np.max(one, initial=0.0) for one in self.push), op=_max())
+        largest = self.V.mesh.comm.allreduce(
+            max(np.max(one, initial=0.0) for one in self.push), op=_max()
+        )
         assert np.max(np.abs(result.u.x.array - self.exact.x.array)) <= error * size
         for push, force in zip(self.push, (result.lambda_lower, result.lambda_upper), strict=True):
             assert np.max(np.abs(force.x.array[:n] - push), initial=0.0) <= error * largest
             assert np.array_equal(force.x.array[:n] > 0.0, push > weak * largest)
-        counts = tuple(self.V.mesh.comm.allreduce(int(np.count_nonzero(push > weak * largest))) for push in self.push)
+        counts = tuple(
+            self.V.mesh.comm.allreduce(int(np.count_nonzero(push > weak * largest)))
+            for push in self.push
+        )
         assert result.active == counts and min(counts) > 0
         assert result.certificate.worst <= 1e-9
 

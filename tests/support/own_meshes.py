@@ -39,5 +39,7 @@ def tags_where(mesh: Any, dim: int, **values: Any) -> Any:
     mesh.topology.create_connectivity(dim, mesh.topology.dim)
     found = [dolfinx.mesh.locate_entities(mesh, dim, marker) for marker in values.values()]
     numbers, first = np.unique(np.concatenate(found), return_index=True)
-    tags = np.concatenate([np.full(len(one), 7 + k, dtype=np.int32) for k, one in enumerate(found)])[first]
+    tags = np.concatenate(
+        [np.full(len(one), 7 + k, dtype=np.int32) for k, one in enumerate(found)]
+    )[first]
     return meshtags(mesh, dim, numbers.astype(np.int32), tags)

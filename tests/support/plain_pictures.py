@@ -33,7 +33,8 @@ def plain_pictures() -> Iterator[None]:
 
     with ExitStack() as stack:
         for owner, name, new in (
-            (Figure, "get_layout_engine", lambda figure: None), (Figure, "savefig", saved),
+            (Figure, "get_layout_engine", lambda figure: None),
+            (Figure, "savefig", saved),
             (Figure, "align_ylabels", lambda figure, axes=None: None),
             (Axes, "_update_title_position", lambda axes, renderer: None),
             (Axis, "_update_label_position", lambda axis, renderer: None),

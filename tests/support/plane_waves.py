@@ -18,7 +18,9 @@ TURNED = np.array([-DIRECTION[1], DIRECTION[0]])
 def stress_vector(gradient: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """sigma n from du_i/dx_j (m, 2, 2)."""
     trace = np.trace(gradient, axis1=1, axis2=2)[:, None, None] * np.eye(2)
-    stress = MATERIAL.lame_lambda * trace + MATERIAL.shear_modulus * (gradient + gradient.swapaxes(1, 2))
+    stress = MATERIAL.lame_lambda * trace + MATERIAL.shear_modulus * (
+        gradient + gradient.swapaxes(1, 2)
+    )
     return np.einsum("mij,mj->mi", stress, normals)
 
 
@@ -47,7 +49,9 @@ class Wave:
 
     def traction(self, x: np.ndarray, normals: np.ndarray, t: float) -> np.ndarray:
         rate = -self.df(self.phase(x, t)) / self.speed
-        return stress_vector(np.multiply.outer(rate, np.multiply.outer(self.polarisation, DIRECTION)), normals)
+        return stress_vector(
+            np.multiply.outer(rate, np.multiply.outer(self.polarisation, DIRECTION)), normals
+        )
 
 
 def exponential(s: complex, *, shear: bool = False) -> Wave:
@@ -57,11 +61,13 @@ def exponential(s: complex, *, shear: bool = False) -> Wave:
 
 def pulse(*, shear: bool = False, duration: float = 2.0) -> Wave:
     """sin² of the given duration that reaches the unit square at t = 0."""
+
     def inside(q: np.ndarray) -> np.ndarray:
         return (q > 0.0) & (q < duration)
 
     return Wave(
         lambda q: np.where(inside(q), np.sin(np.pi * q / duration) ** 2, 0.0),
         lambda q: np.where(inside(q), np.pi / duration * np.sin(2.0 * np.pi * q / duration), 0.0),
-        shear, 0.5 * np.abs(DIRECTION).sum() / (0.5 if shear else 1.0),
+        shear,
+        0.5 * np.abs(DIRECTION).sum() / (0.5 if shear else 1.0),
     )

@@ -43,7 +43,11 @@ class PointOnSlope:
     def time(self, tau: float) -> float:
         """When the velocity has turned to tau [s]."""
         k = self.k
-        return self.speed / (2.0 * self.pull) * (self._between(k - 1.0, tau) + self._between(k + 1.0, tau))
+        return (
+            self.speed
+            / (2.0 * self.pull)
+            * (self._between(k - 1.0, tau) + self._between(k + 1.0, tau))
+        )
 
     @property
     def rest_time(self) -> float:

@@ -35,23 +35,33 @@ class RadialTable(Galerkin):
     `assemble(LaplaceKernels(s, c_p, c_s))` as before, with all three operators. Memory: 10 kB per pair of elements.
     """
 
-    def __init__(self, mesh: BoundaryMesh, c_s: float, width: float, orders: Orders = Orders()) -> None:
+    def __init__(
+        self, mesh: BoundaryMesh, c_s: float, width: float, orders: Orders = Orders()
+    ) -> None:
         super().__init__(mesh, c_s, orders)
         number("RadialTable", "the width of its panels", width, positive=True, unit="m")
         far = float(self.pairs.r_max.max())
         counted("RadialTable", "the width of its panels", far / width, "panels", most=PANELS)
-        dyadic = width * 0.5 ** np.arange(np.ceil(np.log2(width / (INNERMOST * mesh.lengths.min()))), 0.0, -1.0)
-        self.edges: Array = np.concatenate([dyadic, width * np.arange(1.0, np.ceil(far / width * (1.0 + 1e-9)) + 1.0)])
+        dyadic = width * 0.5 ** np.arange(
+            np.ceil(np.log2(width / (INNERMOST * mesh.lengths.min()))), 0.0, -1.0
+        )
+        self.edges: Array = np.concatenate(
+            [dyadic, width * np.arange(1.0, np.ceil(far / width * (1.0 + 1e-9)) + 1.0)]
+        )
         reference = np.cos(np.pi * (np.arange(POINTS) + 0.5) / POINTS)
         self._to_coefficients = np.linalg.inv(chebvander(reference, POINTS - 1))
-        self.nodes: Array = (self.edges[:-1, None] + np.diff(self.edges)[:, None] * 0.5 * (1.0 + reference)).ravel()
+        self.nodes: Array = (
+            self.edges[:-1, None] + np.diff(self.edges)[:, None] * 0.5 * (1.0 + reference)
+        ).ravel()
         self._matrices, self._pole = self._integrated()
 
     def interpolation(self, r: Array) -> csr_matrix:
         """Return (m, nodes) matrix that takes values at the nodes to values at distances r (m,)."""
         panel = np.clip(np.searchsorted(self.edges, r) - 1, 0, len(self.edges) - 2)
         low, high = self.edges[panel], self.edges[panel + 1]
-        weights = chebvander((2.0 * r - low - high) / (high - low), POINTS - 1) @ self._to_coefficients
+        weights = (
+            chebvander((2.0 * r - low - high) / (high - low), POINTS - 1) @ self._to_coefficients
+        )
         columns = panel[:, None] * POINTS + np.arange(POINTS)
         rows = np.arange(0, weights.size + 1, POINTS)
         return csr_matrix((weights.ravel(), columns.ravel(), rows), shape=(len(r), len(self.nodes)))
@@ -71,7 +81,9 @@ class RadialTable(Galerkin):
             order.append((4 * points.pairs[:, None] + np.arange(4)).ravel())
         back = np.argsort(np.concatenate(order))
         jacobian = np.repeat(np.hypot(*self.pairs.a) * np.hypot(*self.pairs.b), 4)
-        matrices = [vstack(block).tocsr()[back].multiply(jacobian[:, None]).tocsr() for block in blocks]
+        matrices = [
+            vstack(block).tocsr()[back].multiply(jacobian[:, None]).tocsr() for block in blocks
+        ]
         return matrices, np.concatenate(poles, axis=1)[:, back] * jacobian
 
     def _moments(self, kernels: Callable, fronts: Sequence[float]) -> NDArray:
@@ -81,11 +93,27 @@ class RadialTable(Galerkin):
         one, xx, xy, yy, d_x, d_y = self._matrices
         smooth = dphi + 1.0 / (TWO_PI * self.nodes**2)
         phi, inertia_p, inertia_s, isotropic = _product(one, [phi, inertia_p, inertia_s, g1])
-        tensor = [isotropic - _product(xx, [g2])[0], -_product(xy, [g2])[0], isotropic - _product(yy, [g2])[0]]
+        tensor = [
+            isotropic - _product(xx, [g2])[0],
+            -_product(xy, [g2])[0],
+            isotropic - _product(yy, [g2])[0],
+        ]
         along = [_product(d, [smooth, ddiff]) for d in (d_x, d_y)]
         normal = [along[0][0] + self._pole[0], along[1][0] + self._pole[1]]
         gradient = [along[0][1], along[1][1]]
-        rows = [*tensor, *normal, *gradient, phi, *tensor, inertia_p, inertia_s, phi, *tensor, *normal, *gradient]
+        rows = [
+            *tensor,
+            *normal,
+            *gradient,
+            phi,
+            *tensor,
+            inertia_p,
+            inertia_s,
+            phi,
+            *tensor,
+            *normal,
+            *gradient,
+        ]
         return np.stack(rows).reshape(len(rows), -1, 2, 2)
 
 

@@ -21,7 +21,9 @@ def rayleigh_speed(material: LinearElastic) -> float:
     return material.c_s * math.sqrt(brentq(equation, 1e-3, 1.0, xtol=1e-15))
 
 
-def rayleigh_motion(material: LinearElastic, depth: Array, wavelength: float) -> tuple[Array, Array]:
+def rayleigh_motion(
+    material: LinearElastic, depth: Array, wavelength: float
+) -> tuple[Array, Array]:
     """Return (U, V) at depths >= 0 [m]: u_x = U cos k(x - c t), u_y = V sin k(x - c t), y upwards; U(0) = 1.
 
     With q, s = k sqrt(1 - c²/c_P²), k sqrt(1 - c²/c_S²): U ~ exp(-q z) - (1 + s²/k²)/2 exp(-s z) and

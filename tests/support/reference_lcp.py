@@ -134,10 +134,21 @@ def out_of_reach(rng: np.random.Generator, m: int) -> LCP:
 def mixed(rng: np.random.Generator, m: int) -> LCP:
     problem = degenerate(rng, m)
     bilateral = rng.random(m) < 0.3
-    return LCP(problem.G, np.where(~bilateral & (rng.random(m) < 0.2), np.inf, problem.q), bilateral)
+    return LCP(
+        problem.G, np.where(~bilateral & (rng.random(m) < 0.2), np.inf, problem.q), bilateral
+    )
 
 
-KINDS = (generic, degenerate, all_active, none_active, ill_scaled, with_bilateral, out_of_reach, mixed)
+KINDS = (
+    generic,
+    degenerate,
+    all_active,
+    none_active,
+    ill_scaled,
+    with_bilateral,
+    out_of_reach,
+    mixed,
+)
 
 
 def problems(kind_index: int, count: int = 25) -> list[LCP]:
@@ -153,7 +164,11 @@ def solutions(G: Array, q: Array) -> list[Array]:
         a, r = np.array(bits), np.zeros(m)
         if abs(np.linalg.det(G[np.ix_(a, a)])) > 1e-12:
             r[a] = np.linalg.solve(G[np.ix_(a, a)], -q[a])
-            if r.min() >= -1e-12 and (q + G @ r).min() >= -1e-12 and not any(np.allclose(r, one) for one in found):
+            if (
+                r.min() >= -1e-12
+                and (q + G @ r).min() >= -1e-12
+                and not any(np.allclose(r, one) for one in found)
+            ):
                 found.append(r)
     return found
 

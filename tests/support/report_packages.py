@@ -11,8 +11,15 @@ import pytest
 from vi_contact.plots.web_page import can_write
 
 CHROMIUM_FLAGS = (
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-dev-shm-usage",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
 )
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -22,12 +29,19 @@ def report_packages() -> None:
     for folder in (ROOT / ".venv" / "report").glob("lib/python3*/site-packages"):
         site.addsitedir(str(folder))
     if not can_write():
-        pytest.skip("jinja2 and plotly are missing: bash install/report.sh brings them", allow_module_level=True)
+        pytest.skip(
+            "jinja2 and plotly are missing: bash install/report.sh brings them",
+            allow_module_level=True,
+        )
 
 
 def browser() -> str:
     """Return the command of a headless browser; skip the module that calls this where there is none."""
-    found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    found = next(
+        filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+    )
     if found is None:
-        pytest.skip("no Chromium here: bash install/report.sh --browser brings it", allow_module_level=True)
+        pytest.skip(
+            "no Chromium here: bash install/report.sh --browser brings it", allow_module_level=True
+        )
     return found

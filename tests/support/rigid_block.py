@@ -88,7 +88,9 @@ class RigidBlock:
                 B, push = self.B[list(chosen)], np.zeros(4)
                 push[list(chosen)] = np.linalg.solve(B / self.mass @ B.T, -B @ x)
                 found = x + self.B.T @ push / self.mass
-                if push.min() >= 0.0 and np.all(self.B[closed] @ found >= -ROUNDED * np.abs(self.B @ x).max()):
+                if push.min() >= 0.0 and np.all(
+                    self.B[closed] @ found >= -ROUNDED * np.abs(self.B @ x).max()
+                ):
                     return found, push
         raise AssertionError("no admissible velocity")
 
@@ -139,7 +141,9 @@ class RigidBlock:
     def motion(self, phases: list[Phase], t: Array) -> tuple[Array, Array]:
         """q and v (k, 3) at times within the phases."""
         rows = np.searchsorted([one.start for one in phases], t, side="right") - 1
-        found = [self.moved(one.q, one.v, one.pivots, s - one.start) for s, one in
-                 zip(t, (phases[row] for row in rows), strict=True)]
+        found = [
+            self.moved(one.q, one.v, one.pivots, s - one.start)
+            for s, one in zip(t, (phases[row] for row in rows), strict=True)
+        ]
         q, v = (np.array(column) for column in zip(*found, strict=True))
         return q, v

@@ -47,7 +47,9 @@ class RigidWall:
     def __post_init__(self) -> None:
         attributes(self, positive=("height", "rho"), not_negative=("nu", "flexibility"))
         if self.nu >= 0.5:
-            raise InputError(f"RigidWall: nu is {self.nu!r}; give a Poisson's ratio from 0 to below 0.5")
+            raise InputError(
+                f"RigidWall: nu is {self.nu!r}; give a Poisson's ratio from 0 to below 0.5"
+            )
 
     @property
     def kappa(self) -> float:
@@ -73,4 +75,9 @@ class RigidWall:
 
     def moment(self, acceleration: float) -> float:
         """Return M [N] about the foot of the wall; M/Q is the height of the thrust, 0.5986 H if it cannot turn."""
-        return self._unit(acceleration) * self.height**2 * MOMENT / (1.0 + THRUST * self.kappa * self.flexibility)
+        return (
+            self._unit(acceleration)
+            * self.height**2
+            * MOMENT
+            / (1.0 + THRUST * self.kappa * self.flexibility)
+        )

@@ -11,7 +11,9 @@ from vi_contact.core.protocols import FrictionLaw
 from vi_contact.laws.mass import ConsistentMass
 
 
-def rubbing_block(friction: FrictionLaw, *, gap: float = 0.05, damping: float = 0.0) -> ContactProblem:
+def rubbing_block(
+    friction: FrictionLaw, *, gap: float = 0.05, damping: float = 0.0
+) -> ContactProblem:
     """4 x 3 elements on a clamped base, thrown to the right and upwards; the right side meets a wall."""
     body = block(4, 3)
     points = np.column_stack([np.tile(np.arange(5.0), 3), np.repeat(np.arange(1.0, 4.0), 5)])

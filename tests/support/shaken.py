@@ -17,7 +17,13 @@ SHAKE = Harmonic(-30.0, 3.0, phase=0.3, direction=(1.0,))
 
 def shaken(impact: Any = None, **system: Any) -> ContactProblem:
     """Six masses that hit the wall many times in 200 steps of 5 ms."""
-    settings = {"gap": 0.01, "stiffness": 2e4, "consistent": True, "damping": 1e-4, "excitation": SHAKE}
+    settings = {
+        "gap": 0.01,
+        "stiffness": 2e4,
+        "consistent": True,
+        "damping": 1e-4,
+        "excitation": SHAKE,
+    }
     return chain_problem(6, impact=impact, **(settings | system))
 
 

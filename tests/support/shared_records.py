@@ -5,8 +5,12 @@ from pathlib import Path
 
 import pytest
 
-SHARED = Path(os.environ.get("VI_CONTACT_GROUND_MOTIONS",
-                             Path(__file__).resolve().parents[3] / "shared" / "ground_motions"))
+SHARED = Path(
+    os.environ.get(
+        "VI_CONTACT_GROUND_MOTIONS",
+        Path(__file__).resolve().parents[3] / "shared" / "ground_motions",
+    )
+)
 EL_CENTRO, LOMA = "elcentro_1940_ns_peknold.at2", "lomaprieta_1989_sf_1295shafter_0111"
 
 

@@ -16,7 +16,11 @@ FENCE = re.compile(r"^ *```(\S*)[^\n]*\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)
 
 def blocks(page: str, language: str) -> list[str]:
     """The fenced blocks of a language."""
-    return [body for name, body in FENCE.findall((ROOT / page).read_text(encoding="utf-8")) if name == language]
+    return [
+        body
+        for name, body in FENCE.findall((ROOT / page).read_text(encoding="utf-8"))
+        if name == language
+    ]
 
 
 @cache

@@ -46,7 +46,12 @@ class SoilLayer:
     def on_elastic_base(self, f: ArrayLike, rock: LinearElastic) -> Array:
         """Return |u_surface / u_outcrop| = |1/(cos k*H + i a sin k*H)|, a = rho c_S*/(rho_rock c_S_rock)."""
         phase = self._phase(f)
-        a = self.material.rho * self.material.c_s * np.sqrt(1.0 + 2j * self.xi) / (rock.rho * rock.c_s)
+        a = (
+            self.material.rho
+            * self.material.c_s
+            * np.sqrt(1.0 + 2j * self.xi)
+            / (rock.rho * rock.c_s)
+        )
         return np.asarray(np.abs(1.0 / (np.cos(phase) + 1j * a * np.sin(phase))))
 
 

@@ -33,14 +33,18 @@ class SlidingBody:
 
     law: SlidingBlock
     lengths: tuple[float, float] = (1.0, 0.5)
-    material: LinearElastic = field(default_factory=lambda: LinearElastic(E=3.0e9, nu=0.0, rho=2400.0))
+    material: LinearElastic = field(
+        default_factory=lambda: LinearElastic(E=3.0e9, nu=0.0, rho=2400.0)
+    )
     damping: Damping = field(default_factory=lambda: Rayleigh(alpha=0.0, beta=1.0e-4))
     divisions: tuple[int, int] = (4, 2)
 
     def __post_init__(self) -> None:
         if self.lengths[0] <= self.law.mu * self.lengths[1]:
-            raise InputError(f"SlidingBody: a block of {self.lengths[0]:g} m x {self.lengths[1]:g} m rocks before it "
-                             f"slides with mu = {self.law.mu:g}: make it wider than mu times its height")
+            raise InputError(
+                f"SlidingBody: a block of {self.lengths[0]:g} m x {self.lengths[1]:g} m rocks before it "
+                f"slides with mu = {self.law.mu:g}: make it wider than mu times its height"
+            )
 
 
 @dataclass(frozen=True)
@@ -57,11 +61,15 @@ class SlidingModel:
         return 0.5 * self.body.lengths[0], 0.5 * self.body.lengths[1]
 
 
-def build(body: SlidingBody, comm: Any, *, excitation: Excitation | Sequence[Excitation]) -> SlidingModel:
+def build(
+    body: SlidingBody, comm: Any, *, excitation: Excitation | Sequence[Excitation]
+) -> SlidingModel:
     """Build mesh, system and gravity stage of the block."""
     mesh, tags = build_mesh(BlockMesh(lengths=body.lengths, divisions=body.divisions), comm)
     weight = BodyForce((0.0, -body.material.rho * body.law.gravity))
-    system = assemble(mesh, body.material, section=PlaneStress(1.0), damping=body.damping, loads=weight)
+    system = assemble(
+        mesh, body.material, section=PlaneStress(1.0), damping=body.damping, loads=weight
+    )
     ground = HalfSpace(point=(0.0, 0.0), normal=(0.0, 1.0))
     surface = contact_surface(system, tags["bottom"], obstacle=ground)
     problem = ContactProblem(system, surface, friction=Coulomb(body.law.mu), excitation=excitation)

@@ -17,12 +17,16 @@ from vi_contact.soil.soil_column import SoilColumn
 SOIL = LinearElastic.from_wave_speeds(400.0, 200.0, 2000.0)
 
 
-def strip(comm: Any, width: float, height: float, divisions: tuple[int, int], **spec: Any) -> tuple[Any, Any]:
+def strip(
+    comm: Any, width: float, height: float, divisions: tuple[int, int], **spec: Any
+) -> tuple[Any, Any]:
     """(mesh, tags) of a rectangle of soil."""
     return fem.build_mesh(BlockMesh(lengths=(width, height), divisions=divisions, **spec), comm)
 
 
-def column_of(material: LinearElastic, heights: Array, *, alpha: float = 0.0, beta: float = 0.0) -> SoilColumn:
+def column_of(
+    material: LinearElastic, heights: Array, *, alpha: float = 0.0, beta: float = 0.0
+) -> SoilColumn:
     """The column of one material."""
     same = np.ones(len(heights) - 1)
     moduli = material.lame_lambda * same, material.shear_modulus * same, material.rho * same
@@ -32,7 +36,9 @@ def column_of(material: LinearElastic, heights: Array, *, alpha: float = 0.0, be
 def energies(problem: Any, **run: Any) -> Array:
     """Kinetic and strain energy together after every step [J]."""
     system = problem.system
-    return np.array([system.kinetic_energy(s.v) + system.strain_energy(s.u) for s, _ in march(problem, **run)])
+    return np.array(
+        [system.kinetic_energy(s.v) + system.strain_energy(s.u) for s, _ in march(problem, **run)]
+    )
 
 
 def history(problem: Any, points: Any, *, derivative: int = 0, **run: Any) -> Array:
@@ -40,7 +46,11 @@ def history(problem: Any, points: Any, *, derivative: int = 0, **run: Any) -> Ar
     space = problem.system.space
     nodes, rows = space.find_nodes(np.asarray(points, dtype=float)), []
     for state, _ in march(problem, **run):
-        rows.append(space.sample(problem.cartesian((state.u, state.v)[derivative]), nodes, state.t, derivative))
+        rows.append(
+            space.sample(
+                problem.cartesian((state.u, state.v)[derivative]), nodes, state.t, derivative
+            )
+        )
     return np.array(rows)
 
 

@@ -25,7 +25,9 @@ from vi_contact.solvers.condensed import Condensed
 
 STEEL = LinearElastic(E=2.1e11, nu=0.3, rho=7800.0)
 ALUMINIUM = LinearElastic(E=7.0e10, nu=0.3, rho=2700.0)
-FIBROUS = LinearElastic(E=2.0e11, nu=0.0, rho=7800.0)  # no contraction: slip is along Q, see half_space.Mindlin
+FIBROUS = LinearElastic(
+    E=2.0e11, nu=0.0, rho=7800.0
+)  # no contraction: slip is along Q, see half_space.Mindlin
 RADIUS, SLOPE, MU, COARSER = 0.01, 1e-3, 0.3, 0.83  # of a sphere [m]; a/R
 APPROACHES = np.linspace(0.85, 1.15, 13)[1:]  # in a
 
@@ -33,7 +35,11 @@ APPROACHES = np.linspace(0.85, 1.15, 13)[1:]  # in a
 def bodies(kind: str, n: float) -> list[Cap]:
     """What touches: a sphere on a rigid "plane", two "spheres" of 10 and 20 mm, a sphere on an elastic "block"."""
     one, m = Cap(RADIUS, STEEL, n), COARSER * n
-    others = {"plane": [], "spheres": [Cap(2.0 * RADIUS, STEEL, m)], "block": [Cap(np.inf, ALUMINIUM, m)]}
+    others = {
+        "plane": [],
+        "spheres": [Cap(2.0 * RADIUS, STEEL, m)],
+        "block": [Cap(np.inf, ALUMINIUM, m)],
+    }
     return [one, *others[kind]]
 
 
@@ -44,17 +50,39 @@ def hertz(kind: str, n: float, *, simplices: bool = False) -> dict[str, float]:
     approaches; scatter: standard deviation of the force's; profile: L2 norm of the nodal pressures' error, its mean.
     """
     caps = bodies(kind, n)
-    spheres = Caps(caps, SLOPE * contact_radius(*(cap.radius for cap in caps)), simplices=simplices,
-                   pressed=lambda t: float(APPROACHES[round(t) - 1]) if t else 1.0)
+    spheres = Caps(
+        caps,
+        SLOPE * contact_radius(*(cap.radius for cap in caps)),
+        simplices=simplices,
+        pressed=lambda t: float(APPROACHES[round(t) - 1]) if t else 1.0,
+    )
     rows = []
     for state in quasi_static(spheres.problem, range(1, 1 + len(APPROACHES)), solver=Condensed()):
-        found, exact = spheres.found(state), spheres.exact_at(spheres.a * APPROACHES[round(state.t) - 1])
-        p, a, core = exact.pressure(found.r), exact.contact_radius, found.r < 0.5 * exact.contact_radius
+        found, exact = (
+            spheres.found(state),
+            spheres.exact_at(spheres.a * APPROACHES[round(state.t) - 1]),
+        )
+        p, a, core = (
+            exact.pressure(found.r),
+            exact.contact_radius,
+            found.r < 0.5 * exact.contact_radius,
+        )
         error = found.r_n / found.weights - p
-        rows.append((found.force / exact.force - 1.0, found.radius / a - 1.0,
-                     found.weights @ (error * core) / (found.weights @ (p * core)), found.norm(error) / found.norm(p)))
-    mean = dict(zip(("force", "radius", "peak", "profile"), np.mean(rows, axis=0).tolist(), strict=True))
-    return mean | {"scatter": float(np.std(rows, axis=0)[0]), "unknowns": float(spheres.problem.system.space.unknowns)}
+        rows.append(
+            (
+                found.force / exact.force - 1.0,
+                found.radius / a - 1.0,
+                found.weights @ (error * core) / (found.weights @ (p * core)),
+                found.norm(error) / found.norm(p),
+            )
+        )
+    mean = dict(
+        zip(("force", "radius", "peak", "profile"), np.mean(rows, axis=0).tolist(), strict=True)
+    )
+    return mean | {
+        "scatter": float(np.std(rows, axis=0)[0]),
+        "unknowns": float(spheres.problem.system.space.unknowns),
+    }
 
 
 STAGES = 8  # at most; stage 0 of an approach presses the bodies, the others rub them: t = STAGES · approach + stage
@@ -91,14 +119,26 @@ class Rubbed:
 
             return moved
 
-        caps = [Cap(RADIUS, self.material, self.n), Cap(RADIUS, self.material, COARSER * self.n, self.turn)]
-        return Caps(caps, 0.5 * SLOPE * RADIUS, self.whole, [motion(1.0), motion(-1.0)],
-                    pressed=lambda t: self.approaches[round(t) // STAGES], comm=self.comm)
+        caps = [
+            Cap(RADIUS, self.material, self.n),
+            Cap(RADIUS, self.material, COARSER * self.n, self.turn),
+        ]
+        return Caps(
+            caps,
+            0.5 * SLOPE * RADIUS,
+            self.whole,
+            [motion(1.0), motion(-1.0)],
+            pressed=lambda t: self.approaches[round(t) // STAGES],
+            comm=self.comm,
+        )
 
     @cached_property
     def _pressed(self) -> list[State]:
         """After every approach, without friction."""
-        smooth, start = Equilibria(self.spheres.problem, solver=Condensed()), initial_state(self.spheres.problem)
+        smooth, start = (
+            Equilibria(self.spheres.problem, solver=Condensed()),
+            initial_state(self.spheres.problem),
+        )
         return [smooth.after(start, float(STAGES * i)) for i in range(len(self.approaches))]
 
     def stages(self, stages: Sequence[int], mu: float = MU) -> list[list[Contact]]:
@@ -106,7 +146,9 @@ class Rubbed:
         rough = Equilibria(replace(self.spheres.problem, friction=Coulomb(mu)), solver=Condensed())
         found = []
         for i, state in enumerate(self._pressed):
-            states = accumulate(stages, lambda old, j, i=i: rough.after(old, float(STAGES * i + j)), initial=state)
+            states = accumulate(
+                stages, lambda old, j, i=i: rough.after(old, float(STAGES * i + j)), initial=state
+            )
             found.append([self.spheres.found(one) for one in islice(states, 1, None)])
         return found
 
@@ -117,10 +159,19 @@ class Rubbed:
 
 def averaged(rows: Sequence[Sequence[dict[str, float]]]) -> list[dict[str, float]]:
     """Of each stage the means over the approaches."""
-    return [{key: float(np.mean([one[key] for one in stage])) for key in stage[0]} for stage in zip(*rows, strict=True)]
+    return [
+        {key: float(np.mean([one[key] for one in stage])) for key in stage[0]}
+        for stage in zip(*rows, strict=True)
+    ]
 
 
-PATH = ((0.25, 0.0), (0.5, 0.0), (0.75, 0.0), (0.9, 0.0), (0.9, 0.5))  # Q/(mu P): where it turned, half the way back
+PATH = (
+    (0.25, 0.0),
+    (0.5, 0.0),
+    (0.75, 0.0),
+    (0.9, 0.0),
+    (0.9, 0.5),
+)  # Q/(mu P): where it turned, half the way back
 
 
 @dataclass(frozen=True)
@@ -153,9 +204,15 @@ class PartialSlip:
     def compared(self) -> list[dict[str, float]]:
         """Of each stage: relative errors of P, of Q over the greatest, L2 error of q; c and its error over a."""
         found = self.rubbed.stages(range(1, 1 + len(PATH)))
-        return averaged([[self._compared(self.exact(form.contact_radius), *path, one)
-                          for path, one in zip(PATH, contacts, strict=True)]
-                         for form, contacts in zip(self.rubbed.forms(), found, strict=True)])
+        return averaged(
+            [
+                [
+                    self._compared(self.exact(form.contact_radius), *path, one)
+                    for path, one in zip(PATH, contacts, strict=True)
+                ]
+                for form, contacts in zip(self.rubbed.forms(), found, strict=True)
+            ]
+        )
 
     @staticmethod
     def _compared(exact: Mindlin, there: float, back: float, found: Contact) -> dict[str, float]:
@@ -163,8 +220,14 @@ class PartialSlip:
         q = exact.traction(r, there) - (2.0 * exact.traction(r, back) if back else 0.0)
         along = found.shear(np.array([[1.0, 0.0, 0.0]]))
         carried = found.friction[:, 0].sum() / found.share / (MU * exact.force)
-        return {"Q": Q, "force": found.force / exact.force - 1.0, "shear": (carried - Q) / there, "c": c / exact.a,
-                "stick": (found.stick(MU) - c) / exact.a, "profile": found.norm(along - q) / found.norm(q)}
+        return {
+            "Q": Q,
+            "force": found.force / exact.force - 1.0,
+            "shear": (carried - Q) / there,
+            "c": c / exact.a,
+            "stick": (found.stick(MU) - c) / exact.a,
+            "profile": found.norm(along - q) / found.norm(q),
+        }
 
 
 STICK = (0.9, 0.7, 0.5, 0.3)  # c/a
@@ -185,36 +248,55 @@ class Torsion:
 
         def moved(points: Array, a: float, stage: int) -> Array:
             exact, c = self.exact(a), a * (STICK + STICK[:1])[stage - 1]
-            stuck = exact.stuck_field(points, exact.twist(c)) if stage > len(STICK) else exact.field(points, c)
+            stuck = (
+                exact.stuck_field(points, exact.twist(c))
+                if stage > len(STICK)
+                else exact.field(points, c)
+            )
             return turned(points, exact.twist(c)) - stuck
 
         return Rubbed(self.n, (0, 2), STEEL, moved, 0.4, self.approaches, self.comm)
 
     def exact(self, a: float) -> Lubkin:
         """The closed form of this radius of contact [m]."""
-        return Lubkin(self.rubbed.spheres.exact_at(a).force, a, MU, 0.5 * STEEL.E / (1.0 + STEEL.nu))
+        return Lubkin(
+            self.rubbed.spheres.exact_at(a).force, a, MU, 0.5 * STEEL.E / (1.0 + STEEL.nu)
+        )
 
     def compared(self) -> list[dict[str, float]]:
         """Of each stage: relative errors of P and T, L2 error of τ; c and its error over a."""
         found = self.rubbed.stages(range(1, 1 + len(STICK)))
-        return averaged([[self._compared(self.exact(form.contact_radius), share, one)
-                          for share, one in zip(STICK, contacts, strict=True)]
-                         for form, contacts in zip(self.rubbed.forms(), found, strict=True)])
+        return averaged(
+            [
+                [
+                    self._compared(self.exact(form.contact_radius), share, one)
+                    for share, one in zip(STICK, contacts, strict=True)
+                ]
+                for form, contacts in zip(self.rubbed.forms(), found, strict=True)
+            ]
+        )
 
     @staticmethod
     def _compared(exact: Lubkin, share: float, found: Contact) -> dict[str, float]:
         c, r = share * exact.a, np.maximum(found.r, 1e-9 * exact.a)
         tau, along = exact.traction(r, c), found.shear(turned(found.points, 1.0) / r[:, None])
-        return {"T": exact.moment(c) / exact.sliding, "force": found.force / exact.force - 1.0,
-                "moment": moment(found) / exact.moment(c) - 1.0, "c": share,
-                "stick": found.stick(MU) / exact.a - share, "profile": found.norm(along - tau) / found.norm(tau)}
+        return {
+            "T": exact.moment(c) / exact.sliding,
+            "force": found.force / exact.force - 1.0,
+            "moment": moment(found) / exact.moment(c) - 1.0,
+            "c": share,
+            "stick": found.stick(MU) / exact.a - share,
+            "profile": found.norm(along - tau) / found.norm(tau),
+        }
 
     def without_slip(self) -> float:
         """Relative error of T where friction has no bound, in the mean over the approaches."""
         exact = [self.exact(form.contact_radius) for form in self.rubbed.forms()]
         given = [one.no_slip(one.twist(STICK[0] * one.a)) for one in exact]
         found = self.rubbed.stages([1 + len(STICK)], mu=1e3)
-        return float(np.mean([moment(one) / T - 1.0 for (one,), T in zip(found, given, strict=True)]))
+        return float(
+            np.mean([moment(one) / T - 1.0 for (one,), T in zip(found, given, strict=True)])
+        )
 
 
 def moment(found: Contact) -> float:

@@ -40,7 +40,9 @@ class ThickLining:
     def __post_init__(self) -> None:
         attributes(self, positive=("inner", "outer"))
         if not self.inner < self.outer:
-            raise InputError(f"ThickLining: inner radius {self.inner!r} m, outer {self.outer!r} m; give inner < outer")
+            raise InputError(
+                f"ThickLining: inner radius {self.inner!r} m, outer {self.outer!r} m; give inner < outer"
+            )
 
     @cached_property
     def _constants(self) -> Array:
@@ -64,7 +66,9 @@ class ThickLining:
     def field(self, name: str, r: float, gamma: float) -> float:
         """Return the amplitude of "sigma_r", "sigma_theta", "tau" [Pa], "u_r", "u_theta" [m] in the lining at r [m]."""
         size = self.outer if name.startswith("u_") else 1.0
-        return float(gamma * size * (_rows(self.lining, r / self.outer)[name] @ self._constants[:4]))
+        return float(
+            gamma * size * (_rows(self.lining, r / self.outer)[name] @ self._constants[:4])
+        )
 
     def diameter_change(self, gamma: float) -> float:
         """Return 2 u_r [m] at the outside, of the diameter that is stretched most."""

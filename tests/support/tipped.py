@@ -18,13 +18,18 @@ from vi_contact.laws.mass import ConsistentMass
 from vi_contact.laws.materials import LinearElastic
 
 POINTS = 13
-ROUGH_ON_ONE_SIDE = [Coulomb(tuple(np.linspace(0.0, 1.2, POINTS))), Tresca(tuple(np.linspace(0.0, 2e4, POINTS)))]
+ROUGH_ON_ONE_SIDE = [
+    Coulomb(tuple(np.linspace(0.0, 1.2, POINTS))),
+    Tresca(tuple(np.linspace(0.0, 2e4, POINTS))),
+]
 RUBBER = LinearElastic(E=1.0e6, nu=0.3, rho=1000.0)
 
 
 def tipped(comm: Any, friction: FrictionLaw, *, simplices: bool, angle: float) -> ContactProblem:
     """A soft rectangle that lands on one corner, turning and gliding, on a plane that gets rougher on one side."""
-    mesh, tags = block(comm, lengths=(1.5, 1.0), divisions=(POINTS - 1, 6), angle=angle, simplices=simplices)
+    mesh, tags = block(
+        comm, lengths=(1.5, 1.0), divisions=(POINTS - 1, 6), angle=angle, simplices=simplices
+    )
     down, along = turned((0.0, -1.0), angle), turned((1.0, 0.0), angle)
 
     def throw(x: Any) -> Any:

@@ -39,8 +39,10 @@ class TwoBars:
         attributes(self, positive=("length1", "length2", "z1", "z2", "c1", "c2", "speed"))
         first, second = (self.length1 / self.c1, self.z1), (self.length2 / self.c2, self.z2)
         if min(first, second)[1] > max(first, second)[1]:
-            raise InputError("TwoBars: the bar crossed first has the larger impedance, so that contact outlives the "
-                             "first reflection; give it an impedance (z1 or z2) that is not above the other's")
+            raise InputError(
+                "TwoBars: the bar crossed first has the larger impedance, so that contact outlives the "
+                "first reflection; give it an impedance (z1 or z2) that is not above the other's"
+            )
 
     @property
     def pressure(self) -> float:

@@ -22,8 +22,15 @@ LENGTHS, UPPER, LOWER = (1.5, 1.0, 1.2), (4, 3, 3), (4, 2, 3)
 
 
 def blocks(
-    d: int = 2, *, upper: tuple[int, ...] = UPPER, lower: tuple[int, ...] = LOWER, simplices: bool = False,
-    angle: float = 0.0, gap: float = 0.0, offset: tuple[float, ...] = (0.0, 0.0), deform: Any = None,
+    d: int = 2,
+    *,
+    upper: tuple[int, ...] = UPPER,
+    lower: tuple[int, ...] = LOWER,
+    simplices: bool = False,
+    angle: float = 0.0,
+    gap: float = 0.0,
+    offset: tuple[float, ...] = (0.0, 0.0),
+    deform: Any = None,
     lengths: tuple[float, ...] = LENGTHS,
 ) -> TwoBlocks:
     """Matching by default."""
@@ -34,10 +41,15 @@ def blocks(
     return TwoBlocks(upper=one, lower=two, angle=angle, gap=gap, offset=offset)
 
 
-def two_blocks(comm: Any, mesh: Any, material: Any = SOFT, **data: Any) -> tuple[SemiDiscreteSystem, Any]:
+def two_blocks(
+    comm: Any, mesh: Any, material: Any = SOFT, **data: Any
+) -> tuple[SemiDiscreteSystem, Any]:
     """(system, tags); ``data`` for fem.assemble, functions of the tags for what needs them."""
     built, tags = build_mesh(mesh, comm)
-    given = {name: value(tags) if callable(value) and name in NEED_TAGS else value for name, value in data.items()}
+    given = {
+        name: value(tags) if callable(value) and name in NEED_TAGS else value
+        for name, value in data.items()
+    }
     return assemble(built, material, **given), tags
 
 
@@ -47,7 +59,9 @@ NEED_TAGS = ("clamped", "prescribed", "loads")
 def per_body(system: SemiDiscreteSystem, *functions: Callable[[Array], Array]) -> Array:
     """A vector of free unknowns that is one function of the points in body 0, another in body 1, ..."""
     space: Any = system.space
-    values = np.column_stack([space.restrict(np.asarray(function(space.points))) for function in functions])
+    values = np.column_stack(
+        [space.restrict(np.asarray(function(space.points))) for function in functions]
+    )
     return np.asarray(values[np.arange(system.rows), space.bodies])
 
 
@@ -59,10 +73,14 @@ def thrown(system: SemiDiscreteSystem, *functions: Callable[[Array], Array]) -> 
 def momenta(problem: ContactProblem, v: Array) -> Array:
     """(bodies, d) linear momentum of each body, with the mass matrix of the equations."""
     system, bodies = problem.system, problem.system.space.bodies
-    momentum = problem.equations.M @ v  # on the unknowns of the equations: forces, hence back with the transpose
+    momentum = (
+        problem.equations.M @ v
+    )  # on the unknowns of the equations: forces, hence back with the transpose
     rows = []
     for body in range(int(largest(system.algebra.comm, bodies.max(initial=0))) + 1):
-        rigid = np.column_stack([relative(problem, column * (bodies == body)) for column in system.influence.T])
+        rigid = np.column_stack(
+            [relative(problem, column * (bodies == body)) for column in system.influence.T]
+        )
         rows.append(system.algebra.comm.sum(rigid.T @ momentum))
     return np.array(rows)
 

@@ -20,7 +20,9 @@ from vi_contact.core.surfaces import ContactSurface
 
 def q1_element(nu: float) -> tuple[Array, Array]:
     """(stiffness, mass) of a unit square, E = rho = 1, plane strain; nodes anticlockwise, components interleaved."""
-    D = np.array([[1.0 - nu, nu, 0.0], [nu, 1.0 - nu, 0.0], [0.0, 0.0, 0.5 - nu]]) / ((1.0 + nu) * (1.0 - 2.0 * nu))
+    D = np.array([[1.0 - nu, nu, 0.0], [nu, 1.0 - nu, 0.0], [0.0, 0.0, 0.5 - nu]]) / (
+        (1.0 + nu) * (1.0 - 2.0 * nu)
+    )
     K, M = np.zeros((8, 8)), np.zeros((8, 8))
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     for point in corners / np.sqrt(3.0):
@@ -47,10 +49,14 @@ class Block:
         return int(self.K.shape[0])
 
 
-def block(nx: int, ny: int, *, h: float = 1.0, modulus: float = 1.0, density: float = 1.0, nu: float = 0.3) -> Block:
+def block(
+    nx: int, ny: int, *, h: float = 1.0, modulus: float = 1.0, density: float = 1.0, nu: float = 0.3
+) -> Block:
     """The block with its base removed."""
     node = np.arange((nx + 1) * (ny + 1)).reshape(ny + 1, nx + 1)
-    elements = np.stack([node[:-1, :-1], node[:-1, 1:], node[1:, 1:], node[1:, :-1]], axis=-1).reshape(-1, 4)
+    elements = np.stack(
+        [node[:-1, :-1], node[:-1, 1:], node[1:, 1:], node[1:, :-1]], axis=-1
+    ).reshape(-1, 4)
     dofs = (2 * elements[:, :, None] + np.arange(2)).reshape(-1, 8)
     rows, columns = np.repeat(dofs, 8, axis=1).ravel(), np.tile(dofs, 8).ravel()
     free = slice(2 * (nx + 1), None)
@@ -81,7 +87,8 @@ class Case:
         """Brute force over all contact sets (m <= 12), with dense algebra."""
         step, surface = self.step, self.step.surface
         bound, bilateral, compliance = (
-            surface.everywhere(values) for values in (step.bound, surface.bilateral, surface.compliance)
+            surface.everywhere(values)
+            for values in (step.bound, surface.bilateral, surface.compliance)
         )
         E = np.zeros((len(self.b), surface.total))
         E[self.contact, np.arange(surface.total)] = 1.0
@@ -96,12 +103,18 @@ class Case:
         everywhere = self.step.surface.everywhere
         r_t = None if result.r_t is None else everywhere(result.r_t)
         return replace(
-            result, x=self.all(result.x), r_n=everywhere(result.r_n), active=everywhere(result.active), r_t=r_t
+            result,
+            x=self.all(result.x),
+            r_n=everywhere(result.r_n),
+            active=everywhere(result.active),
+            r_t=r_t,
         )
 
     def bounded(self, bound: Array) -> Case:
         """The case with other bounds, given for all conditions."""
-        return replace(self, step=replace(self.step, bound=np.asarray(bound)[self.step.surface.slots]))
+        return replace(
+            self, step=replace(self.step, bound=np.asarray(bound)[self.step.surface.slots])
+        )
 
     def starting_at(self, result: StepResult) -> StepProblem:
         """The step with the owned part of a solution as prediction."""
@@ -121,7 +134,11 @@ def case(
     scale: float = 1.0,
 ) -> Case:
     """The step A x = b - reactions, x <= bound at the unknowns ``contact``, starting from rest without prediction."""
-    rows, A, comm = _parallel(matrix, of_node) if parallel else (slice(0, len(b)), _serial(matrix), SerialComm())
+    rows, A, comm = (
+        _parallel(matrix, of_node)
+        if parallel
+        else (slice(0, len(b)), _serial(matrix), SerialComm())
+    )
     mine = (contact >= rows.start) & (contact < rows.stop)
     own = int(mine.sum())
     surface = ContactSurface(
@@ -137,7 +154,9 @@ def case(
         tangents=np.zeros((own, 0), dtype=np.int64),
     )
     guess = np.zeros(rows.stop - rows.start)
-    step = StepProblem(A, b[rows].copy(), bound[mine], surface, scale, guess, np.zeros(own, dtype=bool), 0.0, 1)
+    step = StepProblem(
+        A, b[rows].copy(), bound[mine], surface, scale, guess, np.zeros(own, dtype=bool), 0.0, 1
+    )
     return Case(step, matrix, np.asarray(contact), rows, b)
 
 
@@ -163,7 +182,13 @@ def _parallel(matrix: Any, of_node: int) -> tuple[slice, EffectiveMatrix, Any]:
 
 
 def pushed_block(
-    nx: int = 5, ny: int = 8, *, length: float = 1.0, force: float = 1.0, seed: int = 2, **options: Any
+    nx: int = 5,
+    ny: int = 8,
+    *,
+    length: float = 1.0,
+    force: float = 1.0,
+    seed: int = 2,
+    **options: Any,
 ) -> Case:
     """A dynamic step of the block under loads that close half of its points; ``length`` and ``force`` are units."""
     rng = np.random.default_rng(seed)

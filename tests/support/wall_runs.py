@@ -19,7 +19,12 @@ from vi_contact.run.march import march
 from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
 
-POINTS = (12, 6, 7, 26)  # columns of the reference table: top of the contact side, two of its points, the opposite side
+POINTS = (
+    12,
+    6,
+    7,
+    26,
+)  # columns of the reference table: top of the contact side, two of its points, the opposite side
 SCHEME = ZienkiewiczWoodTaylor(phi=0.5)
 
 
@@ -51,7 +56,12 @@ def problem(case: str, *, reading: Any = None, a0: float = 1.0, **one: Any) -> C
 
 
 def follow(
-    given: ContactProblem, *, steps: int = 400, dt: float, solver: Any = None, state: State | None = None,
+    given: ContactProblem,
+    *,
+    steps: int = 400,
+    dt: float,
+    solver: Any = None,
+    state: State | None = None,
 ) -> History:
     system = given.equations
     space = given.system.space
@@ -59,7 +69,9 @@ def follow(
     names = ("input", "damping", "contact", "algorithmic", "defect")
     losses = dict.fromkeys((*names, "impact"), 0.0)
     rows, sets, energy, changes, iterations, worst = [], [], [], [], [], 0.0
-    for new, report in march(given, scheme=SCHEME, solver=solver or Condensed(), dt=dt, steps=steps, state=state):
+    for new, report in march(
+        given, scheme=SCHEME, solver=solver or Condensed(), dt=dt, steps=steps, state=state
+    ):
         free = State(new.t, new.k, new.u, report.v_minus, new.r_n, new.active)
         step = energy_balance(given, report.old, free, report.balance)
         for name in names:
@@ -75,7 +87,15 @@ def follow(
         worst = max(worst, report.certificate.worst)
     u, contact = (np.array(column) for column in zip(*rows, strict=True))
     return History(
-        u, contact, np.array(sets), np.array(energy), losses, np.array(changes), np.array(iterations), worst, new
+        u,
+        contact,
+        np.array(sets),
+        np.array(energy),
+        losses,
+        np.array(changes),
+        np.array(iterations),
+        worst,
+        new,
     )
 
 

@@ -69,7 +69,8 @@ class WavePacket:
         """Return the mean energy that dashpots on a horizontal boundary above send back, over the packet's."""
         k_y, weights, angles = self._waves()
         shares = [
-            dashpot_energy(self.material, angle, wave=self.wave) if angle < 0.5 * math.pi else 1.0 for angle in angles
+            dashpot_energy(self.material, angle, wave=self.wave) if angle < 0.5 * math.pi else 1.0
+            for angle in angles
         ]
         energies = weights**2 * (k_y**2 + (2.0 * math.pi / self.period) ** 2)
         return float(np.sum(energies * shares) / np.sum(energies))
@@ -86,14 +87,21 @@ def energy_sent_back(
     nx = round(cells * period)
     ny = round(12.0 * length * nx / period)
     packet = WavePacket(material, wave, angle, period, length, 5.0 * length)
-    mesh, tags = fem.build_mesh(BlockMesh(lengths=(period, ny * period / nx), divisions=(nx, ny)), comm)
+    mesh, tags = fem.build_mesh(
+        BlockMesh(lengths=(period, ny * period / nx), divisions=(nx, ny)), comm
+    )
     system = fem.assemble(
-        mesh, material, tied=fem.Tied(tags["left"], tags["right"]),
+        mesh,
+        material,
+        tied=fem.Tied(tags["left"], tags["right"]),
         dashpots=[fem.Dashpots(tags["top"]), fem.Dashpots(tags["bottom"])],
-        initial_displacement=lambda x: packet.motion(x)[0], initial_velocity=lambda x: packet.motion(x)[1],
+        initial_displacement=lambda x: packet.motion(x)[0],
+        initial_velocity=lambda x: packet.motion(x)[1],
     )
     dt = 0.5 * period / nx / packet.speed
     steps = round(11.5 * length / (packet.speed * math.cos(angle)) / dt)
     ((state, _),) = deque(march(linear(system), dt=dt, steps=steps), maxlen=1)
     left = system.kinetic_energy(state.v) + system.strain_energy(state.u)
-    return left / (system.kinetic_energy(system.v0) + system.strain_energy(system.u0)), packet.reflected()
+    return left / (
+        system.kinetic_energy(system.v0) + system.strain_energy(system.u0)
+    ), packet.reflected()

@@ -11,7 +11,12 @@ import numpy as np
 import pytest
 
 import vi_contact as vc
-from demos.problems.boundary_elements import disk_contact, disk_problem, embedded_problem, square_problem
+from demos.problems.boundary_elements import (
+    disk_contact,
+    disk_problem,
+    embedded_problem,
+    square_problem,
+)
 from demos.problems.compare_tractions import Tractions, compared, shares
 from demos.problems.contact_ledger import ContactLedger, ledger
 from demos.problems.disk import Push
@@ -30,9 +35,18 @@ ENERGY = {  # an independent script of boundary elements, 20 elements per side
     "tresca": (0.5339, 1.1351, 1.7641, 2.3341, 2.2702, 1.9331, 1.4205, 0.7669, 0.3107, 0.2992),
 }
 FINE = {  # finite elements on 160 x 160 cells, default scheme, dt = h: energies at HALVES, impulse until t = 4
-    "none": ((0.5336, 1.1351, 1.7728, 2.3433, 2.3054, 1.9807, 1.4843, 0.8308, 0.3286, 0.3056), 4.70304),
-    "tresca": ((0.5336, 1.1351, 1.7646, 2.3245, 2.2710, 1.9328, 1.4209, 0.7767, 0.3092, 0.2985), 4.67378),
-    "coulomb": ((0.5336, 1.1351, 1.7728, 2.3432, 2.2396, 1.8140, 1.2413, 0.5357, 0.2250, 0.4191), 4.55658),
+    "none": (
+        (0.5336, 1.1351, 1.7728, 2.3433, 2.3054, 1.9807, 1.4843, 0.8308, 0.3286, 0.3056),
+        4.70304,
+    ),
+    "tresca": (
+        (0.5336, 1.1351, 1.7646, 2.3245, 2.2710, 1.9328, 1.4209, 0.7767, 0.3092, 0.2985),
+        4.67378,
+    ),
+    "coulomb": (
+        (0.5336, 1.1351, 1.7728, 2.3432, 2.2396, 1.8140, 1.2413, 0.5357, 0.2250, 0.4191),
+        4.55658,
+    ),
 }
 
 
@@ -93,7 +107,9 @@ def test_uzawa_needs_about_two_hundred_iterations(law):
     assert 150 < found.iterations[0] < 250
 
 
-@pytest.mark.parametrize(("law", "early", "late"), [("none", 0.0, 0.0), ("tresca", 0.2, 0.25), ("coulomb", 0.05, 0.25)])
+@pytest.mark.parametrize(
+    ("law", "early", "late"), [("none", 0.0, 0.0), ("tresca", 0.2, 0.25), ("coulomb", 0.05, 0.25)]
+)
 def test_square_tractions_beside_finite_elements(law, early, late):
     """V7.1: tractions on the whole contact boundary, means over 0.2 s, against 40 x 40 cells: pressure to 5 % in L2;
     shear on the body along +x: Coulomb's to 5 % while the base sticks, but for its ends; Tresca's, which turns round
@@ -123,8 +139,15 @@ def test_forces_are_collected_on_the_nodes_of_the_boundary_elements():
     found = force @ shares(x, nodes)
     assert found.sum() == pytest.approx(4.5) and found @ nodes == pytest.approx(force @ x)
     t = np.arange(1.0, 9.0)[:, None]
-    both = Tractions(nodes, np.full(6, 0.2), t[:, 0], t * nodes**2, t * nodes**2 + 0.1 * (nodes > 0.4))
-    assert both.difference(nodes=nodes < 0.4) == 0.0 < both.difference(window=2.0, width=0.5) < both.difference()
+    both = Tractions(
+        nodes, np.full(6, 0.2), t[:, 0], t * nodes**2, t * nodes**2 + 0.1 * (nodes > 0.4)
+    )
+    assert (
+        both.difference(nodes=nodes < 0.4)
+        == 0.0
+        < both.difference(window=2.0, width=0.5)
+        < both.difference()
+    )
     off = np.sqrt(8 * 0.1**2 / np.sum(both.theirs**2))
     assert both.difference() == pytest.approx(off, rel=1e-12)
 
@@ -146,7 +169,9 @@ def test_concrete_on_steel():
     smooth = march_contact(BoundaryContact(matrix))
     motion = problem.solve(smooth.forces)
     assert load(0.04) / plane == pytest.approx(175.308e-6, rel=5e-5)
-    assert -motion.displacement[-1, 1, top] == pytest.approx(np.full(len(top), 175.308e-6), rel=5e-4)
+    assert -motion.displacement[-1, 1, top] == pytest.approx(
+        np.full(len(top), 175.308e-6), rel=5e-4
+    )
     assert motion.work[-1] == pytest.approx(0.5 * load(0.04) ** 2 / plane, rel=2e-3)
     assert smooth.resultant[-1, 1] == pytest.approx(load(0.04), rel=1e-3)
     rough = march_contact(BoundaryContact(matrix, friction=vc.Coulomb(0.3)))
@@ -159,7 +184,9 @@ def test_concrete_in_concrete():
     """V7.3: coarse (4 elements along the box): energy at 20 ms within 1.5 % (friction 2.7 %) of finite elements on 40
     cells, shares of the walls, work of friction; both bodies' energies are what load and friction leave."""
     concrete = vc.LinearElastic.from_wave_speeds(3253.0, 1992.0, 2400.0)
-    box = embedded_problem(4, concrete, dt=1.0 / 3253.0, steps=65, pressure=lambda t: 4e6 * math.tanh((t / 0.015) ** 2))
+    box = embedded_problem(
+        4, concrete, dt=1.0 / 3253.0, steps=65, pressure=lambda t: 4e6 * math.tanh((t / 0.015) ** 2)
+    )
     energy = {}
     for law, friction in {"smooth": None, "rough": vc.Coulomb(0.75)}.items():
         found = march_contact(box.contact(friction))
@@ -167,7 +194,9 @@ def test_concrete_in_concrete():
         books = ledger(found, one, box.bodies.one.forces)
         energy[law] = one.work + two.work
         assert found.worst < 1e-12
-        assert energy[law] == pytest.approx(books.load + found.work, rel=1e-9, abs=1e-9 * energy[law].max())
+        assert energy[law] == pytest.approx(
+            books.load + found.work, rel=1e-9, abs=1e-9 * energy[law].max()
+        )
         floor = found.r_n[-1, :5].sum() / (4e6 * math.tanh((0.02 / 0.015) ** 2))
         assert floor == pytest.approx({"smooth": 1.0, "rough": 0.88}[law], abs=5e-3)
     assert energy["smooth"][-1] == pytest.approx(548.9, rel=0.015)
@@ -179,7 +208,9 @@ def test_concrete_in_concrete():
 def test_tennis_ball():
     """V7.3, B8: 40 elements, gentle push: released at 2.7, then no force, energy constant to round-off; momentum is the
     slope of the mean displacement; the plane's work is the energy; friction lowers speed and energy, slightly."""
-    problem = disk_problem(40, vc.LinearElastic.from_wave_speeds(2.0, 1.0, 1.0), dt=np.pi / 80, steps=102, radius=0.5)
+    problem = disk_problem(
+        40, vc.LinearElastic.from_wave_speeds(2.0, 1.0, 1.0), dt=np.pi / 80, steps=102, radius=0.5
+    )
     mesh, speed, energy = problem.operator.mesh, {}, {}
     contact = disk_contact(problem, Push(height=0.1, rise=4.0))
     for law, friction in {"smooth": vc.Frictionless(), "rough": vc.Coulomb(2.0)}.items():
@@ -188,10 +219,16 @@ def test_tennis_ball():
         last = int(np.flatnonzero(found.active.any(axis=1))[-1])
         assert found.times[last] == pytest.approx(2.69, abs=0.04) and found.worst < 1e-12
         speed[law], energy[law] = found.impulse[-1, 1] / mesh.area, motion.work[-1]
-        mean = motion.displacement[:, 1] @ mesh.node_lengths(np.ones(len(mesh), bool)) / mesh.lengths.sum()
+        mean = (
+            motion.displacement[:, 1]
+            @ mesh.node_lengths(np.ones(len(mesh), bool))
+            / mesh.lengths.sum()
+        )
         slope = np.polyfit(found.times[last + 5 :], mean[last + 5 :], 1)[0]
         assert slope == pytest.approx(speed[law], rel=5e-4)
-        assert np.ptp(motion.work[last + 1 :]) < 1e-14 and motion.work == pytest.approx(found.work, abs=1e-14)
+        assert np.ptp(motion.work[last + 1 :]) < 1e-14 and motion.work == pytest.approx(
+            found.work, abs=1e-14
+        )
         assert abs(found.impulse[-1, 0]) < 1e-6 * found.impulse[-1, 1]
     assert speed["smooth"] == pytest.approx(0.06793, rel=0.01)
     assert speed["rough"] / speed["smooth"] == pytest.approx(0.06789 / 0.06793, abs=5e-4)

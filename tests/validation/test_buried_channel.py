@@ -39,6 +39,7 @@ def gap_at(history: Any, number: int, normal: tuple[float, float]) -> Array:
 
 # Numbers --------------------------------------------------------------------------------------------------------------
 
+
 def test_v4_2_same_as_an_independent_program():
     """Displacements of the bottom corners and all openings, every one of 400 steps, to 1e-10 of the largest (asked:
     1e-5 over 40 steps)."""
@@ -46,8 +47,16 @@ def test_v4_2_same_as_an_independent_program():
     history = shaken("sliding").history
     found = np.column_stack([history[name] for name in ("u_x_1", "u_y_1", "u_x_7", "u_y_7")])
     assert np.abs(found - corners).max() < 1e-10 * np.abs(corners).max()
-    order = np.lexsort((model().surface.points @ (1.0, 1.0), np.argmax([model().sides[s] for s in model().sides], 0)))
-    assert np.abs(np.asarray(history["gap"])[:, order] - openings).max() < 1e-10 * np.abs(corners).max()
+    order = np.lexsort(
+        (
+            model().surface.points @ (1.0, 1.0),
+            np.argmax([model().sides[s] for s in model().sides], 0),
+        )
+    )
+    assert (
+        np.abs(np.asarray(history["gap"])[:, order] - openings).max()
+        < 1e-10 * np.abs(corners).max()
+    )
 
 
 @pytest.mark.parametrize("contact", ["sliding", "rubbing", "bilateral"])
@@ -56,7 +65,11 @@ def test_v4_2_certificates_and_ledger(contact):
     V9.6)."""
     solution = shaken(contact)
     facts, history = solution.facts, solution.history
-    assert facts["worst_certificate"] < 1e-9 and facts["energy_defect"] < 1e-10 and facts["escalated_steps"] == 0
+    assert (
+        facts["worst_certificate"] < 1e-9
+        and facts["energy_defect"] < 1e-10
+        and facts["escalated_steps"] == 0
+    )
     size = facts["energy"]["energy_max"]
     for loss in ("loss_contact", "loss_impact", "loss_friction"):
         assert np.diff(history[loss]).min() > -1e-12 * size, loss
@@ -77,6 +90,7 @@ def test_v4_2_both_routes(friction):
 
 # Statements -----------------------------------------------------------------------------------------------------------
 
+
 def test_fig_7_openings():
     """Channel minus soil along the outward normal: never negative, on both walls in turn. The two tops are open
     together in less than 5 % of the steps (found: 4 %), both whole walls in 1 %."""
@@ -84,7 +98,10 @@ def test_fig_7_openings():
     gap = np.asarray(history["gap"])
     assert gap.min() == 0.0
     left, right = gap_at(history, 19, (-1.0, 0.0)), gap_at(history, 13, (1.0, 0.0))
-    apart = {"left": history["u_x_19"] - history["u_x_19_soil"], "right": history["u_x_13_soil"] - history["u_x_13"]}
+    apart = {
+        "left": history["u_x_19"] - history["u_x_19_soil"],
+        "right": history["u_x_13_soil"] - history["u_x_13"],
+    }
     assert np.abs(apart["left"] - left).max() < EXACT * largest(history)
     assert np.abs(apart["right"] - right).max() < EXACT * largest(history)
     assert 0.3 < np.mean(left > 0.0) < 0.6 and 0.3 < np.mean(right > 0.0) < 0.6
@@ -98,7 +115,10 @@ def test_fig_8_rocking():
     """The bottom corners move up and down about the static settlement, in anti-phase."""
     history = shaken("sliding").history
     left, right = (history[name] - history[name][0] for name in ("u_y_1", "u_y_7"))
-    assert history["u_y_1"][0] == pytest.approx(history["u_y_7"][0], rel=1e-9) and history["u_y_1"][0] < 0.0
+    assert (
+        history["u_y_1"][0] == pytest.approx(history["u_y_7"][0], rel=1e-9)
+        and history["u_y_1"][0] < 0.0
+    )
     assert np.corrcoef(left, right)[0, 1] < -0.7
     for one in (left, right):
         assert one.min() < 0.0 < one.max() and abs(one.mean()) < 0.1 * one.std()
@@ -110,13 +130,21 @@ def test_mirror_symmetry(contact):
     shows: 1e-12 of the largest displacement. Mirrored runs differ by 0.4 to 2 times that, by processor and release."""
     one, two = shaken(contact).history, shaken(contact, amplitude=-2.0).history
     last_digit = shaken(contact, amplitude=np.nextafter(2.0, 3.0)).history
-    round_off = max(float(np.abs(one[name] - last_digit[name]).max()) for name in displacements(one))
+    round_off = max(
+        float(np.abs(one[name] - last_digit[name]).max()) for name in displacements(one)
+    )
     assert 0.0 < round_off < 1e-11 * largest(one)
     image = {"1": "7", "7": "1", "4": "4", "10": "16", "16": "10", "13": "19", "19": "13"}
     for label, other in image.items():
         for end in ("", "_soil"):
-            off = np.abs(np.array([one[f"u_x_{label}{end}"] + two[f"u_x_{other}{end}"],
-                                   one[f"u_y_{label}{end}"] - two[f"u_y_{other}{end}"]]))
+            off = np.abs(
+                np.array(
+                    [
+                        one[f"u_x_{label}{end}"] + two[f"u_x_{other}{end}"],
+                        one[f"u_y_{label}{end}"] - two[f"u_y_{other}{end}"],
+                    ]
+                )
+            )
             assert off.max() < 8.0 * round_off
 
 
@@ -168,7 +196,9 @@ def test_frame_invariance(friction, excitation):
     for column in ("pressure", "traction_t", "gap") if friction else ("pressure", "gap"):
         there, here = np.asarray(relative[column]), np.asarray(absolute[column])
         assert np.abs(there - here).max() < 1e-8 * np.abs(there).max(), column
-    assert np.ptp(absolute["u_x_1"]) > 3.0 * np.ptp(relative["u_x_1"])  # the ground's own motion is in it
+    assert np.ptp(absolute["u_x_1"]) > 3.0 * np.ptp(
+        relative["u_x_1"]
+    )  # the ground's own motion is in it
 
 
 @pytest.mark.parametrize("friction", [None, FRICTION], ids=["sliding", "rubbing"])

@@ -19,17 +19,30 @@ from vi_contact.engineering.checks.racking_ratio import racking_ratio
 from vi_contact.meshes.cut import Welded
 
 pytestmark = pytest.mark.serial
-CONCRETE, SOIL = LinearElastic(E=25e9, nu=0.2, rho=2400.0), LinearElastic(E=100e6, nu=0.3, rho=1900.0)
+CONCRETE, SOIL = (
+    LinearElastic(E=25e9, nu=0.2, rho=2400.0),
+    LinearElastic(E=100e6, nu=0.3, rho=1900.0),
+)
 INNER, OUTER, FAR = 2.85, 3.15, 60.0
 FINE, COARSE = (144, 8, 56), (48, 3, 24)
 
 
-def sheared(slip: bool, divisions: tuple[int, int, int], *, pressure: float = 0.0, held: bool = True,
-            gamma: float = GAMMA) -> tuple[ContactProblem, State]:
+def sheared(
+    slip: bool,
+    divisions: tuple[int, int, int],
+    *,
+    pressure: float = 0.0,
+    held: bool = True,
+    gamma: float = GAMMA,
+) -> tuple[ContactProblem, State]:
     """The tunnel in ground that is stretched along x and pressed along y by gamma/2, under a pressure beforehand."""
     rings: Any = Rings(INNER, OUTER, FAR, divisions)
-    mesh, tags = fem.build_mesh(rings if slip else Welded(rings, "lining_out", "soil_in"), MPI.COMM_SELF)
-    shrunk = -pressure / (2.0 * (SOIL.lame_lambda + SOIL.shear_modulus))  # strain of the ground without the tunnel
+    mesh, tags = fem.build_mesh(
+        rings if slip else Welded(rings, "lining_out", "soil_in"), MPI.COMM_SELF
+    )
+    shrunk = -pressure / (
+        2.0 * (SOIL.lame_lambda + SOIL.shear_modulus)
+    )  # strain of the ground without the tunnel
     motion = np.array([shrunk + 0.5 * gamma, shrunk - 0.5 * gamma])
     prescribed = [fem.Prescribed(tags["soil_out"], lambda x, t: motion * x)]
     for body in ("lining", "soil"):
@@ -57,12 +70,16 @@ def test_tunnel_in_sheared_ground(slip: bool, published: float | None):
     changed = diameter_change(problem, state)
     assert changed == pytest.approx(exact.diameter_change(GAMMA), rel=0.01)
     coarse = diameter_change(*sheared(slip, COARSE))
-    assert abs(changed / exact.diameter_change(GAMMA) - 1) < 0.5 * abs(coarse / exact.diameter_change(GAMMA) - 1)
+    assert abs(changed / exact.diameter_change(GAMMA) - 1) < 0.5 * abs(
+        coarse / exact.diameter_change(GAMMA) - 1
+    )
     if published is not None:
         assert changed == pytest.approx(published, rel=0.06)
         angle = np.arctan2(problem.surface.points[:, 1], problem.surface.points[:, 0])
         pressure = state.r_n / problem.surface.weights
-        assert np.abs(pressure + exact.pressure(GAMMA) * np.cos(2 * angle)).max() < 0.03 * exact.pressure(GAMMA)
+        assert np.abs(
+            pressure + exact.pressure(GAMMA) * np.cos(2 * angle)
+        ).max() < 0.03 * exact.pressure(GAMMA)
 
 
 def test_tunnel_under_pressure_keeps_contact():

@@ -63,7 +63,10 @@ def graded(h: float, *, side: float = 1.0) -> BlockMesh:
     y = y if side > 0.0 else -y[::-1]
 
     def placed(points: Array) -> Array:
-        axes = [np.interp(points[:, i], np.linspace(0.0, 1.0, len(nodes)), nodes) for i, nodes in enumerate((x, y))]
+        axes = [
+            np.interp(points[:, i], np.linspace(0.0, 1.0, len(nodes)), nodes)
+            for i, nodes in enumerate((x, y))
+        ]
         return np.column_stack(axes)
 
     return BlockMesh(lengths=(1.0, 1.0), divisions=(len(x) - 1, len(y) - 1), deform=placed)
@@ -91,14 +94,22 @@ def sheared(history: History, *, comm: Any = COMM) -> ContactProblem:
     """The block under P, without friction, on a rigid parabola; its tangential load is history(t) mu P."""
     mesh, tags = build_mesh(graded(H), comm)
     system = assemble(mesh, material(1), loads=tractions(tags, history))
-    return ContactProblem(system, contact_surface(system, tags["bottom"], obstacle=AnalyticGap(parabola)))
+    return ContactProblem(
+        system, contact_surface(system, tags["bottom"], obstacle=AnalyticGap(parabola))
+    )
 
 
 def mirrored_pair(history: History, *, h: float = H, comm: Any = COMM) -> ContactProblem:
     """The block on its mirror image; their gap stands for the curved sides."""
     bodies = {"upper": 1.0, "lower": -1.0}
-    mesh, tags = build_mesh(Blocks({name: graded(h, side=side) for name, side in bodies.items()}), comm)
-    loads = [one for name, side in bodies.items() for one in tractions(tags, history, body=f"{name}_", side=side)]
+    mesh, tags = build_mesh(
+        Blocks({name: graded(h, side=side) for name, side in bodies.items()}), comm
+    )
+    loads = [
+        one
+        for name, side in bodies.items()
+        for one in tractions(tags, history, body=f"{name}_", side=side)
+    ]
     system = assemble(mesh, material(2), loads=loads)
     flat = contact_pair(system, tags["upper_bottom"], tags["lower_top"])
     return ContactProblem(system, replace(flat, gap0=parabola(flat.points)))
@@ -165,7 +176,11 @@ def check_first_loading(found: Contact, share: float, h: float = H) -> None:
     """c to h on both sides, slip along Q on both rings, Σ r_t = Q and Σ r_n = P to 1e-9 (asked: 1e-6)."""
     stick, slip, c = found.sticking(), found.slips(1.0), A * np.sqrt(1.0 - share)
     assert abs(stick[0] + c) < h and abs(stick[-1] - c) < h
-    assert len(stick) + len(slip) == np.sum(found.r_n > 0.0) and slip[0] < stick[0] and slip[-1] > stick[-1]
+    assert (
+        len(stick) + len(slip) == np.sum(found.r_n > 0.0)
+        and slip[0] < stick[0]
+        and slip[-1] > stick[-1]
+    )
     assert found.r_t.sum() == pytest.approx(share * MU * HERTZ.force, rel=1e-9)
     assert found.r_n.sum() == pytest.approx(HERTZ.force, rel=1e-9)
 
@@ -205,7 +220,9 @@ def test_v2_4_mirrored_pair():
             check_first_loading(contact, share, h)
             assert np.abs(contact.r_n - found[0].r_n).max() < CERTIFIED
             assert np.abs(contact.r_t - contact.r_t[::-1]).max() < CERTIFIED
-        errors.append([shear_error(contact, share) for share, contact in zip(SHARES, found, strict=True)])
+        errors.append(
+            [shear_error(contact, share) for share, contact in zip(SHARES, found, strict=True)]
+        )
     assert max(errors[0]) < 0.05 and max(errors[1]) < 0.02
     assert np.mean(errors[1]) < 0.5 * np.mean(errors[0])
 
@@ -244,20 +261,27 @@ def test_v2_4_one_body():
     inner = np.abs(found[0].x) < A - 1.5 * H
     for share, contact in zip(SHARES, found, strict=True):
         check_first_loading(contact, share)
-        assert np.abs(contact.shear - exact_shear(contact.x, share))[inner].max() < 0.04 * MU * HERTZ.peak
-        assert np.abs(contact.r_n / contact.weights - HERTZ.pressure(contact.x))[inner].max() < 0.03 * HERTZ.peak
+        assert (
+            np.abs(contact.shear - exact_shear(contact.x, share))[inner].max()
+            < 0.04 * MU * HERTZ.peak
+        )
+        assert (
+            np.abs(contact.r_n / contact.weights - HERTZ.pressure(contact.x))[inner].max()
+            < 0.03 * HERTZ.peak
+        )
     once = stages(sheared(growing_load), [SHARES[-1]])[0]
     assert np.abs(once.r_t - found[-1].r_t).max() < CERTIFIED
 
 
 @pytest.mark.serial
 def test_v2_4_one_body_reversed():
-    """Turned from Q* to -Q* nothing is left of the first way: the mirror image, to 1e-9 P. Back at Q* the loop closes.
-    """
+    """Turned from Q* to -Q* nothing is left of the first way: the mirror image, to 1e-9 P. Back at Q* the loop closes."""
     found = stages(sheared(cyclic_load), range(1, 7))
     there, turned_round, again = found[0], found[3], found[5]
     for contact, sign in ((turned_round, -1.0), (again, 1.0)):
-        r_n, r_t = (contact.r_n[::-1], contact.r_t[::-1]) if sign < 0.0 else (contact.r_n, contact.r_t)
+        r_n, r_t = (
+            (contact.r_n[::-1], contact.r_t[::-1]) if sign < 0.0 else (contact.r_n, contact.r_t)
+        )
         assert np.abs(sign * r_t - there.r_t).max() < CERTIFIED
         assert np.abs(r_n - there.r_n).max() < CERTIFIED
     assert len(found[1].slips(-1.0)) > 0 and len(found[1].slips(1.0)) == 0
@@ -266,7 +290,9 @@ def test_v2_4_one_body_reversed():
 @pytest.mark.parametrize("problem", [sheared, mirrored_pair])
 def test_v2_4_ranks_agree(problem):
     """All ranks together and each alone: nodal forces to 1e-9 P."""
-    together, alone = (stages(problem(growing_load, comm=comm), SHARES[1:3]) for comm in (COMM, MPI.COMM_SELF))
+    together, alone = (
+        stages(problem(growing_load, comm=comm), SHARES[1:3]) for comm in (COMM, MPI.COMM_SELF)
+    )
     for one, other in zip(together, alone, strict=True):
         assert np.abs(one.r_n - other.r_n).max() < CERTIFIED
         assert np.abs(one.r_t - other.r_t).max() < CERTIFIED

@@ -41,7 +41,9 @@ T_END = 0.02
 LOAD = 4.0e6 * np.tanh((20.0 / 15.0) ** 2)  # at the end [N/m]
 ROUGH = vc.Coulomb(0.75)
 LAWS = {"smooth": vc.Frictionless(), "rough": ROUGH}
-cases = pytest.mark.parametrize("law, scheme", [("smooth", vc.Midpoint()), ("rough", None)], ids=["smooth", "rough"])
+cases = pytest.mark.parametrize(
+    "law, scheme", [("smooth", vc.Midpoint()), ("rough", None)], ids=["smooth", "rough"]
+)
 laws = pytest.mark.parametrize("law", LAWS)
 
 
@@ -50,7 +52,9 @@ def test_certificates_and_ledger(law, scheme):
     """V9.7: every step certified to 1e-9, the ledger closed to 1e-10; what is put in is more than what is stored by
     what friction takes."""
     problem = build(EMBEDDED, COMM).problem(friction=LAWS[law])
-    solution = vc.simulate(problem, scheme=scheme, dt=2.5e-4, t_end=T_END, progress=False, record=(vc.Energy(),))
+    solution = vc.simulate(
+        problem, scheme=scheme, dt=2.5e-4, t_end=T_END, progress=False, record=(vc.Energy(),)
+    )
     assert 0.0 < solution.facts["worst_certificate"] <= 1e-9
     assert 0.0 < solution.facts["energy_defect"] <= 1e-10
     history = solution.history
@@ -84,7 +88,9 @@ def test_action_is_reaction(law, scheme):
         base.append(dt * inner)
         if law == "smooth":
             size = 4.0e6 * dt
-            assert box == pytest.approx(-dt * (balance.r_n @ problem.surface.normals), abs=1e-12 * size)
+            assert box == pytest.approx(
+                -dt * (balance.r_n @ problem.surface.normals), abs=1e-12 * size
+            )
     on_box, on_block = np.array(impulses).transpose(1, 0, 2)
     size = np.abs(on_box).max()
     assert np.abs(on_box + on_block).max() < 1e-12 * size
@@ -102,15 +108,24 @@ class Whole:
     def build(self, gmsh: Any) -> None:
         n = self.embedded.box.cells
         box = arrays_of(BlockMesh(lengths=(1.0, 1.0), divisions=(n, n), corner=(-0.5, -0.5)))
-        block = arrays_of(BlockMesh(lengths=(3.0, 2.0), divisions=(3 * n, 2 * n), corner=(-1.5, -2.0)))
+        block = arrays_of(
+            BlockMesh(lengths=(3.0, 2.0), divisions=(3 * n, 2 * n), corner=(-1.5, -2.0))
+        )
         x, y = block.points[block.cells].mean(axis=1).T
         kept = block.cells[(np.abs(x) > 0.5) | (y < -0.5)]
         used, cells = np.unique(kept, return_inverse=True)
         cells = np.concatenate([box.cells, len(box.points) + cells.reshape(kept.shape)])
         points = np.concatenate([box.points, block.points[used]])
-        add_arrays(gmsh, MeshArrays("quadrilateral", points, cells, *self._groups(points, cells, len(box.cells))))
+        add_arrays(
+            gmsh,
+            MeshArrays(
+                "quadrilateral", points, cells, *self._groups(points, cells, len(box.cells))
+            ),
+        )
 
-    def _groups(self, points: Array, cells: Any, count: int) -> tuple[dict[str, Any], dict[str, Any]]:
+    def _groups(
+        self, points: Array, cells: Any, count: int
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Cells and boundaries by where they are, the first `count` cells being those of the box."""
         inside = np.arange(len(cells)) < count
         sides, owner = cell_sides(cells, "quadrilateral")
@@ -143,7 +158,9 @@ def test_a_welded_interface_is_none(law):
         motion = run(problem, scheme=vc.Midpoint(), dt=2.5e-4, steps=60)
         order = in_order(model.system, EMBEDDED.box.cells)
         points = field(model.system, model.system.u0)[0][order]
-        found.append((points, motion.u[:, order], motion.r_n[:, np.lexsort(model.surface.points.T)]))
+        found.append(
+            (points, motion.u[:, order], motion.r_n[:, np.lexsort(model.surface.points.T)])
+        )
     for welded, whole in zip(*found, strict=True):
         assert welded.shape == whole.shape
         assert np.abs(welded - whole).max() < 1e-10 * np.abs(whole).max()
@@ -178,7 +195,12 @@ def test_friction_takes_energy():
         model = build(EMBEDDED, COMM)
         problem = model.problem(friction=friction)
         solution = vc.simulate(
-            problem, scheme=vc.Midpoint(), dt=2.5e-4, t_end=T_END, progress=False, record=(vc.Energy(), vc.Contact())
+            problem,
+            scheme=vc.Midpoint(),
+            dt=2.5e-4,
+            t_end=T_END,
+            progress=False,
+            record=(vc.Energy(), vc.Contact()),
         )
         histories[law] = solution.history
     smooth, rough = histories["smooth"], histories["rough"]
@@ -189,7 +211,9 @@ def test_friction_takes_energy():
     assert np.diff(rough["loss_friction"]).min() >= 0.0 and not smooth["loss_friction"].any()
     assert rough["friction_force_y"][-1] == pytest.approx(0.11 * LOAD, rel=0.1)
     assert smooth["contact_force_y"][-1] == pytest.approx(LOAD, rel=0.01)
-    assert rough["contact_force_y"][-1] + rough["friction_force_y"][-1] == pytest.approx(LOAD, rel=0.02)
+    assert rough["contact_force_y"][-1] + rough["friction_force_y"][-1] == pytest.approx(
+        LOAD, rel=0.02
+    )
 
 
 @pytest.mark.parametrize(("law", "tolerance"), [("smooth", 5e-3), ("rough", 0.02)])
@@ -201,7 +225,9 @@ def test_slow_limit(law, tolerance):
     ).history
     *_, state = quasi_static(problem, T_END * np.arange(1, 5) / 4, solver=Condensed())
     energy = problem.equations.strain_energy(state.u)
-    assert history["energy_kinetic"][-1] + history["energy_strain"][-1] == pytest.approx(energy, rel=tolerance)
+    assert history["energy_kinetic"][-1] + history["energy_strain"][-1] == pytest.approx(
+        energy, rel=tolerance
+    )
     if law == "smooth":
         assert (state.r_n @ problem.surface.normals)[1] == pytest.approx(-LOAD, rel=1e-9)
 
@@ -212,7 +238,9 @@ def test_stiff_block_and_no_lateral_strain():
     model = build(Embedded(box, block=vc.LinearElastic(E=2.0e14, nu=0.0, rho=2400.0)), COMM)
     problem = model.problem()
     *_, state = quasi_static(problem, [T_END], solver=Condensed())
-    assert problem.equations.strain_energy(state.u) == pytest.approx(LOAD**2 / (2.0 * 2.0e10), rel=3e-4)
+    assert problem.equations.strain_energy(state.u) == pytest.approx(
+        LOAD**2 / (2.0 * 2.0e10), rel=3e-4
+    )
     floor = model.surface.normals[:, 1] < -0.5
     pressure = state.r_n / model.surface.weights / LOAD
     assert pressure[floor] == pytest.approx(1.0, abs=1e-2)
@@ -232,9 +260,15 @@ def test_the_embedded_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFi
     numbers = demo("concrete_in_concrete").main(quick=True, out=shared_tmp, progress=False)
     comm.Barrier()  # rank 0 draws
     for name in LAWS:
-        assert 0.0 < numbers[f"{name}: certificate"] <= 1e-9 and 0.0 < numbers[f"{name}: ledger defect"] <= 1e-10
+        assert (
+            0.0 < numbers[f"{name}: certificate"] <= 1e-9
+            and 0.0 < numbers[f"{name}: ledger defect"] <= 1e-10
+        )
         assert numbers[f"{name}: floor"] + numbers[f"{name}: walls"] == pytest.approx(1.0, abs=0.02)
-    assert numbers["rough: friction"] > 0.0 and numbers["rough: E(20 ms)"] < numbers["smooth: E(20 ms)"]
+    assert (
+        numbers["rough: friction"] > 0.0
+        and numbers["rough: E(20 ms)"] < numbers["smooth: E(20 ms)"]
+    )
     for figure in ("snapshots", "energies"):
         assert (shared_tmp / f"{figure}.png").stat().st_size > 6_000
     assert comm.rank or "shares of load" in capsys.readouterr().out

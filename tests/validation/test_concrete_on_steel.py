@@ -29,7 +29,11 @@ def pressed(box: Square, law: str, scheme: Any, *, dt: float, t_end: float) -> M
     """The history of the box, with the energy."""
     model = build(box, MPI.COMM_WORLD)
     solution = vc.simulate(
-        model.problem(friction=LAWS[law]), scheme=scheme, dt=dt, t_end=t_end, progress=False,
+        model.problem(friction=LAWS[law]),
+        scheme=scheme,
+        dt=dt,
+        t_end=t_end,
+        progress=False,
         record=(vc.Energy(), vc.Contact(), vc.Probe(model.probes())),
     )
     assert 0.0 < solution.facts["worst_certificate"] <= 1e-9
@@ -66,13 +70,17 @@ def quasi_static(history: Mapping[str, Array]) -> None:
     assert plane == pytest.approx(23809.8e6, rel=5e-5) and f == pytest.approx(3.777e6, rel=5e-4)
     assert history["energy"][-1] == pytest.approx(f**2 / (2.0 * plane), rel=1e-3)
     corner = history["u_x_corner"][-1]
-    assert corner == pytest.approx(0.5 * material.nu * (1.0 + material.nu) * f / material.E, rel=1e-3)
+    assert corner == pytest.approx(
+        0.5 * material.nu * (1.0 + material.nu) * f / material.E, rel=1e-3
+    )
     assert corner == pytest.approx(1.9830e-5, rel=0.0, abs=0.5001e-9)
     assert history["contact_resultant"][-1] == pytest.approx(f, rel=1e-3)
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize(("law", "top", "tolerance"), [("smooth", 175.308e-6, 5e-4), ("on steel", 173.75e-6, 5e-3)])
+@pytest.mark.parametrize(
+    ("law", "top", "tolerance"), [("smooth", 175.308e-6, 5e-4), ("on steel", 173.75e-6, 5e-3)]
+)
 def test_space_time_boundary_elements(law, top, tolerance):
     """V7.2 with rho = 2300 kg/m³ at 40 ms against an independent script of space-time boundary elements: displacement
     of the top, static to 0.05 %; with the base sticking, and stress peaks at its ends, to 0.5 %."""
@@ -88,10 +96,16 @@ def test_the_concrete_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFi
     numbers = demo("concrete_on_steel").main(quick=True, out=shared_tmp, progress=False)
     comm.Barrier()  # rank 0 draws
     for name in LAWS:
-        assert 0.0 < numbers[f"{name}: certificate"] <= 1e-9 and 0.0 < numbers[f"{name}: ledger defect"] <= 1e-10
+        assert (
+            0.0 < numbers[f"{name}: certificate"] <= 1e-9
+            and 0.0 < numbers[f"{name}: ledger defect"] <= 1e-10
+        )
         assert numbers[f"{name}: energy"] == pytest.approx(1.0, abs=0.01)
         assert numbers[f"{name}: force"] == pytest.approx(1.0, abs=0.01)
-    assert numbers["smooth: corner"] == pytest.approx(1.0, abs=0.01) and numbers["on steel: corner"] == 0.0
+    assert (
+        numbers["smooth: corner"] == pytest.approx(1.0, abs=0.01)
+        and numbers["on steel: corner"] == 0.0
+    )
     for figure in ("snapshots", "tractions", "energies"):
         assert (shared_tmp / f"{figure}.png").stat().st_size > 6_000
     assert comm.rank or "on steel" in capsys.readouterr().out

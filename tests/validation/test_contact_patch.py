@@ -47,12 +47,17 @@ PLANE = ((2.0, 1.0), (6, 4))
 SPACE = ((2.0, 1.0, 1.5), (3, 2, 3))
 shapes = pytest.mark.parametrize("simplices", [False, True], ids=["tensor", "simplices"])
 dimensions = pytest.mark.parametrize("d", [2, 3])
-solvers = pytest.mark.parametrize("solver", [Condensed(), Volume(method=ReducedNewton())], ids=["condensed", "volume"])
+solvers = pytest.mark.parametrize(
+    "solver", [Condensed(), Volume(method=ReducedNewton())], ids=["condensed", "volume"]
+)
 
 
 def distorted(x: Array) -> Array:
     """Interior nodes pushed about; sides stay where they are, but their nodes slide along them."""
-    bump = np.prod([np.sin(pi * x[:, i] / length) for i, length in enumerate((2.0, 1.0, 1.5)[: x.shape[1]])], axis=0)
+    bump = np.prod(
+        [np.sin(pi * x[:, i] / length) for i, length in enumerate((2.0, 1.0, 1.5)[: x.shape[1]])],
+        axis=0,
+    )
     along = np.zeros_like(x)
     along[:, 0] = 0.05 * np.sin(pi * x[:, 0]) * np.cos(pi * x[:, 1])
     return x + along + 0.06 * bump[:, None]
@@ -84,11 +89,17 @@ def test_v2_1_flat_side(simplices, d, solver):
     3D; pressure p at every node, all to 1e-12.
     """
     lengths, divisions = PLANE if d == 2 else SPACE
-    mesh, tags = block(COMM, lengths=lengths, divisions=divisions, simplices=simplices, deform=distorted)
+    mesh, tags = block(
+        COMM, lengths=lengths, divisions=divisions, simplices=simplices, deform=distorted
+    )
     E, nu = STEEL.E, STEEL.nu
-    down, aside = (P * (1.0 - nu**2) / E, nu * (1.0 + nu) * P / E) if d == 2 else (P / E, nu * P / E)
+    down, aside = (
+        (P * (1.0 - nu**2) / E, nu * (1.0 + nu) * P / E) if d == 2 else (P / E, nu * P / E)
+    )
     strain = np.array([aside, -down, aside])[:d]
-    hold = [Prescribed(tags[side], components=(i,)) for side, i in (("left", 0), ("back", 2))[: d - 1]]
+    hold = [
+        Prescribed(tags[side], components=(i,)) for side, i in (("left", 0), ("back", 2))[: d - 1]
+    ]
     hold.append(held_by(tags, "top", lambda x: x * strain, 1))
     system = assemble(mesh, STEEL, prescribed=hold)
     plane = HalfSpace(point=(0.0,) * d, normal=(0.0, 1.0, 0.0)[:d])
@@ -96,7 +107,10 @@ def test_v2_1_flat_side(simplices, d, solver):
     state, points, values = solved(ContactProblem(system, surface), solver)
     assert relative(values, points * strain) < 1e-12
     assert relative(pressures(surface, state), np.full(surface.total, P)) < 1e-12
-    assert surface.total == np.prod([n + 1 for i, n in enumerate(divisions) if i != 1]) and state.active.all()
+    assert (
+        surface.total == np.prod([n + 1 for i, n in enumerate(divisions) if i != 1])
+        and state.active.all()
+    )
 
 
 @pytest.mark.serial
@@ -109,10 +123,17 @@ def test_v2_1_turned_side(angle, simplices, d, solver):
     left, every other side free: displacements and pressures to 1e-12."""
     lengths, divisions = PLANE if d == 2 else SPACE
     mesh, tags = block(
-        COMM, lengths=lengths, divisions=divisions, simplices=simplices, deform=distorted, angle=angle
+        COMM,
+        lengths=lengths,
+        divisions=divisions,
+        simplices=simplices,
+        deform=distorted,
+        angle=angle,
     )
     E, nu = STEEL.E, STEEL.nu
-    down, aside = (P * (1.0 - nu**2) / E, nu * (1.0 + nu) * P / E) if d == 2 else (P / E, nu * P / E)
+    down, aside = (
+        (P * (1.0 - nu**2) / E, nu * (1.0 + nu) * P / E) if d == 2 else (P / E, nu * P / E)
+    )
 
     def turn(x: Array, angle: float) -> Array:
         return np.column_stack([turned(x[:, :2], angle), x[:, 2:]])
@@ -122,9 +143,14 @@ def test_v2_1_turned_side(angle, simplices, d, solver):
 
     up = turn(np.eye(d)[1:2], angle)[0]
     system = assemble(
-        mesh, STEEL, prescribed=held_by(tags, "left", exact), loads=Traction(tags["top"], tuple(-P * up))
+        mesh,
+        STEEL,
+        prescribed=held_by(tags, "left", exact),
+        loads=Traction(tags["top"], tuple(-P * up)),
     )
-    surface = contact_surface(system, tags["bottom"], obstacle=HalfSpace(point=(0.0,) * d, normal=tuple(up)))
+    surface = contact_surface(
+        system, tags["bottom"], obstacle=HalfSpace(point=(0.0,) * d, normal=tuple(up))
+    )
     state, points, values = solved(ContactProblem(system, surface), solver)
     assert relative(values, exact(points)) < 1e-12
     assert relative(pressures(surface, state), np.full(surface.total, P)) < 1e-12
@@ -140,7 +166,13 @@ def shrunk(x: Array) -> Array:
 
 def pressed_sides(tags: Any, d: int, names: tuple[str, ...]) -> list[Traction]:
     """The pressure p on plane sides."""
-    axes = {"left": (0, -1.0), "right": (0, 1.0), "top": (1, 1.0), "back": (2, -1.0), "front": (2, 1.0)}
+    axes = {
+        "left": (0, -1.0),
+        "right": (0, 1.0),
+        "top": (1, 1.0),
+        "back": (2, -1.0),
+        "front": (2, 1.0),
+    }
     sides = [(tags[name], *axes[name]) for name in names if axes[name][0] < d]
     return [Traction(side, tuple(-P * sign * np.eye(d)[axis])) for side, axis, sign in sides]
 
@@ -175,7 +207,9 @@ def test_v2_1_curved_side(simplices, d, solver):
     r_n / weight is below p by the cosine of half the angle between facets, 2 % on this mesh.
     """
     lengths, divisions = PLANE if d == 2 else SPACE
-    mesh, tags = block(COMM, lengths=lengths, divisions=divisions, simplices=simplices, deform=bulged)
+    mesh, tags = block(
+        COMM, lengths=lengths, divisions=divisions, simplices=simplices, deform=bulged
+    )
     loads = pressed_sides(tags, d, ("right", "top", "back", "front"))
     system = assemble(mesh, STEEL, prescribed=held_by(tags, "left", shrunk), loads=loads)
     surface = contact_surface(system, tags["bottom"], obstacle=Fitted())
@@ -201,7 +235,9 @@ def test_v2_1_forces_of_the_curved_side(simplices, d):
     of the curved side, its ends included, it is a push along the nodal normal. The pushes sum to p times the projected
     area; sideways they balance the plane sides (in 3D front and back differ in area)."""
     lengths, divisions = PLANE if d == 2 else SPACE
-    mesh, tags = block(COMM, lengths=lengths, divisions=divisions, simplices=simplices, deform=bulged)
+    mesh, tags = block(
+        COMM, lengths=lengths, divisions=divisions, simplices=simplices, deform=bulged
+    )
     loads = pressed_sides(tags, d, ("left", "right", "top", "back", "front"))
     system = assemble(mesh, STEEL, loads=loads)
     u = system.space.restrict(shrunk(system.space.points))

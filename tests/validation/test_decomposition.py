@@ -20,8 +20,13 @@ def test_loads_and_reactions_add_up_to_the_step(comm: Any, shared_tmp: Path) -> 
     wall = Wall()
     model = build(wall, comm, base_inertia="catalogue")
     problem = model.problem("b")
-    steps = vc.march(problem, scheme=vc.ZienkiewiczWoodTaylor(phi=0.5), solver=vc.Condensed(), dt=model.time_step(),
-                     steps=30)
+    steps = vc.march(
+        problem,
+        scheme=vc.ZienkiewiczWoodTaylor(phi=0.5),
+        solver=vc.Condensed(),
+        dt=model.time_step(),
+        steps=30,
+    )
     *_, (state, report) = steps
     found = split(problem, report)
     if comm.rank:
@@ -35,4 +40,7 @@ def test_loads_and_reactions_add_up_to_the_step(comm: Any, shared_tmp: Path) -> 
     assert found.forces[:, 0].max() < 0.0  # all points press, towards the wall
     plot_data(wall, {case: CASES[case] for case in "ab"}, shared_tmp / "data.png")
     plot_decomposition(found, wall, shared_tmp / "decomposition.png")
-    assert min((shared_tmp / name).stat().st_size for name in ("data.png", "decomposition.png")) > 20_000
+    assert (
+        min((shared_tmp / name).stat().st_size for name in ("data.png", "decomposition.png"))
+        > 20_000
+    )

@@ -30,18 +30,27 @@ NAMES = ["midpoint", "trapezoidal"]
 N, DT = 100, 5e-3
 
 
-def history(problem: ContactProblem, scheme: Any, *, t_end: float, dt: float = DT, **solver: Any) -> dict[str, Any]:
+def history(
+    problem: ContactProblem, scheme: Any, *, t_end: float, dt: float = DT, **solver: Any
+) -> dict[str, Any]:
     """The history, once every step is certified and the ledger (V9.7) with friction in it closes."""
     found = dict(
         simulate(
-            problem, scheme=scheme, solver=Condensed(**solver), dt=dt, t_end=t_end, record=[Energy(), Contact()]
+            problem,
+            scheme=scheme,
+            solver=Condensed(**solver),
+            dt=dt,
+            t_end=t_end,
+            record=[Energy(), Contact()],
         ).history
     )
     total = found["energy_kinetic"] + found["energy_strain"]
     losses = sum(value for name, value in found.items() if name.startswith("loss_"))
     defect = total + losses - found["work_input"] - total[0]
     way = max(np.abs(found["slip"]).max(), np.abs(found["gap"]).max())
-    assert np.abs(defect).max() <= 1e-11 * total.max() + rounded(problem, way)  # measured: 0.18 of it
+    assert np.abs(defect).max() <= 1e-11 * total.max() + rounded(
+        problem, way
+    )  # measured: 0.18 of it
     assert found["certificate"].max() <= 1e-12
     assert np.diff(found["loss_friction"]).min() >= -1e-14 * total.max()
     return found
@@ -51,7 +60,9 @@ def impulses(found: dict[str, Any], scheme: Any) -> tuple[float, float]:
     """Normal (up) and tangential impulse of the base on the column: means of the step, or the trapezoidal rule."""
     forces = [found["contact_force_y"], found["friction_force_x"]]
     ends = [0.5 * force[0] if isinstance(scheme, Trapezoidal) else 0.0 for force in forces]
-    return tuple(DT * (float(force[1:].sum()) + end) for force, end in zip(forces, ends, strict=True))  # type: ignore
+    return tuple(
+        DT * (float(force[1:].sum()) + end) for force, end in zip(forces, ends, strict=True)
+    )  # type: ignore
 
 
 @pytest.mark.parametrize(("scheme", "mass"), PAIRS, ids=NAMES)
@@ -65,12 +76,16 @@ def test_V15_oblique_impact(scheme: Any, mass: Any) -> None:
     assert normal == pytest.approx(2.0, rel=0.005)
     assert tangential == pytest.approx(-0.6, rel=0.005)
     assert found["loss_friction"][-1] == pytest.approx(exact.friction_work, rel=0.002)
-    assert found["energy_kinetic"][-1] + found["energy_strain"][-1] == pytest.approx(exact.energy, rel=0.005)
+    assert found["energy_kinetic"][-1] + found["energy_strain"][-1] == pytest.approx(
+        exact.energy, rel=0.005
+    )
     inside = (found["t"] > 0.2) & (found["t"] < 1.2)
     slip, t = found["slip"][inside, 0, 0], found["t"][inside]
     assert (slip[-1] - slip[0]) / (t[-1] - t[0]) == pytest.approx(exact.slip_speed, rel=0.01)
     closed = found["active"][:, 0]
-    np.testing.assert_allclose(found["traction_t"][closed, 0, 0], 0.3 * found["pressure"][closed, 0], rtol=1e-12)
+    np.testing.assert_allclose(
+        found["traction_t"][closed, 0, 0], 0.3 * found["pressure"][closed, 0], rtol=1e-12
+    )
 
 
 @pytest.mark.parametrize(("scheme", "mass"), PAIRS, ids=NAMES)
@@ -90,7 +105,9 @@ def test_V15_sticks_under_much_friction(scheme: Any, mass: Any) -> None:
 def test_V16_slides_to_rest(scheme: Any, mass: Any) -> None:
     """V1.6: slip speeds 0.85, 0.55, 0.25 for two seconds each, stick at t = 6 for good; slip 3.3, work 0.495."""
     exact = ShearColumn(height=1.0, material=UNIT, speed=1.0, tau_y=0.15)
-    assert exact.slip_speeds == pytest.approx([0.85, 0.55, 0.25]) and exact.stick_time == pytest.approx(6.0)
+    assert exact.slip_speeds == pytest.approx(
+        [0.85, 0.55, 0.25]
+    ) and exact.stick_time == pytest.approx(6.0)
     found = history(column(N, v0=(1.0, 0.0), friction=Tresca(0.15), mass=mass), scheme, t_end=8.0)
     slip, t = found["slip"][:, 0, 0], found["t"]
     for trip, speed in enumerate(exact.slip_speeds):
@@ -103,7 +120,9 @@ def test_V16_slides_to_rest(scheme: Any, mass: Any) -> None:
         assert creep <= 1e-3 * exact.slip
     assert slip[-1] == pytest.approx(exact.slip, rel=0.001)
     assert found["loss_friction"][-1] == pytest.approx(exact.friction_work, rel=0.001)
-    assert found["energy_kinetic"][-1] + found["energy_strain"][-1] == pytest.approx(exact.energy, abs=3e-4)
+    assert found["energy_kinetic"][-1] + found["energy_strain"][-1] == pytest.approx(
+        exact.energy, abs=3e-4
+    )
 
 
 @pytest.mark.parametrize("method", [NSGS(), FixedPoint()], ids=["nsgs", "fixed point"])

@@ -34,7 +34,12 @@ TAU = MU * P
 LAWS = [Coulomb(MU), Tresca(TAU)]
 BODIES = {
     "quadrilaterals": {"lengths": (1.2, 0.7), "divisions": (6, 4)},
-    "turned triangles": {"lengths": (1.2, 0.7), "divisions": (6, 4), "simplices": True, "angle": 0.4},
+    "turned triangles": {
+        "lengths": (1.2, 0.7),
+        "divisions": (6, 4),
+        "simplices": True,
+        "angle": 0.4,
+    },
     "tetrahedra": {"lengths": (1.2, 0.7, 0.8), "divisions": (3, 3, 2), "simplices": True},
     "P2 triangles": {"lengths": (1.2, 0.7), "divisions": (3, 2), "simplices": True, "degree": 2},
     "Q2 hexahedra": {"lengths": (1.2, 0.7, 0.8), "divisions": (2, 1, 2), "degree": 2},
@@ -54,13 +59,19 @@ def sheared(law: FrictionLaw, body: str, share: float, *, nu: float = 0.0) -> Co
         return (*turned((x, y), angle), *np.zeros(d - 2))
 
     q = share * TAU
-    shear = [(tags["top"], along(q, 0.0)), (tags["right"], along(0.0, q)), (tags["left"], along(0.0, -q))]
+    shear = [
+        (tags["top"], along(q, 0.0)),
+        (tags["right"], along(0.0, q)),
+        (tags["left"], along(0.0, -q)),
+    ]
     loads = [Traction(tags["top"], along(0.0, -P))]
     loads += [Traction(facets, value, history=lambda t: t) for facets, value in shear]
     system = assemble(mesh, LinearElastic(E=E, nu=nu, rho=2000.0), loads=loads, degree=degree)
     assert system.floating
     ground = HalfSpace(point=(0.0,) * d, normal=along(0.0, 1.0))
-    return ContactProblem(system, contact_surface(system, tags["bottom"], obstacle=ground), friction=law)
+    return ContactProblem(
+        system, contact_surface(system, tags["bottom"], obstacle=ground), friction=law
+    )
 
 
 def thrust(problem: ContactProblem, state: State) -> Array:
@@ -93,7 +104,9 @@ def test_v2_7_below_the_threshold_sticks(body, law):
 @bodies
 def test_v2_7_above_the_threshold_has_no_equilibrium(body, law):
     """1.01: refused in one sentence that names the direction in which the block goes off."""
-    with pytest.raises(InputError, match="no static equilibrium: its loads carry it off along ") as refusal:
+    with pytest.raises(
+        InputError, match="no static equilibrium: its loads carry it off along "
+    ) as refusal:
         static_equilibrium(sheared(law, body, 1.01), solver=Condensed(), t=1.0)
     words = str(refusal.value).split("(")[1].split(")")[0]
     way = np.array([float(word) for word in words.split(",")])
@@ -106,7 +119,9 @@ def test_v2_7_above_the_threshold_has_no_equilibrium(body, law):
 def test_v2_7_load_steps_end_where_the_threshold_is(law):
     """Ten steps from 0.91 to 1.0 less 1e-6 of the threshold are equilibria, one with 1e-6 too much is not."""
     below = [*np.linspace(0.91, 0.99, 9), 1.0 - 1e-6]
-    stages = quasi_static(sheared(law, "quadrilaterals", 1.0), [*below, 1.0 + 1e-6], solver=Condensed())
+    stages = quasi_static(
+        sheared(law, "quadrilaterals", 1.0), [*below, 1.0 + 1e-6], solver=Condensed()
+    )
     for share in below:
         state = next(stages)
         assert state.r_t is not None and state.t == share

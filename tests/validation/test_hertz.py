@@ -41,7 +41,9 @@ SETS = {  # modulus E*, radius, force per length, and the published a and p0
 }
 
 
-def computed(name: str, *, per_a: float, simplices: bool = False) -> tuple[Pressed, HertzLine, float]:
+def computed(
+    name: str, *, per_a: float, simplices: bool = False
+) -> tuple[Pressed, HertzLine, float]:
     """(result, exact, h) on cells of a / ``per_a`` under the contact."""
     modulus, radius, force, _, _ = SETS[name]
     exact = HertzLine(force=force, modulus=modulus, radius=radius)
@@ -49,9 +51,13 @@ def computed(name: str, *, per_a: float, simplices: bool = False) -> tuple[Press
     h = a / per_a
     nu = 0.3
     result = pressed_half(
-        COMM, even_then_growing(h, 1.5 * a, 30.0 * a), growing(h, 30.0 * a),
+        COMM,
+        even_then_growing(h, 1.5 * a, 30.0 * a),
+        growing(h, 30.0 * a),
         material=LinearElastic(E=modulus * (1.0 - nu**2), nu=nu, rho=1.0),
-        obstacle=AnalyticGap(lambda points: points[:, 0] ** 2 / (2.0 * radius)), force=force, simplices=simplices,
+        obstacle=AnalyticGap(lambda points: points[:, 0] ** 2 / (2.0 * radius)),
+        force=force,
+        simplices=simplices,
     )
     return result, exact, float(result.x[1])
 
@@ -84,7 +90,10 @@ def test_v2_3_line_contact(name):
 def test_v2_3_pressure_converges_with_h(simplices):
     """L2 error of the pressure: 3.9, 2.0, 1.0 % of its norm at 10, 20, 40 cells across a, order 1 because of the root
     at the edge (2.6, 1.1, 0.4 % on triangles)."""
-    errors = [profile_error(*computed("unit", per_a=n, simplices=simplices)[:2]) for n in (10.0, 20.0, 40.0)]
+    errors = [
+        profile_error(*computed("unit", per_a=n, simplices=simplices)[:2])
+        for n in (10.0, 20.0, 40.0)
+    ]
     assert errors[0] < 0.05 and errors[2] < 0.012
     assert np.all(orders(errors) > 0.9) and (simplices or np.all(orders(errors) < 1.1))
 
@@ -110,10 +119,15 @@ def point_contact(cells: int) -> dict[str, float]:
     a, F = SPHERE.contact_radius, SPHERE.force
     ball = BallMesh(radius=SPHERE.radius, size=a / cells, foot=1.5 * a, eighth=True)
     mesh, tags = build_mesh(ball, COMM)
-    hold = [Prescribed(tags["side_x"], components=(0,)), Prescribed(tags["side_z"], components=(2,))]
+    hold = [
+        Prescribed(tags["side_x"], components=(0,)),
+        Prescribed(tags["side_z"], components=(2,)),
+    ]
     one = assemble(mesh, STEEL, loads=Traction(tags["cut"], (0.0, 1.0, 0.0)))
     cut_area = float(COMM.allreduce(one.load(0.0) @ one.influence[:, 1]))
-    system = assemble(mesh, STEEL, prescribed=hold, loads=Traction(tags["cut"], (0.0, -0.25 * F / cut_area, 0.0)))
+    system = assemble(
+        mesh, STEEL, prescribed=hold, loads=Traction(tags["cut"], (0.0, -0.25 * F / cut_area, 0.0))
+    )
     plane = HalfSpace(point=(0.0, 0.0, 0.0), normal=(0.0, 1.0, 0.0))
     surface = contact_surface(system, tags["foot"], obstacle=plane)
     state = static_equilibrium(ContactProblem(system, surface), solver=Condensed())

@@ -45,7 +45,10 @@ class TwoBalls:
     def build(self, gmsh: Any) -> None:
         one, two = (arrays_from_script(ball) for ball in (self.upper, self.lower))
         count, cells, others = len(one.points), len(one.cells), len(two.cells)
-        bodies = {"upper": np.arange(cells + others) < cells, "lower": np.arange(cells + others) >= cells}
+        bodies = {
+            "upper": np.arange(cells + others) < cells,
+            "lower": np.arange(cells + others) >= cells,
+        }
         facets = {f"upper_{name}": rows for name, rows in one.facet_groups.items()}
         facets |= {f"lower_{name}": rows + count for name, rows in two.facet_groups.items()}
         points = np.concatenate([one.points, two.points * [1.0, -1.0, 1.0]])
@@ -54,22 +57,29 @@ class TwoBalls:
         add_arrays(gmsh, MeshArrays("tetrahedron", points, rows, bodies, facets))
 
 
-def pressed(upper: int, lower: int, *, radius: float = RADIUS, swapped: bool = False) -> dict[str, float]:
+def pressed(
+    upper: int, lower: int, *, radius: float = RADIUS, swapped: bool = False
+) -> dict[str, float]:
     """Relative errors with so many cells in the contact radius; ``radius``: of the lower ball. As in test_hertz.py."""
     exact = HertzPoint(
-        force=FORCE, modulus=contact_modulus(*[(STEEL.E, STEEL.nu)] * 2), radius=1.0 / (1.0 / RADIUS + 1.0 / radius)
+        force=FORCE,
+        modulus=contact_modulus(*[(STEEL.E, STEEL.nu)] * 2),
+        radius=1.0 / (1.0 / RADIUS + 1.0 / radius),
     )
     a = exact.contact_radius
     mesh, tags = build_mesh(
-        TwoBalls(*(
-            BallMesh(radius=R, size=a / cells, foot=foot * a, eighth=True)
-            for R, cells, foot in ((RADIUS, upper, 1.5), (radius, lower, 1.9))
-        )),
+        TwoBalls(
+            *(
+                BallMesh(radius=R, size=a / cells, foot=foot * a, eighth=True)
+                for R, cells, foot in ((RADIUS, upper, 1.5), (radius, lower, 1.9))
+            )
+        ),
         COMM,
     )
     hold = [Prescribed(tags["lower_cut"], components=(1,))] + [
         Prescribed(tags[f"{body}_side_{axis}"], components=(c,))
-        for body in ("upper", "lower") for c, axis in ((0, "x"), (2, "z"))
+        for body in ("upper", "lower")
+        for c, axis in ((0, "x"), (2, "z"))
     ]
     one = assemble(mesh, STEEL, loads=Traction(tags["upper_cut"], (0.0, 1.0, 0.0)))
     area = one.load(0.0) @ one.influence[:, 1]
@@ -80,7 +90,9 @@ def pressed(upper: int, lower: int, *, radius: float = RADIUS, swapped: bool = F
     state = static_equilibrium(ContactProblem(system, surface), solver=Condensed())
     r, w = np.hypot(surface.points[:, 0], surface.points[:, 2]), surface.weights
     expected, found, core = exact.pressure(r), state.r_n / w, r < 0.5 * a
-    assert state.r_n[r > a + 2.0 * a / min(upper, lower)].max(initial=0.0) == 0.0  # swapped, no condition lies there
+    assert (
+        state.r_n[r > a + 2.0 * a / min(upper, lower)].max(initial=0.0) == 0.0
+    )  # swapped, no condition lies there
     return {
         "force": 4.0 * state.r_n @ np.abs(surface.normals[:, 1]) / FORCE - 1.0,
         "peak": (w[core] @ found[core]) / (w[core] @ expected[core]) - 1.0,
@@ -93,14 +105,20 @@ def pressed(upper: int, lower: int, *, radius: float = RADIUS, swapped: bool = F
 def test_v2_3_unequal_spheres(swapped):
     """Radii 8 and 16 mm, 5 cells across a on one side, 4 on the other: peak to 4 %, radius to 2.5 %, force 1e-12."""
     found = pressed(5, 4, radius=2.0 * RADIUS, swapped=swapped)
-    assert abs(found["force"]) < 1e-12 and abs(found["peak"]) < 0.04 and abs(found["radius"]) < 0.025
+    assert (
+        abs(found["force"]) < 1e-12 and abs(found["peak"]) < 0.04 and abs(found["radius"]) < 0.025
+    )
 
 
 def test_v2_3_two_spheres_converge():
     """With 5 and 4, then 10 and 8 cells across a the peak is 2.9 and 0.6 % off, the radius 2.0 and 0.8 %, the nodal
     pressures scatter by 11 and 7 %: as for the sphere on a rigid plane."""
     coarse, fine = pressed(5, 4), pressed(10, 8)
-    for name, bounds in {"peak": (0.032, 0.008), "radius": (0.022, 0.009), "profile": (0.13, 0.08)}.items():
+    for name, bounds in {
+        "peak": (0.032, 0.008),
+        "radius": (0.022, 0.009),
+        "profile": (0.13, 0.08),
+    }.items():
         assert abs(coarse[name]) < bounds[0] and abs(fine[name]) < bounds[1], name
     assert max(abs(found["force"]) for found in (coarse, fine)) < 1e-12
 

@@ -78,12 +78,20 @@ def follow(ball: Ball, steps: int) -> Impact:
         system = report.problem.equations
         defect += abs(energy_balance(report.problem, report.old, report.new, report.balance).defect)
         up = system.M @ system.influence[:, 1] * QUARTERS / model.mass
-        force, mean, second = COMM.allreduce(np.array([state.r_n.sum(), report.balance.r_n.sum(), state.r_n @ r2]))
-        rows.append((
-            state.t, system.algebra.dot(up, state.u) + ball.height, system.algebra.dot(up, state.v), QUARTERS * force,
-            QUARTERS * mean, np.sqrt(2.5 * second / force) if force > 0.0 else 0.0,
-            QUARTERS * (system.kinetic_energy(state.v) + system.strain_energy(state.u)),
-        ))
+        force, mean, second = COMM.allreduce(
+            np.array([state.r_n.sum(), report.balance.r_n.sum(), state.r_n @ r2])
+        )
+        rows.append(
+            (
+                state.t,
+                system.algebra.dot(up, state.u) + ball.height,
+                system.algebra.dot(up, state.v),
+                QUARTERS * force,
+                QUARTERS * mean,
+                np.sqrt(2.5 * second / force) if force > 0.0 else 0.0,
+                QUARTERS * (system.kinetic_energy(state.v) + system.strain_energy(state.u)),
+            )
+        )
     return Impact(model, dt, *np.array(rows).T, QUARTERS * defect)
 
 
@@ -124,7 +132,10 @@ def test_v3_3_converges(coarse: Impact, fine: Impact) -> None:
     for name in ("approach", "force", "force_history"):
         assert abs(fine.errors[name]) <= abs(coarse.errors[name]) * 0.5**0.9, name
     for found in (coarse, fine):
-        assert found.errors["approach"] < 0.0 < found.errors["force"] and found.errors["duration"] < 0.0
+        assert (
+            found.errors["approach"] < 0.0 < found.errors["force"]
+            and found.errors["duration"] < 0.0
+        )
 
 
 @pytest.mark.serial
@@ -145,7 +156,9 @@ def test_v3_3_balances(mesh: str, request: pytest.FixtureRequest) -> None:
     touching = np.flatnonzero(found.force)
     assert np.array_equal(touching, np.arange(touching[0], touching[-1] + 1))
     peak = found.force.argmax()
-    assert np.all(np.diff(found.force[touching[0] : peak]) > 0.0) and np.all(np.diff(found.force[peak:]) <= 0.0)
+    assert np.all(np.diff(found.force[touching[0] : peak]) > 0.0) and np.all(
+        np.diff(found.force[peak:]) <= 0.0
+    )
 
 
 @pytest.mark.serial
@@ -170,8 +183,11 @@ def test_v3_3_course_of_the_theory() -> None:
 
 @pytest.mark.serial
 @pytest.mark.parametrize("friction", [None, Coulomb(0.3)])
-@pytest.mark.parametrize("obstacle", [HalfSpace(point=(0.0, 0.0, 0.0), normal=(0.0, 1.0, 0.0)), Touching()],
-                         ids=["plane", "oblique"])
+@pytest.mark.parametrize(
+    "obstacle",
+    [HalfSpace(point=(0.0, 0.0, 0.0), normal=(0.0, 1.0, 0.0)), Touching()],
+    ids=["plane", "oblique"],
+)
 def test_inertia_of_the_ball_is_kept(obstacle: object, friction: Coulomb | None) -> None:
     """V9.4 on a curved foot: contact directions all along -y, or along normals up to 37 degrees from it. The contact
     unknowns lose their mass; mass, centre of mass and all moments of inertia stay to 1e-12."""
@@ -180,7 +196,11 @@ def test_inertia_of_the_ball_is_kept(obstacle: object, friction: Coulomb | None)
     surface = contact_surface(system, tags["foot"], obstacle=obstacle)
     tilt = np.degrees(np.arccos(-surface.whole().normals[:, 1]))
     assert tilt.max() < 1e-6 if isinstance(obstacle, HalfSpace) else 30.0 < tilt.max() < 40.0
-    plain = ContactProblem(system, surface) if friction is None else ContactProblem(system, surface, friction=friction)
+    plain = (
+        ContactProblem(system, surface)
+        if friction is None
+        else ContactProblem(system, surface, friction=friction)
+    )
     moved = replace(plain, mass=Redistributed())
     before, after = inertia(plain), inertia(moved)
     assert np.abs(after - before).max() <= 1e-12 * np.abs(before).max()

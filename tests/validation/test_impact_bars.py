@@ -30,7 +30,11 @@ from vi_contact.schemes.trapezoidal import Trapezoidal
 
 pytestmark = pytest.mark.slow
 
-BODIES = {"bar": {"dimension": 1}, "strip": {"dimension": 2}, "triangles": {"dimension": 2, "triangles": True}}
+BODIES = {
+    "bar": {"dimension": 1},
+    "strip": {"dimension": 2},
+    "triangles": {"dimension": 2, "triangles": True},
+}
 COURANTS = (1.0, 0.5, 0.1)
 
 
@@ -50,10 +54,14 @@ class History:
         return float(self.mean[inside].sum() * self.dt)
 
 
-def follow(bar: Bar, courant: float, t_end: float, *, scheme: Any = None, mass: Any = None) -> History:
+def follow(
+    bar: Bar, courant: float, t_end: float, *, scheme: Any = None, mass: Any = None
+) -> History:
     """The bar's histories, by the default scheme unless told otherwise."""
     model, dt, rows = build(bar, MPI.COMM_WORLD), bar.time_step(courant), []
-    for state, report in march(model.problem(mass=mass), scheme=scheme, dt=dt, steps=round(t_end / dt)):
+    for state, report in march(
+        model.problem(mass=mass), scheme=scheme, dt=dt, steps=round(t_end / dt)
+    ):
         system, load = report.problem.equations, report.problem.equations.load
         assert report.certificate.worst <= 1e-9
         total = system.kinetic_energy(state.v) + system.strain_energy(state.u)
@@ -67,11 +75,24 @@ def follow(bar: Bar, courant: float, t_end: float, *, scheme: Any = None, mass: 
     return History(t, *(value / bar.section for value in values), dt)
 
 
-@pytest.mark.parametrize("body, courant", [
-    ("strip", 1.0),
-    *(pytest.param(body, courant, marks=pytest.mark.serial)  # one body on two ranks: the others have the same path
-      for body, courant in (("bar", 1.0), ("triangles", 1.0), ("bar", 0.1), ("strip", 0.5), ("triangles", 0.5))),
-])
+@pytest.mark.parametrize(
+    "body, courant",
+    [
+        ("strip", 1.0),
+        *(
+            pytest.param(
+                body, courant, marks=pytest.mark.serial
+            )  # one body on two ranks: the others have the same path
+            for body, courant in (
+                ("bar", 1.0),
+                ("triangles", 1.0),
+                ("bar", 0.1),
+                ("strip", 0.5),
+                ("triangles", 0.5),
+            )
+        ),
+    ],
+)
 def test_thrown_bar(body: str, courant: float) -> None:
     """V1.1: force within 1 % of 300 in the window, contact 2/3 s ± 2 dt, mean rebound 10 ± 2 %, energy within 1 %."""
     found = follow(Bar(ThrownBar(), **BODIES[body]), courant, 1.6)  # type: ignore[arg-type]
@@ -87,7 +108,8 @@ def test_thrown_bar(body: str, courant: float) -> None:
 
 @pytest.mark.serial
 @pytest.mark.parametrize(
-    "body, courant", [(body, 1.0) for body in BODIES] + [("bar", 0.1), ("strip", 0.5), ("triangles", 0.5)]
+    "body, courant",
+    [(body, 1.0) for body in BODIES] + [("bar", 0.1), ("strip", 0.5), ("triangles", 0.5)],
 )
 def test_period_three(body: str, courant: float) -> None:
     """V1.3, four bounces: energy never above 1/8 nor below 98 % of it, force up to 1.8 times the exact one, impulse of
@@ -114,7 +136,9 @@ def test_bouncing_strip(body: str, courant: float, periods: float, floor: float)
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("courant, periods, floor", [(1.0, 10, 0.88), (0.5, 2, 0.992), (0.2, 0.5, 0.9999)])
+@pytest.mark.parametrize(
+    "courant, periods, floor", [(1.0, 10, 0.88), (0.5, 2, 0.992), (0.2, 0.5, 0.9999)]
+)
 def test_bouncing_bar_for_ten_periods(courant: float, periods: int, floor: float) -> None:
     """V1.2: energy >= 0.88 of the first after ten periods, 0.992 after two, 0.9999 after half of one (4000 steps), at
     most 1.001 of it; the foot as the exact bar's in the first period, 1.5 % rms of the height (measured 1.4, 1.1 and
@@ -122,12 +146,16 @@ def test_bouncing_bar_for_ten_periods(courant: float, periods: int, floor: float
     exact, dt = BouncingBar(), courant / 300.0
     problem = bouncing(100, mass=Redistributed())
     lowest, highest, impulse, error = 1.0, 0.0, 0.0, []
-    for report in serial_run(problem, Trapezoidal(), dt=dt, steps=round(periods * exact.period / dt)):
+    for report in serial_run(
+        problem, Trapezoidal(), dt=dt, steps=round(periods * exact.period / dt)
+    ):
         t = report.new.t
         if t < 2.5:
             impulse += dt * float(report.balance.r_n.sum())
         if t < exact.period and report.new.k % round(1.0 / courant) == 0:
-            error.append(-problem.surface.normal_values(report.new.u)[0] - float(exact.displacement(0.0, t)))
+            error.append(
+                -problem.surface.normal_values(report.new.u)[0] - float(exact.displacement(0.0, t))
+            )
         if report.new.k % 100 == 0:
             total = energy(problem, report.new) / 500.0 + 1.0
             lowest, highest = min(lowest, total), max(highest, total)
@@ -145,10 +173,15 @@ def test_code_aster_sdnv100(body: str) -> None:
     bar = Bar(case, **BODIES[body])  # type: ignore[arg-type]
     model, dt = build(bar, MPI.COMM_WORLD), bar.time_step(0.5)
     problem = model.problem()
-    ends = problem.system.space.find_nodes(np.array([model.probes()["foot"], model.probes()["top"]]))
+    ends = problem.system.space.find_nodes(
+        np.array([model.probes()["foot"], model.probes()["top"]])
+    )
     rows = []
     for state, report in march(problem, dt=dt, steps=round(1.2e-4 / dt)):
-        u, v = (problem.system.space.sample(problem.cartesian(x), ends, state.t)[:, -1] for x in (state.u, state.v))
+        u, v = (
+            problem.system.space.sample(problem.cartesian(x), ends, state.t)[:, -1]
+            for x in (state.u, state.v)
+        )
         system = report.problem.equations
         total = system.kinetic_energy(state.v) + system.strain_energy(state.u)
         force = MPI.COMM_WORLD.allreduce(state.r_n.sum())
@@ -158,9 +191,13 @@ def test_code_aster_sdnv100(body: str) -> None:
     assert touching[0] == pytest.approx(2.0e-5, abs=1.001 * dt)
     assert touching[-1] == pytest.approx(1.0e-4, abs=2.001 * dt)
     deepest = np.argmin(np.abs(t - 6.0e-5))
-    assert foot[deepest] == pytest.approx(-2.0e-3, rel=1e-9) and top[deepest] == pytest.approx(-6.0e-3, rel=0.01)
+    assert foot[deepest] == pytest.approx(-2.0e-3, rel=1e-9) and top[deepest] == pytest.approx(
+        -6.0e-3, rel=0.01
+    )
     early, late = t < 5.5e-5, t > 1.03e-4
-    assert np.abs(v_top[early] / -100.0 - 1.0).max() <= 0.01 and v_top[late].mean() == pytest.approx(100.0, rel=0.01)
+    assert np.abs(v_top[early] / -100.0 - 1.0).max() <= 0.01 and v_top[
+        late
+    ].mean() == pytest.approx(100.0, rel=0.01)
     window = (t > 3.2e-5) & (t < 9.0e-5)
     assert np.abs(pressure[window] / 4.0e9 - 1.0).max() <= 0.01
     assert np.abs(total / 8.0e6 - 1.0).max() <= 0.01
@@ -174,7 +211,9 @@ def test_dissipative_schemes_never_gain(scheme: Any, courant: float) -> None:
     first contact."""
     problem = period_three(100, mass=ConsistentMass())
     last, periods = 0.125, 2.0 if courant > 0.1 else 0.7
-    for report in serial_run(problem, scheme, dt=courant / 100.0, steps=round(300 * periods / courant)):
+    for report in serial_run(
+        problem, scheme, dt=courant / 100.0, steps=round(300 * periods / courant)
+    ):
         now = energy(problem, report.new)
         assert now - last <= 1e-11 * 0.125
         last = now
@@ -204,5 +243,11 @@ def test_dissipative_schemes_never_gain_on_a_strip(case: Any, courant: float) ->
 @pytest.mark.serial
 def test_newmark_on_consistent_mass_blows_up_on_a_strip() -> None:
     """Negative test: V1.3 on a strip of triangles, Courant number ½, where not all nodes of the foot act as one."""
-    found = follow(Bar(PeriodicBar(), dimension=2, triangles=True), 0.5, 12.0, scheme=Newmark(), mass=ConsistentMass())
+    found = follow(
+        Bar(PeriodicBar(), dimension=2, triangles=True),
+        0.5,
+        12.0,
+        scheme=Newmark(),
+        mass=ConsistentMass(),
+    )
     assert found.energy[-1] > 10.0 * 0.125

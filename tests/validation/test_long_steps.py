@@ -28,12 +28,18 @@ def run(scheme: Any, dt: Any = DT) -> vc.Solution:
 
 def test_the_scheme_of_the_warning_creates_none(caplog: pytest.LogCaptureFixture) -> None:
     """Where the default, HHT and halved steps warn, certified step by step, the scheme of the sentence creates none."""
-    for scheme, dt in ((vc.Trapezoidal(), DT), (vc.HHT(), DT), (vc.Trapezoidal(), vc.HalvedAtImpact(DT))):
+    for scheme, dt in (
+        (vc.Trapezoidal(), DT),
+        (vc.HHT(), DT),
+        (vc.Trapezoidal(), vc.HalvedAtImpact(DT)),
+    ):
         with caplog.at_level(logging.WARNING, "vi_contact"):
             gained = run(scheme, dt)
         assert gained.facts["energy_created"] > 0.5 and gained.facts["worst_certificate"] < 1e-9
         told = " ".join(gained.summary().split())
-        found = re.search(r"WARNING: contact and time scheme created .* (\w+)\(\), which creates none", told)
+        found = re.search(
+            r"WARNING: contact and time scheme created .* (\w+)\(\), which creates none", told
+        )
         assert found, told
         safe = run(getattr(vc, found[1])())
         energy, work = safe.facts["energy"]["energy_max"], safe.history["work_input"].max()
@@ -45,5 +51,7 @@ def test_the_scheme_of_the_warning_creates_none(caplog: pytest.LogCaptureFixture
 def test_the_table_of_the_page(name: str) -> None:
     """Its first column, steps of 10 ms, in classes: what grows is chaotic, and whether it grows is not."""
     page = (ROOT / "docs" / "guide" / "schemes.md").read_text(encoding="utf-8")
-    row = re.search(rf"^\| {re.escape(name)} \| ([^|]+) \|", page[page.index("| 10 ms (67) |"):], re.MULTILINE)
+    row = re.search(
+        rf"^\| {re.escape(name)} \| ([^|]+) \|", page[page.index("| 10 ms (67) |") :], re.MULTILINE
+    )
     assert row and row[1] == BENCHMARK.told(run(BENCHMARK.SCHEMES[name]).facts["energy_created"])

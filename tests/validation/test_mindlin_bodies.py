@@ -33,7 +33,9 @@ def test_v2_4_closed_form_in_space(share):
         carried += 2.0 * np.pi * float((w * 2.0 * s * r) @ FORM.traction(r, share))
     assert carried == pytest.approx(share * mu_p, rel=1e-5)
     middle = FORM.field(np.array([[0.0, 1e-6, 0.0]]), share)[0]
-    assert middle == pytest.approx([FORM.shift(share), 0.0, 0.0], rel=1e-5, abs=1e-5 * FORM.shift(share))
+    assert middle == pytest.approx(
+        [FORM.shift(share), 0.0, 0.0], rel=1e-5, abs=1e-5 * FORM.shift(share)
+    )
     assert FORM.shift(1e-9) == pytest.approx(1e-9 * mu_p / (4.0 * FORM.G * FORM.a) * 1.0, rel=1e-5)
 
 
@@ -44,8 +46,14 @@ def test_v2_4_displacements_below_tractions():
     pull = np.array([[1.0, 2.0, -0.5]])
 
     def gradient(x):
-        around = [(under_point_loads(x + h * e, np.zeros((1, 2)), pull, G=1.0, nu=nu)
-                   - under_point_loads(x - h * e, np.zeros((1, 2)), pull, G=1.0, nu=nu)) / (2.0 * h) for e in np.eye(3)]
+        around = [
+            (
+                under_point_loads(x + h * e, np.zeros((1, 2)), pull, G=1.0, nu=nu)
+                - under_point_loads(x - h * e, np.zeros((1, 2)), pull, G=1.0, nu=nu)
+            )
+            / (2.0 * h)
+            for e in np.eye(3)
+        ]
         return np.stack(around, axis=-1)
 
     def stress(x):
@@ -54,12 +62,17 @@ def test_v2_4_displacements_below_tractions():
         return g + g.swapaxes(1, 2) + 2.0 * nu / (1.0 - 2.0 * nu) * trace
 
     step = 1e-2
-    balance = sum((stress(point + step * e) - stress(point - step * e))[:, :, i] for i, e in enumerate(np.eye(3)))
+    balance = sum(
+        (stress(point + step * e) - stress(point - step * e))[:, :, i]
+        for i, e in enumerate(np.eye(3))
+    )
     assert np.abs(balance[0] / (2.0 * step)).max() < 1e-3 * np.abs(stress(point)[0]).max()
     assert np.abs(stress(point)[1, :, 1]).max() < 1e-6 * np.abs(stress(point)[1]).max()
     away = np.array([[300.0, 200.0, -100.0]])
     whole = under_hertz(away, 1.0, pull[0], G=1.0, nu=nu)
-    assert np.allclose(whole, under_point_loads(away, np.zeros((1, 2)), pull, G=1.0, nu=nu), rtol=1e-4)
+    assert np.allclose(
+        whole, under_point_loads(away, np.zeros((1, 2)), pull, G=1.0, nu=nu), rtol=1e-4
+    )
 
 
 @pytest.mark.slow

@@ -10,7 +10,16 @@ from functools import cache
 
 import numpy as np
 import pytest
-from fem_problems import Errors, block, field, field_errors, linear, max_over_ranks, orders, plane_strain
+from fem_problems import (
+    Errors,
+    block,
+    field,
+    field_errors,
+    linear,
+    max_over_ranks,
+    orders,
+    plane_strain,
+)
 from mpi4py import MPI
 
 from vi_contact.core.algebra import Array
@@ -29,9 +38,11 @@ SIDES = ("left", "right", "bottom", "top")
 
 def wave(x: Array, t: float, derivative: int = 0) -> Array:
     """u or its first or second time derivative."""
-    sine, cosine = ((np.sin(W * t), np.cos(W * t)), (np.cos(W * t), -np.sin(W * t)), (-np.sin(W * t), -np.cos(W * t)))[
-        derivative
-    ]
+    sine, cosine = (
+        (np.sin(W * t), np.cos(W * t)),
+        (np.cos(W * t), -np.sin(W * t)),
+        (-np.sin(W * t), -np.cos(W * t)),
+    )[derivative]
     first = np.sin(KX * x[:, 0]) * np.cos(KY * x[:, 1]) * sine
     second = np.cos(KX * x[:, 0]) * np.sin(KY * x[:, 1]) * cosine
     return W**derivative * np.column_stack([first, second])
@@ -45,7 +56,10 @@ def body_force(x: Array, t: float) -> Array:
     first = ((lame + 2 * shear) * KX**2 + shear * KY**2 - rho * W**2) * s + mixed * c
     second = ((lame + 2 * shear) * KY**2 + shear * KX**2 - rho * W**2) * c + mixed * s
     return np.column_stack(
-        [first * np.sin(KX * x[:, 0]) * np.cos(KY * x[:, 1]), second * np.cos(KX * x[:, 0]) * np.sin(KY * x[:, 1])]
+        [
+            first * np.sin(KX * x[:, 0]) * np.cos(KY * x[:, 1]),
+            second * np.cos(KX * x[:, 0]) * np.sin(KY * x[:, 1]),
+        ]
     )
 
 
@@ -60,8 +74,12 @@ def test_body_force_solves_the_equation():
         trace = np.trace(gradient, axis1=1, axis2=2)[:, None, None]
         return lame * trace * np.eye(2) + shear * (gradient + gradient.transpose(0, 2, 1))
 
-    divergence = sum((stress(x + step[j])[:, :, j] - stress(x - step[j])[:, :, j]) / (2 * h) for j in range(2))
-    assert body_force(x, t) == pytest.approx(MATERIAL.rho * wave(x, t, 2) - divergence, rel=1e-5, abs=1e-5)
+    divergence = sum(
+        (stress(x + step[j])[:, :, j] - stress(x - step[j])[:, :, j]) / (2 * h) for j in range(2)
+    )
+    assert body_force(x, t) == pytest.approx(
+        MATERIAL.rho * wave(x, t, 2) - divergence, rel=1e-5, abs=1e-5
+    )
 
 
 def discrete(n: int, *, simplices: bool = False) -> SemiDiscreteSystem:
@@ -80,7 +98,11 @@ def discrete(n: int, *, simplices: bool = False) -> SemiDiscreteSystem:
 def final(system: SemiDiscreteSystem, *, dt: float, steps: int, phi: float = 0.5) -> State:
     """The last state."""
     *_, (state, _) = march(
-        linear(system), scheme=ZienkiewiczWoodTaylor(phi=phi), solver=Condensed(), dt=dt, steps=steps
+        linear(system),
+        scheme=ZienkiewiczWoodTaylor(phi=phi),
+        solver=Condensed(),
+        dt=dt,
+        steps=steps,
     )
     return state
 
@@ -94,7 +116,13 @@ def errors(n: int, *, simplices: bool, steps: int) -> tuple[Errors, Errors]:
 
     def against(values: Array) -> Errors:
         return field_errors(
-            points, values, (n, n), lambda x: wave(x, 0.5), lame=lame, shear=shear, simplices=simplices
+            points,
+            values,
+            (n, n),
+            lambda x: wave(x, 0.5),
+            lame=lame,
+            shear=shear,
+            simplices=simplices,
         )
 
     return against(values), against(wave(points, 0.5))
@@ -103,7 +131,9 @@ def errors(n: int, *, simplices: bool, steps: int) -> tuple[Errors, Errors]:
 @pytest.mark.parametrize("simplices", [False, True])
 def test_v8_5_orders_in_space(simplices):
     """n = 4, 8, 16 with dt = h/4: H1 order 1, L2 order 2, and the gradients as good as the interpolant's."""
-    found, best = zip(*[errors(n, simplices=simplices, steps=2 * n) for n in (4, 8, 16)], strict=True)
+    found, best = zip(
+        *[errors(n, simplices=simplices, steps=2 * n) for n in (4, 8, 16)], strict=True
+    )
     assert orders([error.h1 for error in found]) == pytest.approx([1.0, 1.0], abs=0.05)
     assert orders([error.energy for error in found]) == pytest.approx([1.0, 1.0], abs=0.05)
     assert orders([error.l2 for error in found]) == pytest.approx([2.0, 2.0], abs=0.1)
@@ -124,5 +154,8 @@ def test_v8_5_orders_in_time(phi, order):
     steps = (40, 80, 160) if phi == 0.5 else (160, 320, 640)
     found = [final(system, dt=0.5 / n, steps=n, phi=phi) for n in steps]
     for name in "uv":
-        distance = [max_over_ranks(MPI.COMM_WORLD, getattr(one, name) - getattr(exact, name)) for one in found]
+        distance = [
+            max_over_ranks(MPI.COMM_WORLD, getattr(one, name) - getattr(exact, name))
+            for one in found
+        ]
         assert orders(distance) == pytest.approx([order, order], abs=0.1), name

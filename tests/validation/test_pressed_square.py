@@ -21,7 +21,9 @@ from vi_contact.plots.deformed import read_frames
 pytestmark = pytest.mark.slow
 
 LAWS = {
-    "none": vc.Frictionless(), "tresca": vc.Tresca(0.05), "coulomb": vc.Coulomb(0.5),
+    "none": vc.Frictionless(),
+    "tresca": vc.Tresca(0.05),
+    "coulomb": vc.Coulomb(0.5),
     "weak tresca": vc.Tresca(0.005),
 }
 one_rank = pytest.mark.serial  # whole marches, slow on several ranks: these have the reference runs
@@ -39,8 +41,12 @@ def run(law: str, scheme: str, cells: int = 20, confined: bool = False) -> dict[
     """The history to t = 6 with dt = h, with the energy; certified and with a closed ledger."""
     square = model(cells, confined)
     solution = vc.simulate(
-        square.problem(friction=LAWS[law]), scheme=SCHEMES[scheme], dt=square.square.time_step, t_end=6.0,
-        record=(vc.Energy(), vc.Contact(), vc.Probe(square.probes())), progress=False,
+        square.problem(friction=LAWS[law]),
+        scheme=SCHEMES[scheme],
+        dt=square.square.time_step,
+        t_end=6.0,
+        record=(vc.Energy(), vc.Contact(), vc.Probe(square.probes())),
+        progress=False,
     )
     assert 0.0 < solution.facts["worst_certificate"] <= 1e-9
     assert 0.0 < solution.facts["energy_defect"] <= 1e-10
@@ -56,27 +62,39 @@ def at(history: dict[str, Array], column: str, *times: float) -> Array:
 
 REFERENCE: dict[str, dict[str, tuple[float, ...]]] = {
     "none": {
-        "energy": (0.00532, 0.01137, 0.02328, 0.01976, 0.00841, 0.01163), "loss_friction": (0.0, 0.0),
-        "u_y_top": (-0.1075, -0.2339, -0.2236), "u_x_corner": (0.0771, -0.0056), "force": (0.150,),
+        "energy": (0.00532, 0.01137, 0.02328, 0.01976, 0.00841, 0.01163),
+        "loss_friction": (0.0, 0.0),
+        "u_y_top": (-0.1075, -0.2339, -0.2236),
+        "u_x_corner": (0.0771, -0.0056),
+        "force": (0.150,),
     },
     "tresca": {
-        "energy": (0.00532, 0.01137, 0.02301, 0.01781, 0.00569, 0.01394), "loss_friction": (0.00026, 0.00068),
-        "u_y_top": (-0.1075, -0.2338, -0.2050), "u_x_corner": (0.0236, 0.0294), "force": (0.158,),
+        "energy": (0.00532, 0.01137, 0.02301, 0.01781, 0.00569, 0.01394),
+        "loss_friction": (0.00026, 0.00068),
+        "u_y_top": (-0.1075, -0.2338, -0.2050),
+        "u_x_corner": (0.0236, 0.0294),
+        "force": (0.158,),
     },
     "coulomb": {
-        "energy": (0.00532, 0.01137, 0.02327, 0.01801, 0.00542, 0.01458), "loss_friction": (0.0, 0.00005),
-        "u_y_top": (-0.1075, -0.2338, -0.2010), "u_x_corner": (0.0001, 0.0005), "force": (0.160,),
+        "energy": (0.00532, 0.01137, 0.02327, 0.01801, 0.00542, 0.01458),
+        "loss_friction": (0.0, 0.00005),
+        "u_y_top": (-0.1075, -0.2338, -0.2010),
+        "u_x_corner": (0.0001, 0.0005),
+        "force": (0.160,),
     },
 }
 TIMES = {
-    "energy": (0.5, 1.0, 2.0, 3.0, 4.0, 6.0), "loss_friction": (2.0, 6.0), "u_y_top": (1.0, 2.0, 3.0),
+    "energy": (0.5, 1.0, 2.0, 3.0, 4.0, 6.0),
+    "loss_friction": (2.0, 6.0),
+    "u_y_top": (1.0, 2.0, 3.0),
     "u_x_corner": (2.0, 4.0),
 }
 LAST_DIGIT = {"energy": 1e-5, "loss_friction": 1e-5, "u_y_top": 1e-4, "u_x_corner": 1e-4}
 
 
 @pytest.mark.parametrize(
-    "law", [pytest.param(law, marks=() if law == "coulomb" else one_rank) for law in RUBBING])
+    "law", [pytest.param(law, marks=() if law == "coulomb" else one_rank) for law in RUBBING]
+)
 def test_midpoint_on_the_reference_mesh(law):
     """V7.1, 20 x 20 cells, consistent mass: energies, work of friction, displacements and the mean force of the steps
     between t = 1.2 and 1.8 to every printed digit."""
@@ -84,7 +102,9 @@ def test_midpoint_on_the_reference_mesh(law):
     for column, times in TIMES.items():
         expected = pytest.approx(reference[column], rel=0.0, abs=0.5001 * LAST_DIGIT[column])
         assert at(history, column, *times) == expected, column
-    force = history["contact_resultant"][25:37].mean()  # means of the steps that end at 1.25 ... 1.8
+    force = history["contact_resultant"][
+        25:37
+    ].mean()  # means of the steps that end at 1.25 ... 1.8
     assert force == pytest.approx(reference["force"][0], rel=0.0, abs=0.5001e-3)
 
 
@@ -113,7 +133,9 @@ def test_friction_takes_energy_for_a_while(scheme):
         assert np.all(rubbed["energy"][between] < free["energy"][between])
         assert rubbed["energy"][-1] > free["energy"][-1]
         assert np.diff(rubbed["loss_friction"]).min() >= 0.0 < rubbed["loss_friction"][-1]
-    corner = [np.max(np.abs(run(law, scheme)["u_x_corner"][: len(between) * 4 // 6])) for law in RUBBING]
+    corner = [
+        np.max(np.abs(run(law, scheme)["u_x_corner"][: len(between) * 4 // 6])) for law in RUBBING
+    ]
     assert corner[2] < 0.02 * corner[0] and corner[1] < 0.5 * corner[0]
 
 
@@ -130,11 +152,15 @@ def test_confined_square(scheme):
 
 
 @one_rank
-@pytest.mark.parametrize(("scheme", "law"), [("midpoint", "none"), ("default", "none"), ("default", "coulomb")])
+@pytest.mark.parametrize(
+    ("scheme", "law"), [("midpoint", "none"), ("default", "none"), ("default", "coulomb")]
+)
 def test_energies_converge_with_the_mesh(scheme, law):
     """V7.1: the mean square over time of E_N - E_2N, N = 10, 20, halves with h: order 1 +- 0.3, as a front has it."""
     energies = [run(law, scheme, cells)["energy"][:: cells // 10] for cells in (10, 20, 40)]
-    coarse, fine = (np.sqrt(np.mean((a - b) ** 2)) for a, b in zip(energies, energies[1:], strict=False))
+    coarse, fine = (
+        np.sqrt(np.mean((a - b) ** 2)) for a, b in zip(energies, energies[1:], strict=False)
+    )
     assert 0.7 < np.log2(coarse / fine) < 1.3
 
 
@@ -167,7 +193,10 @@ def test_the_square_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixt
     named = sorted({name.split(":")[0] for name in numbers})
     assert len(named) == 3
     for name in named:
-        assert 0.0 < numbers[f"{name}: certificate"] <= 1e-9 and 0.0 < numbers[f"{name}: ledger defect"] <= 1e-10
+        assert (
+            0.0 < numbers[f"{name}: certificate"] <= 1e-9
+            and 0.0 < numbers[f"{name}: ledger defect"] <= 1e-10
+        )
         assert numbers[f"{name}: E(1)"] == pytest.approx(0.0114, rel=0.02)
         assert (numbers[f"{name}: friction"] > 0.0) == ("no friction" not in name)
     for figure in ("snapshots", "tractions", "energies"):

@@ -28,7 +28,9 @@ def computed(cells: int) -> Pressed:
     h, size = a / cells, 20.0 * a
     x = np.append(a - growing(h, a)[::-1], a + growing(h, size - a)[1:])
     flat = AnalyticGap(lambda points: np.where(points[:, 0] <= a * (1.0 + 1e-9), 0.0, a))
-    return pressed_half(COMM, x, growing(h, size), material=RUBBER, obstacle=flat, force=PUNCH.force)
+    return pressed_half(
+        COMM, x, growing(h, size), material=RUBBER, obstacle=flat, force=PUNCH.force
+    )
 
 
 def near_edge(result: Pressed, cells: int) -> tuple[Array, Mask]:
@@ -46,7 +48,9 @@ def test_v2_5_flat_punch():
     assert 2.0 * result.r_n.sum() == pytest.approx(PUNCH.force, rel=1e-9)
     assert result.pressure[0] == pytest.approx(float(PUNCH.pressure(0.0)), rel=5e-3)
     half = 0.5 * PUNCH.half_width
-    assert np.interp(half, result.x, result.pressure) == pytest.approx(float(PUNCH.pressure(half)), rel=5e-3)
+    assert np.interp(half, result.x, result.pressure) == pytest.approx(
+        float(PUNCH.pressure(half)), rel=5e-3
+    )
     assert fit.sum() >= 10
     slope = np.polyfit(np.log(distance[fit]), np.log(result.pressure[fit]), 1)[0]
     assert slope == pytest.approx(-0.5, abs=0.05)

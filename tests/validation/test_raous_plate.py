@@ -38,14 +38,24 @@ CONDENSED = Condensed()
 SIDE = 0.04
 POINTS = (0.0, 1.25e-3, 5.0e-3, 7.5e-3, 11.25e-3)
 PUBLISHED = (2.86e-5, 2.72e-5, 2.28e-5, 1.98e-5, 1.50e-5)  # u_x [m], to 5 %
-REFERENCE = (2.8459438e-5, 2.7079236e-5, 2.2740255e-5, 1.9727067e-5, 1.5364159e-5)  # u_x on 32 x 10 Q1
+REFERENCE = (
+    2.8459438e-5,
+    2.7079236e-5,
+    2.2740255e-5,
+    1.9727067e-5,
+    1.5364159e-5,
+)  # u_x on 32 x 10 Q1
 
 
-def plate(comm: Any = COMM, *, divisions: tuple[int, int] = (32, 10), simplices: bool = False) -> ContactProblem:
+def plate(
+    comm: Any = COMM, *, divisions: tuple[int, int] = (32, 10), simplices: bool = False
+) -> ContactProblem:
     """The loads grow with t and are complete at t = 1."""
     mesh, tags = block(comm, lengths=(SIDE, SIDE), divisions=divisions, simplices=simplices)
     system = assemble(
-        mesh, LinearElastic(E=1.3e11, nu=0.2, rho=7800.0), prescribed=Prescribed(tags["right"], components=(0,)),
+        mesh,
+        LinearElastic(E=1.3e11, nu=0.2, rho=7800.0),
+        prescribed=Prescribed(tags["right"], components=(0,)),
         loads=[
             Traction(tags["left"], (15.0e7, 0.0), history=lambda t: t),
             Traction(tags["top"], (0.0, -5.0e7), history=lambda t: t),
@@ -69,8 +79,13 @@ class Base:
         surface = problem.surface
         order = np.argsort(surface.points[:, 0])
         assert state.r_t is not None
-        columns = (surface.points[:, 0], surface.tangential_values(state.u)[:, 0], -surface.normal_values(state.u),
-                   state.r_n, state.r_t[:, 0])
+        columns = (
+            surface.points[:, 0],
+            surface.tangential_values(state.u)[:, 0],
+            -surface.normal_values(state.u),
+            state.r_n,
+            state.r_t[:, 0],
+        )
         return cls(*(column[order] for column in columns))
 
     def at_points(self) -> Array:
@@ -83,7 +98,9 @@ def computed(*, solver: Solver = CONDENSED, **spec: Any) -> Base:
     return Base.of(problem, static_equilibrium(problem, solver=solver, t=1.0))
 
 
-@pytest.mark.parametrize("method", [FrictionNewton(), FixedPoint()], ids=["FrictionNewton", "FixedPoint"])
+@pytest.mark.parametrize(
+    "method", [FrictionNewton(), FixedPoint()], ids=["FrictionNewton", "FixedPoint"]
+)
 def test_v2_6_digits(method):
     """All printed digits of u_x at A ... E, u_y(A), the sums of the reactions and that of the last free point.
 
@@ -103,9 +120,15 @@ def test_v2_6_zones():
     base = computed()
     mm = 1e3 * base.x
     opened, slipping, sticking = mm < 3.7, (mm > 3.7) & (mm < 31.2), mm > 31.2
-    assert np.all(base.u_y[opened] > 0.0) and not base.r_n[opened].any() and not base.r_t[opened].any()
-    assert np.all(base.u_x[slipping] > 0.0) and base.r_t[slipping] == pytest.approx(base.r_n[slipping], rel=1e-14)
-    assert not base.u_x[sticking].any() and np.all(np.abs(base.r_t[sticking]) < 0.6 * base.r_n[sticking])
+    assert (
+        np.all(base.u_y[opened] > 0.0) and not base.r_n[opened].any() and not base.r_t[opened].any()
+    )
+    assert np.all(base.u_x[slipping] > 0.0) and base.r_t[slipping] == pytest.approx(
+        base.r_n[slipping], rel=1e-14
+    )
+    assert not base.u_x[sticking].any() and np.all(
+        np.abs(base.r_t[sticking]) < 0.6 * base.r_n[sticking]
+    )
     assert not base.u_y[~opened].any() and np.all(base.r_n[~opened] > 0.0)
     assert base.r_n.sum() == pytest.approx(5.0e7 * SIDE, rel=1e-10)
 
@@ -143,20 +166,27 @@ def test_v2_6_unloading_is_another_path():
         found[steps] = half.u_x[0] / there.u_x[0]
         assert not free.r_n.any() and np.abs(free.u_x).max() < 1e-9 * there.u_x[0]
         assert there.u_x[0] == pytest.approx(REFERENCE[0], rel=3e-8)
-    assert found[10] == pytest.approx(0.93, abs=0.005) and found[5] == pytest.approx(found[10], rel=1e-3)
+    assert found[10] == pytest.approx(0.93, abs=0.005) and found[5] == pytest.approx(
+        found[10], rel=1e-3
+    )
     smooth = released(Frictionless())
-    there, half = (smooth.surface.tangential_values(state.u)[:, 0].max()
-                   for state in quasi_static(smooth, [1.0, 1.5], solver=Condensed()))
+    there, half = (
+        smooth.surface.tangential_values(state.u)[:, 0].max()
+        for state in quasi_static(smooth, [1.0, 1.5], solver=Condensed())
+    )
     assert half == pytest.approx(0.5 * there, rel=1e-9)
 
 
 @pytest.mark.parametrize(
-    ("divisions", "simplices"), [((32, 32), False), ((64, 20), False), ((64, 64), True), ((48, 40), False)],
+    ("divisions", "simplices"),
+    [((32, 32), False), ((64, 20), False), ((64, 64), True), ((48, 40), False)],
     ids=["32x32", "64x20", "64x64 triangles", "48x40"],
 )
 def test_v2_6_other_meshes(divisions, simplices):
     """1 % of u_x at A ... E on other meshes; A and B between nodes where the mesh has none there."""
-    assert computed(divisions=divisions, simplices=simplices).at_points() == pytest.approx(REFERENCE, rel=0.01)
+    assert computed(divisions=divisions, simplices=simplices).at_points() == pytest.approx(
+        REFERENCE, rel=0.01
+    )
 
 
 def test_v2_6_ranks_agree():

@@ -26,7 +26,10 @@ from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 
 SPEED, MASS = 10.0, 10.0  # V1.1: of the approach [m/s], of the bar [kg] for a unit area
 MESHES, RESTITUTIONS = (1, 10, 160), (0.0, 0.5, 1.0)
-COURANT, END = 0.45, 1.3  # the gap closes well inside a step: no tie that round-off decides; contact ends at 7/6 s
+COURANT, END = (
+    0.45,
+    1.3,
+)  # the gap closes well inside a step: no tie that round-off decides; contact ends at 7/6 s
 LAWS = {
     "reset": lambda e: (ZienkiewiczWoodTaylor(), Newton(e)),
     "projection": lambda e: (ZienkiewiczWoodTaylor(), Newton(e, ImpulseUpdate())),
@@ -39,7 +42,9 @@ def rebound(n: int, scheme: Any, impact: Any) -> float:
     problem, dt = thrown(n, impact=impact), COURANT * 10.0 / n / 30.0
     *_, last = reports = list(serial_run(problem, scheme, dt=dt, steps=round(END / dt)))
     assert not any(report.new.active.any() for report in reports if report.new.t > 1.2)
-    return float(problem.equations.influence[:, 0] @ (problem.equations.M @ last.new.v)) / MASS / SPEED
+    return (
+        float(problem.equations.influence[:, 0] @ (problem.equations.M @ last.new.v)) / MASS / SPEED
+    )
 
 
 @pytest.mark.serial
@@ -87,7 +92,8 @@ def test_the_rebound_of_a_strip_does_not_know_e(law: str, triangles: bool) -> No
     """V1.1 in two dimensions, three elements across: from 10 to 40 elements along the strip the rebound comes closer to
     1, and what e changes of it is less than half as much; of 40 elements 3 % are missing at most, 2 % of it by e."""
     coarse, fine = (
-        1.0 - np.array([strip_rebound(n, *LAWS[law](e), triangles) for e in RESTITUTIONS]) for n in (10, 40)
+        1.0 - np.array([strip_rebound(n, *LAWS[law](e), triangles) for e in RESTITUTIONS])
+        for n in (10, 40)
     )
     assert fine.min() > 0.0 and fine.max() < min(0.032, coarse.max())
     assert np.ptp(fine) < min(0.022, 0.5 * np.ptp(coarse))
@@ -100,4 +106,6 @@ def strip_rebound(n: int, scheme: Any, impact: Any, triangles: bool) -> float:
     problem = model.problem(mass=ConsistentMass(), impact=impact)
     *_, (state, _) = march(problem, scheme=scheme, dt=dt, steps=round(END / dt))
     system = problem.equations
-    return system.algebra.dot(system.influence[:, 1], system.M @ state.v) / bar.section / MASS / SPEED
+    return (
+        system.algebra.dot(system.influence[:, 1], system.M @ state.v) / bar.section / MASS / SPEED
+    )

@@ -26,9 +26,16 @@ pytestmark = pytest.mark.serial
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "ground_motions"
 RECORDS = Path(os.environ.get("VI_CONTACT_GROUND_MOTIONS", SHARED))
 SOFT = vc.LinearElastic(E=1e8, nu=0.2, rho=2400.0)  # a wave takes a step and more for a cell
-SIDES = {"base": ("foot_bottom", "heel_bottom"), "end": ("heel_right",), "heel": ("heel_top",), "stem": ("stem_right",)}
+SIDES = {
+    "base": ("foot_bottom", "heel_bottom"),
+    "end": ("heel_right",),
+    "heel": ("heel_top",),
+    "stem": ("stem_right",),
+}
 WALLS = {  # lowest corner, width and height [m]; the ground lies below, to the right and on the heel
-    "foot": (0.0, 0.0, 0.5, 0.5), "heel": (0.5, 0.0, 2.5, 0.5), "stem": (0.0, 0.5, 0.5, 3.5),
+    "foot": (0.0, 0.0, 0.5, 0.5),
+    "heel": (0.5, 0.0, 2.5, 0.5),
+    "stem": (0.0, 0.5, 0.5, 3.5),
 }
 
 
@@ -55,17 +62,25 @@ def surface(system: Any, sides: dict[str, Facets], kind: str) -> Any:
         made = fem.joined_surfaces(*(fem.contact_surface(system, side) for side in sides.values()))
     else:
         mesh = sides["base"].mesh
-        one = Facets("wall", np.unique(np.concatenate([side.indices for side in sides.values()])), mesh)
-        made = fem.contact_surface(system, one, feature_angle=np.pi if kind == "mean normals" else np.pi / 6)
+        one = Facets(
+            "wall", np.unique(np.concatenate([side.indices for side in sides.values()])), mesh
+        )
+        made = fem.contact_surface(
+            system, one, feature_angle=np.pi if kind == "mean normals" else np.pi / 6
+        )
     return made.with_frictionless_corners()
 
 
 def run(kind: str, shaking: Any, dt: float, t_end: float) -> dict[str, Any]:
     """Histories of thrust, friction work and uplift, and the last displacements, from rest under the weight."""
     system, sides = wall()
-    problem = vc.ContactProblem(system, surface(system, sides, kind), friction=vc.Coulomb(0.3), excitation=shaking)
+    problem = vc.ContactProblem(
+        system, surface(system, sides, kind), friction=vc.Coulomb(0.3), excitation=shaking
+    )
     state = vc.static_equilibrium(problem, solver=vc.Condensed())
-    found = vc.simulate(problem, dt=dt, t_end=t_end, state=state, record=[vc.Energy(), vc.Contact()], progress=False)
+    found = vc.simulate(
+        problem, dt=dt, t_end=t_end, state=state, record=[vc.Energy(), vc.Contact()], progress=False
+    )
     columns = {"force": "contact_force_x", "work": "loss_friction", "uplift": "contact_uplift"}
     histories = {name: found.history[column] for name, column in columns.items()}
     return histories | {"u": problem.cartesian(found.state.u)}
@@ -73,13 +88,18 @@ def run(kind: str, shaking: Any, dt: float, t_end: float) -> dict[str, Any]:
 
 def compare(one: dict[str, Any], other: dict[str, Any]) -> dict[str, float]:
     """Largest difference of each over the largest value."""
-    return {name: float(np.abs(one[name] - other[name]).max() / np.abs(other[name]).max()) for name in one}
+    return {
+        name: float(np.abs(one[name] - other[name]).max() / np.abs(other[name]).max())
+        for name in one
+    }
 
 
 def test_one_group_is_four() -> None:
     """The same motion to 1e-8 with contact, friction and uplift; that of mean normals at the corners is another one."""
     shaking = vc.Harmonic(4.0, 2.5, direction=(1.0, 0.3))
-    one, four, mean = (run(kind, shaking, 4e-3, 0.3) for kind in ("one group", "four groups", "mean normals"))
+    one, four, mean = (
+        run(kind, shaking, 4e-3, 0.3) for kind in ("one group", "four groups", "mean normals")
+    )
     assert max(compare(one, four).values()) < 1e-8
     assert compare(mean, four)["force"] > 0.1 and four["work"][-1] > 0.0
     assert len(np.unique(four["uplift"])) > 5
@@ -92,6 +112,8 @@ def test_el_centro() -> None:
         pytest.skip("the record is not beside the checkout")
     record = read_record(path, "g")
     strong = replace(record, acceleration=record.acceleration[80:])
-    one, four = (run(kind, vc.GroundMotion(strong), 5e-3, 0.75) for kind in ("one group", "four groups"))
+    one, four = (
+        run(kind, vc.GroundMotion(strong), 5e-3, 0.75) for kind in ("one group", "four groups")
+    )
     assert max(compare(one, four).values()) < 1e-8
     assert four["force"].min() < -2e5 and four["work"][-1] > 0.0

@@ -9,21 +9,40 @@ pytest.importorskip("dolfinx")
 from mpi4py import MPI
 from rigid_wall import RigidWall
 
-from vi_contact import Condensed, ContactProblem, HalfSpace, LinearElastic, State, fem, static_equilibrium
+from vi_contact import (
+    Condensed,
+    ContactProblem,
+    HalfSpace,
+    LinearElastic,
+    State,
+    fem,
+    static_equilibrium,
+)
 from vi_contact.meshes.block import BlockMesh
 
 pytestmark = pytest.mark.serial
 HEIGHT, LENGTH, G = 10.0, 100.0, 9.81
 
 
-def pressed(nu: float, acceleration: float, *, cells: int = 40, gravity: float = 0.0, surcharge: float = 0.0,
-            bilateral: bool = True) -> tuple[ContactProblem, State]:
+def pressed(
+    nu: float,
+    acceleration: float,
+    *,
+    cells: int = 40,
+    gravity: float = 0.0,
+    surcharge: float = 0.0,
+    bilateral: bool = True,
+) -> tuple[ContactProblem, State]:
     """A layer of LENGTH on rock; body force towards the wall at x = 0; the far side does not settle."""
     soil = LinearElastic(E=1e8, nu=nu, rho=1900.0)
     divisions = (round(LENGTH / HEIGHT) * cells, cells)
-    mesh, tags = fem.build_mesh(BlockMesh(lengths=(LENGTH, HEIGHT), divisions=divisions), MPI.COMM_SELF)
-    loads = [fem.BodyForce((-soil.rho * acceleration, -soil.rho * gravity)),
-             fem.Traction(tags["top"], (0.0, -surcharge))]
+    mesh, tags = fem.build_mesh(
+        BlockMesh(lengths=(LENGTH, HEIGHT), divisions=divisions), MPI.COMM_SELF
+    )
+    loads = [
+        fem.BodyForce((-soil.rho * acceleration, -soil.rho * gravity)),
+        fem.Traction(tags["top"], (0.0, -surcharge)),
+    ]
     # the far side: free to move horizontally; vertically it is held, unless the layer settles
     sides = fem.Prescribed(tags["right"], components=(0,) if gravity or surcharge else (1,))
     system = fem.assemble(mesh, soil, clamped=tags["bottom"], prescribed=sides, loads=loads)
@@ -33,7 +52,9 @@ def pressed(nu: float, acceleration: float, *, cells: int = 40, gravity: float =
     return problem, static_equilibrium(problem, solver=Condensed())
 
 
-@pytest.mark.parametrize(("nu", "thrust", "height"), [(0.3, 0.960, 0.576), (1 / 3, 0.987, 0.572), (0.4, 1.049, 0.564)])
+@pytest.mark.parametrize(
+    ("nu", "thrust", "height"), [(0.3, 0.960, 0.576), (1 / 3, 0.987, 0.572), (0.4, 1.049, 0.564)]
+)
 def test_smooth_bilateral_wall(nu: float, thrust: float, height: float):
     """Q and h within 1 % of the published plane-strain values (measured 0.2 and 0.2 %), 7 % of the 1D theory."""
     problem, state = pressed(nu, 2.0)
@@ -46,6 +67,7 @@ def test_smooth_bilateral_wall(nu: float, thrust: float, height: float):
 
 def test_unilateral_while_the_ground_presses():
     """Gravity and a surcharge first: the same as bilateral while all pressures are positive; beyond, a gap opens."""
+
     def added(acceleration: float, bilateral: bool) -> tuple[ContactProblem, State]:
         return pressed(0.3, acceleration, cells=12, gravity=G, surcharge=1e5, bilateral=bilateral)
 

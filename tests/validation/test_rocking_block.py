@@ -31,8 +31,12 @@ SHORTEST = 0.409014  # rectangular pulse of 1.5 times the onset that overturns [
 
 def block(E: float = 3.0e10, *, damped: bool = True, **more: Any) -> rocking.RockingBlock:
     """The block of V3.1; damping that keeps the share of critical when E changes."""
-    damping = vc.Rayleigh(alpha=0.0, beta=3.0e-4 * (3.0e10 / E) ** 0.5) if damped else vc.NoDamping()
-    return rocking.RockingBlock(SHAPE, vc.LinearElastic(E=E, nu=0.0, rho=2400.0), damping=damping, **more)
+    damping = (
+        vc.Rayleigh(alpha=0.0, beta=3.0e-4 * (3.0e10 / E) ** 0.5) if damped else vc.NoDamping()
+    )
+    return rocking.RockingBlock(
+        SHAPE, vc.LinearElastic(E=E, nu=0.0, rho=2400.0), damping=damping, **more
+    )
 
 
 @pytest.fixture(scope="module")
@@ -41,13 +45,22 @@ def model() -> rocking.RockingModel:
 
 
 def released(
-    model: rocking.RockingModel, theta0: float, t_end: float, *, dt: TimeSteps | None = None,
+    model: rocking.RockingModel,
+    theta0: float,
+    t_end: float,
+    *,
+    dt: TimeSteps | None = None,
     scheme: vc.MoreauJean | vc.Trapezoidal | None = None,
 ) -> tuple[Mapping[str, Array], Mapping[str, Any]]:
     """(history, facts) of free rocking from rest at theta0."""
     solution = vc.simulate(
-        model.problem, scheme=scheme or vc.MoreauJean(), solver=vc.Condensed(), dt=dt or model.time_steps(),
-        t_end=t_end, state=model.tilted(theta0), record=(vc.Energy(), vc.Contact(), rocking.Rocking(model)),
+        model.problem,
+        scheme=scheme or vc.MoreauJean(),
+        solver=vc.Condensed(),
+        dt=dt or model.time_steps(),
+        t_end=t_end,
+        state=model.tilted(theta0),
+        record=(vc.Energy(), vc.Contact(), rocking.Rocking(model)),
         progress=False,
     )
     return solution.history, solution.facts
@@ -57,7 +70,11 @@ def first_impact(model: rocking.RockingModel, theta0: float) -> float:
     """Time from the release to theta = 0 [s]."""
     t, theta = 0.0, theta0
     for state, report in vc.march(
-        model.problem, scheme=vc.MoreauJean(), solver=vc.Condensed(), dt=model.time_steps(), steps=4000,
+        model.problem,
+        scheme=vc.MoreauJean(),
+        solver=vc.Condensed(),
+        dt=model.time_steps(),
+        steps=4000,
         state=model.tilted(theta0),
     ):
         assert report.certificate.worst <= 1e-9
@@ -77,14 +94,20 @@ def test_free_rocking(model):
     times, peaks = rocking.impacts(history)
     assert times == pytest.approx(IMPACTS, rel=0.02)
     assert peaks[1:] / SHAPE.alpha == pytest.approx(AMPLITUDES, rel=0.05)
-    assert rocking.restitution(model.block, history, times[0]) == pytest.approx(0.94230769, rel=5e-3)
+    assert rocking.restitution(model.block, history, times[0]) == pytest.approx(
+        0.94230769, rel=5e-3
+    )
     assert times == pytest.approx(model.block.impact_times(theta0, 3), rel=3e-3)
     assert peaks == pytest.approx(model.block.amplitudes(theta0, 2), rel=5e-3)
-    assert np.max(np.abs(history["theta"] - model.block.motion(theta0, history["t"]))) < 0.01 * theta0
+    assert (
+        np.max(np.abs(history["theta"] - model.block.motion(theta0, history["t"]))) < 0.01 * theta0
+    )
     assert 0.0 < facts["worst_certificate"] <= 1e-9
     lost = history["loss_damping"] + history["loss_contact"] + history["loss_algorithmic"]
     arm = 0.5 * SHAPE.width * theta0 * (1.0 - 0.5 * theta0 / model.block.overturning_angle)
-    left = 1.0 - lost[np.searchsorted(history["t"], times + 0.1)] / (model.block.mass * SHAPE.gravity * arm)
+    left = 1.0 - lost[np.searchsorted(history["t"], times + 0.1)] / (
+        model.block.mass * SHAPE.gravity * arm
+    )
     assert 1.0 - left == pytest.approx(1.0 - 0.88794379 ** np.arange(1.0, 4.0), rel=0.02)
 
 
@@ -107,7 +130,9 @@ def test_stiffness(model):
     """V3.1: E -> infinity. The time of the first impact tends to the rigid limit like 1/E."""
     theta0 = 0.5 * SHAPE.alpha
     rigid = float(model.block.impact_times(theta0, 1)[0])
-    soft, stiff = (first_impact(rocking.build(block(E), COMM), theta0) / rigid - 1.0 for E in (3.0e9, 3.0e10))
+    soft, stiff = (
+        first_impact(rocking.build(block(E), COMM), theta0) / rigid - 1.0 for E in (3.0e9, 3.0e10)
+    )
     assert -1e-3 < soft < stiff < 0.0
     assert soft / stiff == pytest.approx(10.0, rel=0.1)
 
@@ -117,7 +142,9 @@ def test_time_step(model):
     theta0, errors = 0.5 * SHAPE.alpha, []
     for dt in (4e-3, model.time_steps()):
         history, _ = released(model, theta0, 2.2, dt=dt)
-        errors.append(np.max(np.abs(history["theta"] - model.block.motion(theta0, history["t"]))) / theta0)
+        errors.append(
+            np.max(np.abs(history["theta"] - model.block.motion(theta0, history["t"]))) / theta0
+        )
     assert 0.05 < errors[0] < 0.5
     assert errors[1] < 0.1 * errors[0]
 
@@ -168,7 +195,12 @@ def overturns(model: rocking.RockingModel, duration: float) -> bool:
     """Whether 1.5 times the onset acceleration for so long overturns the block."""
     pulse, largest = vc.Rectangular(1.5 * SHAPE.onset_acceleration, duration), 0.0
     for state, report in vc.march(
-        model.shaken(pulse), scheme=vc.MoreauJean(), solver=vc.Condensed(), dt=1e-3, steps=3000, state=model.rest
+        model.shaken(pulse),
+        scheme=vc.MoreauJean(),
+        solver=vc.Condensed(),
+        dt=1e-3,
+        steps=3000,
+        state=model.rest,
     ):
         assert report.certificate.worst <= 1e-9
         angle = abs(model.angle(state)) / model.block.overturning_angle
@@ -194,13 +226,18 @@ def test_default_scheme_keeps_the_loss_as_vibration(model):
     arm = 0.5 * SHAPE.width * theta0 * (1.0 - 0.5 * theta0 / model.block.overturning_angle)
     rigid_loss = (1.0 - 0.88794379) * model.block.mass * SHAPE.gravity * arm
     gone, hops = [], []
-    for damped, scheme, dt in ((False, vc.Trapezoidal(), 1e-4), (True, vc.MoreauJean(), model.time_steps())):
+    for damped, scheme, dt in (
+        (False, vc.Trapezoidal(), 1e-4),
+        (True, vc.MoreauJean(), model.time_steps()),
+    ):
         other = rocking.build(block(damped=damped), COMM)
         history, facts = released(other, theta0, 0.6, scheme=scheme, dt=dt)
         times, _ = rocking.impacts(history)
         assert times == pytest.approx([0.25 * PERIODS[0.25]], rel=0.02)
         assert np.max(-history["theta"]) == pytest.approx(SHAPE.amplitudes(theta0, 1)[1], rel=0.05)
-        assert rocking.restitution(other.block, history, times[0]) == pytest.approx(0.94230769, rel=0.05)
+        assert rocking.restitution(other.block, history, times[0]) == pytest.approx(
+            0.94230769, rel=0.05
+        )
         assert 0.0 < facts["worst_certificate"] <= 1e-9
         energy = history["energy_kinetic"] + history["energy_strain"] - history["work_input"]
         after = history["t"] > times[0] + 0.05

@@ -34,8 +34,12 @@ COMM = MPI.COMM_WORLD
 G = 9.81
 OBLONG, SQUARE = RigidBlock((0.5, 2.0, 0.4)), RigidBlock((0.4, 2.0, 0.4))
 STIFF, STIFFER = (vc.LinearElastic(E=E, nu=0.0, rho=2400.0) for E in (3.0e11, 3.0e12))
-DAMPING = vc.Rayleigh(alpha=0.0, beta=1.0e-3)  # half of critical in the lowest bending: an impact is over in some ms
-TURN = np.array([[np.cos(0.4), 0.0, np.sin(0.4)], [0.0, 1.0, 0.0], [-np.sin(0.4), 0.0, np.cos(0.4)]])
+DAMPING = vc.Rayleigh(
+    alpha=0.0, beta=1.0e-3
+)  # half of critical in the lowest bending: an impact is over in some ms
+TURN = np.array(
+    [[np.cos(0.4), 0.0, np.sin(0.4)], [0.0, 1.0, 0.0], [-np.sin(0.4), 0.0, np.cos(0.4)]]
+)
 grounds = pytest.mark.parametrize("slab", [False, True], ids=["plane", "slab"])
 
 
@@ -59,41 +63,63 @@ class Model:
     def rigid(self, x: Array) -> Array:
         """Translation of the middle of the base and rotation (6,) of a displacement or velocity."""
         rows, fit = self.fit
-        values = self.problem.system.space.expand(self.problem.cartesian(x), 0.0).reshape(-1, 3)[rows]
+        values = self.problem.system.space.expand(self.problem.cartesian(x), 0.0).reshape(-1, 3)[
+            rows
+        ]
         return np.asarray(fit @ (values @ TURN).ravel())
 
     def tilted(self, q: Array) -> State:
         """The block at rest at q = (w, theta_x, theta_z), the ground undisturbed."""
+
         def turned(x: Array) -> Array:
             return (np.cross([q[1], 0.0, q[2]], x @ TURN) + [0.0, q[0], 0.0]) @ TURN.T
 
         system, rest = self.problem.system, self.rest
         bodies = [turned, np.zeros_like][: 1 + system.space.bodies.max()]
         r_t = None if rest.r_t is None else 0.0 * rest.r_t
-        return replace(rest, u=rest.u + relative(self.problem, per_body(system, *bodies)), r_n=0.0 * rest.r_n,
-                       r_t=r_t, active=np.zeros_like(rest.active))
+        return replace(
+            rest,
+            u=rest.u + relative(self.problem, per_body(system, *bodies)),
+            r_n=0.0 * rest.r_n,
+            r_t=r_t,
+            active=np.zeros_like(rest.active),
+        )
 
 
 @cache
 def built(shape: RigidBlock, slab: bool, friction: bool = False) -> Model:
     """A block on four corners. Its base is held sideways, or rubs with mu = 1, and is then free to spin on a corner."""
     a, h, c = shape.half
-    meshes = {"block": BlockMesh(lengths=shape.lengths, divisions=(1, 6, 1), corner=(-a, 0.0, -c), deform=turned)}
+    meshes = {
+        "block": BlockMesh(
+            lengths=shape.lengths, divisions=(1, 6, 1), corner=(-a, 0.0, -c), deform=turned
+        )
+    }
     if slab:
-        meshes["ground"] = BlockMesh(lengths=(3.0 * a, 0.2, 3.0 * c), divisions=(4, 1, 5),
-                                     corner=(-1.4 * a, -0.2, -1.6 * c), deform=turned)
+        meshes["ground"] = BlockMesh(
+            lengths=(3.0 * a, 0.2, 3.0 * c),
+            divisions=(4, 1, 5),
+            corner=(-1.4 * a, -0.2, -1.6 * c),
+            deform=turned,
+        )
     mesh, tags = fem.build_mesh(Blocks(meshes), COMM)
     sides = [tags[name] for name in ("block_bottom", "ground_top")[: len(meshes)]]
     system = fem.assemble(
-        mesh, [(tags[name], material) for name, material in zip(meshes, (STIFF, STIFFER), strict=False)],
-        damping=DAMPING, loads=fem.BodyForce((0.0, -STIFF.rho * G, 0.0)), clamped=tags["ground_bottom"] if slab else (),
+        mesh,
+        [(tags[name], material) for name, material in zip(meshes, (STIFF, STIFFER), strict=False)],
+        damping=DAMPING,
+        loads=fem.BodyForce((0.0, -STIFF.rho * G, 0.0)),
+        clamped=tags["ground_bottom"] if slab else (),
         prescribed=() if friction else [fem.Prescribed(side, components=(0, 2)) for side in sides],
     )
     plane = vc.HalfSpace(point=(0.0, 0.0, 0.0), normal=(0.0, 1.0, 0.0))
 
     def problem(system: Any, points: Any = None, **data: Any) -> vc.ContactProblem:
-        surface = (fem.contact_pair(system, *sides, matching=fem.DualMortar(), points=points) if slab
-                   else fem.contact_surface(system, sides[0], obstacle=plane, points=points))
+        surface = (
+            fem.contact_pair(system, *sides, matching=fem.DualMortar(), points=points)
+            if slab
+            else fem.contact_surface(system, sides[0], obstacle=plane, points=points)
+        )
         return vc.ContactProblem(system, surface, **data)
 
     whole = problem(system)  # without friction: thrust of the base would be counted as weight
@@ -120,12 +146,18 @@ class Rocked:
 def rocked(model: Model, state: State, t_end: float) -> Rocked:
     rows = []
     for new, report in vc.march(
-        model.problem, scheme=vc.MoreauJean(), solver=vc.Condensed(), dt=vc.HalvedAtImpact(1e-3, 5), t_end=t_end,
+        model.problem,
+        scheme=vc.MoreauJean(),
+        solver=vc.Condensed(),
+        dt=vc.HalvedAtImpact(1e-3, 5),
+        t_end=t_end,
         state=state,
     ):
         assert report.certificate.worst <= 1e-9
         motion, rates = (model.rigid(x)[[1, 3, 5]] for x in (new.u - model.rest.u, new.v))
-        rows.append((new.t, motion, rates, model.problem.surface.normal_values(model.rest.u - new.u)))
+        rows.append(
+            (new.t, motion, rates, model.problem.surface.normal_values(model.rest.u - new.u))
+        )
     return Rocked(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
@@ -135,21 +167,29 @@ def differences(found: Rocked, shape: RigidBlock, phases: list[Phase]) -> tuple[
     q, v = shape.motion(phases, found.t)
     starts = np.array([one.start for one in phases[1:]])
     shaken = np.any((found.t[:, None] > starts - 2e-3) & (found.t[:, None] < starts + 0.03), axis=1)
-    angles, rates = (np.abs(a - b)[:, 1:].max(axis=1) / np.abs(b[:, 1:]).max()
-                     for a, b in ((found.q, q), (found.rates, v)))
+    angles, rates = (
+        np.abs(a - b)[:, 1:].max(axis=1) / np.abs(b[:, 1:]).max()
+        for a, b in ((found.q, q), (found.rates, v))
+    )
     return angles, np.where(shaken, 0.0, rates)
 
 
 # The rigid block ------------------------------------------------------------------------------------------------------
 
+
 def test_the_rigid_block_on_an_edge_is_housners():
     """Times of impacts and amplitudes are those of the slender block with e = 1 - 1.5 sin²(alpha) (V3.1), to 1e-9."""
     plane = rocking_block.RockingBlock(HousnerBlock(width=0.5, height=2.0, gravity=G))
     phases = list(OBLONG.phases(OBLONG.tilted(0, 0.0, 0.05), 1.5))
-    assert [one.pivots.tolist() for one in phases[:2]] == [[True, False, True, False], [False, True, False, True]]
+    assert [one.pivots.tolist() for one in phases[:2]] == [
+        [True, False, True, False],
+        [False, True, False, True],
+    ]
     assert [one.start for one in phases[1:]] == pytest.approx(plane.impact_times(0.05, 3), rel=1e-9)
     t = np.linspace(0.0, 1.4, 50)
-    assert OBLONG.motion(phases, t)[0][:, 2] == pytest.approx(plane.motion(0.05, t), abs=1e-9 * 0.05)
+    assert OBLONG.motion(phases, t)[0][:, 2] == pytest.approx(
+        plane.motion(0.05, t), abs=1e-9 * 0.05
+    )
 
 
 def test_the_rigid_block_keeps_its_angular_momentum_about_the_corner_it_lands_on():
@@ -174,8 +214,11 @@ def test_the_rigid_block_keeps_its_angular_momentum_about_the_corner_it_lands_on
 
 # Finite elements ------------------------------------------------------------------------------------------------------
 
+
 @grounds
-@pytest.mark.parametrize(("tilt", "landings"), [((0.0, 0.05), 2), ((-0.06, 0.08), 3)], ids=["edge", "corner"])
+@pytest.mark.parametrize(
+    ("tilt", "landings"), [((0.0, 0.05), 2), ((-0.06, 0.08), 3)], ids=["edge", "corner"]
+)
 def test_rocking(slab, tilt, landings):
     """V3.4: released on an edge or a corner: angles to 2.5e-5 until the first landing (what is left is elasticity), to
     2 % of the largest over two landings on edges or three on corners; angular velocities after each landing to 2 %, its
@@ -201,7 +244,11 @@ def test_a_square_block_on_its_diagonal(slab):
     at once, and a rigid block has no one answer: e by the angular momentum about the far corner if it lands first, or
     after the two beside the diagonal. The block of finite elements is in between."""
     a, h, _ = SQUARE.half
-    about, limit, theta = (a**2 + h**2) / 3.0 + 2.0 * a**2 + h**2, np.sqrt(2.0) * a / h, 0.05 * np.sqrt(2.0)
+    about, limit, theta = (
+        (a**2 + h**2) / 3.0 + 2.0 * a**2 + h**2,
+        np.sqrt(2.0) * a / h,
+        0.05 * np.sqrt(2.0),
+    )
     p = np.sqrt(G * h / about)
     landing = np.arccosh(1.0 / (1.0 - theta / limit)) / p
     model, start = built(SQUARE, slab), SQUARE.tilted(0, -0.05, 0.05)
@@ -223,17 +270,27 @@ def test_spinning_on_a_corner(slab):
     with the inertia I in space about the corner, to 1.5e-5 of the largest angle, until another corner lands."""
     a, h, c = OBLONG.half
     arm, tilt = np.array([a, h, c]), np.array([-0.06, 0.0, 0.08])
-    inertia = np.diag([h**2 + c**2, a**2 + c**2, a**2 + h**2]) / 3.0 + arm @ arm * np.eye(3) - np.outer(arm, arm)
+    inertia = (
+        np.diag([h**2 + c**2, a**2 + c**2, a**2 + h**2]) / 3.0
+        + arm @ arm * np.eye(3)
+        - np.outer(arm, arm)
+    )
     A = np.zeros((7, 7))
     A[:3, 3:6] = np.eye(3)
     A[3:6, :3] = np.linalg.solve(inertia, G * h * np.diag([1.0, 0.0, 1.0]))
     A[3:6, 6] = np.linalg.solve(inertia, G * np.array([c, 0.0, -a]))
     model, rows = built(OBLONG, slab, friction=True), []
     for state, report in vc.march(
-        model.problem, scheme=vc.MoreauJean(), solver=vc.Condensed(), dt=1e-3, t_end=0.33,
+        model.problem,
+        scheme=vc.MoreauJean(),
+        solver=vc.Condensed(),
+        dt=1e-3,
+        t_end=0.33,
         state=model.tilted(OBLONG.tilted(0, tilt[0], tilt[2])),
     ):
-        assert report.certificate.worst <= 1e-9 and np.array_equal(state.active, [True, False, False, False])
+        assert report.certificate.worst <= 1e-9 and np.array_equal(
+            state.active, [True, False, False, False]
+        )
         expected = (expm(A * state.t) @ [*tilt, 0.0, 0.0, 0.0, 1.0])[:3]
         rows.append([model.rigid(state.u - model.rest.u)[3:], expected])
     found, expected = np.array(rows).swapaxes(0, 1)
@@ -249,13 +306,26 @@ def test_onset(slab, friction):
     nothing but elasticity (1 um), 1 % above more than 0.2 mm in 0.3 s."""
     a, h, c = OBLONG.half
     model = built(OBLONG, slab, friction)
-    for shares, up in (((0.99, 0.99), []), ((1.01, 0.99), [1, 3]), ((0.99, -1.01), [0, 1]), ((1.01, 1.01), [1, 2, 3])):
+    for shares, up in (
+        ((0.99, 0.99), []),
+        ((1.01, 0.99), [1, 3]),
+        ((0.99, -1.01), [0, 1]),
+        ((1.01, 1.01), [1, 2, 3]),
+    ):
         x, z = G * shares[0] * a / h, G * shares[1] * c / h
-        motion = vc.Tabulated((0.0, 0.2, 1.0), (0.0, 1.0, 1.0), direction=tuple(turned(np.array([x, 0.0, z]))))
-        steps = list(vc.march(
-            replace(model.problem, excitation=motion), scheme=vc.MoreauJean(), solver=vc.Condensed(), dt=8e-3,
-            t_end=0.5, state=model.rest,
-        ))
+        motion = vc.Tabulated(
+            (0.0, 0.2, 1.0), (0.0, 1.0, 1.0), direction=tuple(turned(np.array([x, 0.0, z])))
+        )
+        steps = list(
+            vc.march(
+                replace(model.problem, excitation=motion),
+                scheme=vc.MoreauJean(),
+                solver=vc.Condensed(),
+                dt=8e-3,
+                t_end=0.5,
+                state=model.rest,
+            )
+        )
         assert max(report.certificate.worst for _, report in steps) <= 1e-9
         heights = model.problem.surface.normal_values(model.rest.u - steps[-1][0].u)
         assert np.flatnonzero(heights > 2e-4).tolist() == up

@@ -50,9 +50,15 @@ PROBLEMS: dict[str, Callable[[Any], ContactProblem]] = {
     "inclined box of tetrahedra": partial(thrown_box, simplices=True, angle=0.5),
 }
 problems = pytest.mark.parametrize("name", PROBLEMS)
-ON_RANKS = ("turned wall", "points and gap", "stiff springs", "inclined box of tetrahedra")  # a kind of each
+ON_RANKS = (
+    "turned wall",
+    "points and gap",
+    "stiff springs",
+    "inclined box of tetrahedra",
+)  # a kind of each
 many_routes = pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=() if name in ON_RANKS else pytest.mark.serial) for name in PROBLEMS]
+    "name",
+    [pytest.param(name, marks=() if name in ON_RANKS else pytest.mark.serial) for name in PROBLEMS],
 )
 
 
@@ -62,6 +68,7 @@ def timing(name: str) -> tuple[float, int]:
 
 
 # Routes ---------------------------------------------------------------------------------------------------------------
+
 
 @pytest.mark.slow
 @many_routes
@@ -78,7 +85,9 @@ def test_all_routes_agree_at_every_step(name):
         steps -= 19
     solvers = (*CONDENSED.values(), *VOLUME.values())
     checked = cross_check(problem, scheme=SCHEME, solvers=solvers, dt=dt, steps=steps, state=state)
-    assert len({found.method for found in checked.found}) == len(solvers) - 2  # both forms of Hildreth have one name
+    assert (
+        len({found.method for found in checked.found}) == len(solvers) - 2
+    )  # both forms of Hildreth have one name
     for found in checked.found:
         assert found.relative["u"] < 1e-9, found.method
         assert found.relative["r_n"] < 1e-9, found.method
@@ -123,7 +132,9 @@ def test_bilateral_points_by_both_routes(solver):
     held = replace(problem, surface=problem.surface.bilateral_everywhere())
     found = run(held, dt=WALL_DT, steps=30, solver=solver)
     assert found.r_n.min() < 0.0 < found.r_n.max() and found.active.all()
-    checked = cross_check(held, scheme=SCHEME, solvers=(solver, Condensed(Hildreth())), dt=WALL_DT, steps=30)
+    checked = cross_check(
+        held, scheme=SCHEME, solvers=(solver, Condensed(Hildreth())), dt=WALL_DT, steps=30
+    )
     assert checked.worst < 1e-9
 
 
@@ -143,6 +154,7 @@ def test_stiff_springs_tend_to_the_rigid_wall():
 
 
 # The same body, written differently -----------------------------------------------------------------------------------
+
 
 @cache
 def reference(name: str, *, alone: bool = False) -> Run:
@@ -173,9 +185,14 @@ def test_inclined_box_moves_like_the_level_one(simplices):
     """The same in three dimensions, with gravity and the throw turned about the z axis."""
     angle = 0.5
     level, inclined = (
-        run(thrown_box(COMM, simplices=simplices, angle=a), dt=BOX_DT, steps=8) for a in (0.0, angle)
+        run(thrown_box(COMM, simplices=simplices, angle=a), dt=BOX_DT, steps=8)
+        for a in (0.0, angle)
     )
-    same(inclined, level, u=lambda u: np.concatenate([turned(u[..., :2], -angle), u[..., 2:]], axis=-1))
+    same(
+        inclined,
+        level,
+        u=lambda u: np.concatenate([turned(u[..., :2], -angle), u[..., 2:]], axis=-1),
+    )
 
 
 @pytest.mark.serial  # many marches; that ranks do not matter is shown below
@@ -202,7 +219,8 @@ def test_listed_points_may_come_in_any_order():
     """The conditions are numbered as the points are listed; the motion is the same."""
     heights = [3.0, 6.0, 9.0]
     one, other = (
-        run(shaken_wall(COMM, contacts=order), dt=WALL_DT, steps=34) for order in (heights, heights[::-1])
+        run(shaken_wall(COMM, contacts=order), dt=WALL_DT, steps=34)
+        for order in (heights, heights[::-1])
     )
     assert np.array_equal(one.active, other.active[:, ::-1]) and one.active.any()
     assert np.abs(one.u - other.u).max() < 1e-12 * np.abs(one.u).max()

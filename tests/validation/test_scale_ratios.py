@@ -15,9 +15,28 @@ pytestmark = pytest.mark.serial
 ROOT = Path(__file__).resolve().parents[2]
 LOOSE = 1.6  # releases of PETSc coarsen otherwise, and meshes number their nodes otherwise
 KEYS = {
-    "unknowns", "points", "closed", "dimension", "element", "courant", "friction", "mu", "method", "preconditioner",
-    "iterations", "linear_iterations", "newton_steps", "products", "renewals", "cpu_products", "setup_products",
-    "seconds", "peak_bytes", "bytes_per_unknown", "certificate", "ranks",
+    "unknowns",
+    "points",
+    "closed",
+    "dimension",
+    "element",
+    "courant",
+    "friction",
+    "mu",
+    "method",
+    "preconditioner",
+    "iterations",
+    "linear_iterations",
+    "newton_steps",
+    "products",
+    "renewals",
+    "cpu_products",
+    "setup_products",
+    "seconds",
+    "peak_bytes",
+    "bytes_per_unknown",
+    "certificate",
+    "ranks",
 }
 MOST_PRODUCTS = {"1": 20, "10": 50, "100": 40, "static": 40}
 
@@ -26,7 +45,17 @@ def test_counts_are_those_of_the_table(tmp_path: Path) -> None:
     """The benchmark on a block of 4000 unknowns: iterations, products, Newton steps and renewals, each at most 1.6
     times the committed ones; the bounds of the contract with its users in every row."""
     found = tmp_path / "scale.json"
-    command = [sys.executable, "benchmarks/scale.py", "--sizes", "3e3", "--steps", "2", "--no-small", "--json", found]
+    command = [
+        sys.executable,
+        "benchmarks/scale.py",
+        "--sizes",
+        "3e3",
+        "--steps",
+        "2",
+        "--no-small",
+        "--json",
+        found,
+    ]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     rows = json.loads(found.read_text())
@@ -44,5 +73,7 @@ def test_counts_are_those_of_the_table(tmp_path: Path) -> None:
         assert row["certificate"] <= 1e-9 and row["renewals"] <= 4 and row["newton_steps"] <= 12
         if not row["mu"]:
             linear = row["linear_iterations"] / row["over_linear"]
-            assert row["linear_iterations"] <= (1.5 if courant in ("1", "10") else 2.0) * linear + 1.0  # of a handful
+            assert (
+                row["linear_iterations"] <= (1.5 if courant in ("1", "10") else 2.0) * linear + 1.0
+            )  # of a handful
             assert row["products"] <= MOST_PRODUCTS[courant]

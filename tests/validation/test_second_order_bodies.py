@@ -29,13 +29,21 @@ from vi_contact.meshes.block import BlockMesh
 
 COMM = MPI.COMM_WORLD
 MATERIAL = vc.LinearElastic(E=2.5, nu=0.25, rho=1.0)
-CELLS = {"triangles": (True, 2), "quadrilaterals": (False, 2), "tetrahedra": (True, 3), "hexahedra": (False, 3)}
+CELLS = {
+    "triangles": (True, 2),
+    "quadrilaterals": (False, 2),
+    "tetrahedra": (True, 3),
+    "hexahedra": (False, 3),
+}
 
 
 def smooth(x: Array, t: float = 0.0) -> Array:
     """u_i = sin(2 x_i + 0.3 i) cos(1.5 x_(i+1))."""
     d = x.shape[1]
-    return np.stack([np.sin(2.0 * x[:, i] + 0.3 * i) * np.cos(1.5 * x[:, (i + 1) % d]) for i in range(d)], axis=1)
+    return np.stack(
+        [np.sin(2.0 * x[:, i] + 0.3 * i) * np.cos(1.5 * x[:, (i + 1) % d]) for i in range(d)],
+        axis=1,
+    )
 
 
 def body_force(x: Array, t: float) -> Array:
@@ -52,25 +60,46 @@ def body_force(x: Array, t: float) -> Array:
 def errors(name: str, n: int, curved: bool) -> tuple[float, float]:
     """(L2, H1) on n distorted cells a side."""
     simplices, d = CELLS[name]
-    spec: dict[str, Any] = {"lengths": (2.0, 1.5, 1.2)[:d], "divisions": (n,) * d, "simplices": simplices}
+    spec: dict[str, Any] = {
+        "lengths": (2.0, 1.5, 1.2)[:d],
+        "divisions": (n,) * d,
+        "simplices": simplices,
+    }
     given = Curved(BlockMesh(**spec)) if curved else BlockMesh(**spec, deform=wavy)
     mesh, tags = fem.build_mesh(given, COMM)
-    held = [fem.Prescribed(group, smooth) for group in tags.values() if isinstance(group, fem.Facets)]
-    system = fem.assemble(mesh, MATERIAL, degree=2, prescribed=held, loads=fem.BodyForce(body_force))
+    held = [
+        fem.Prescribed(group, smooth) for group in tags.values() if isinstance(group, fem.Facets)
+    ]
+    system = fem.assemble(
+        mesh, MATERIAL, degree=2, prescribed=held, loads=fem.BodyForce(body_force)
+    )
     problem, x = linear(system), ufl.SpatialCoordinate(mesh)
     u = fem.as_function(problem, vc.static_equilibrium(problem), "u")
-    exact = ufl.as_vector([ufl.sin(2.0 * x[i] + 0.3 * i) * ufl.cos(1.5 * x[(i + 1) % d]) for i in range(d)])
+    exact = ufl.as_vector(
+        [ufl.sin(2.0 * x[i] + 0.3 * i) * ufl.cos(1.5 * x[(i + 1) % d]) for i in range(d)]
+    )
     dx = ufl.dx(metadata={"quadrature_degree": 6})
     l2, h1 = (integral(mesh, ufl.inner(e, e), dx) for e in (u - exact, ufl.grad(u - exact)))
     return float(np.sqrt(l2)), float(np.sqrt(h1))
 
 
-@pytest.mark.parametrize("name, curved", [
-    *(pytest.param(name, curved, marks=pytest.mark.serial)  # ranks do not change an order: one kind of cells shows it
-      for name, curved in (("quadrilaterals", False), ("quadrilaterals", True), ("tetrahedra", True),
-                           ("hexahedra", True))),
-    ("triangles", True),
-])
+@pytest.mark.parametrize(
+    "name, curved",
+    [
+        *(
+            pytest.param(
+                name, curved, marks=pytest.mark.serial
+            )  # ranks do not change an order: one kind of cells shows it
+            for name, curved in (
+                ("quadrilaterals", False),
+                ("quadrilaterals", True),
+                ("tetrahedra", True),
+                ("hexahedra", True),
+            )
+        ),
+        ("triangles", True),
+    ],
+)
 def test_orders_three_and_two(name: str, curved: bool) -> None:
     """Measured: 3.02 to 3.06 in L2, 1.93 to 2.02 in H1 between the two meshes, with straight sides too."""
     counts = (4, 8) if CELLS[name][1] == 2 else (3, 6)
@@ -93,7 +122,10 @@ def cylinder(per_a: float, degree: int, simplices: bool) -> dict[str, float]:
     far = 4.0 * HALF_WIDTH  # beyond it goes on straight, so that the body keeps a top
 
     def placed(points: Array) -> Array:
-        axes = [np.interp(points[:, i], np.linspace(0.0, 1.0, len(nodes)), nodes) for i, nodes in enumerate((x, y))]
+        axes = [
+            np.interp(points[:, i], np.linspace(0.0, 1.0, len(nodes)), nodes)
+            for i, nodes in enumerate((x, y))
+        ]
         near = np.minimum(axes[0], far)
         rise = (0.5 * near**2 + far * (axes[0] - near)) / RADIUS
         return np.column_stack([axes[0], axes[1] + rise * (1.0 - axes[1] / y[-1])])
@@ -103,14 +135,21 @@ def cylinder(per_a: float, degree: int, simplices: bool) -> dict[str, float]:
     mesh, tags = fem.build_mesh(given, COMM)
     material = vc.LinearElastic(E=1.0 - 0.3**2, nu=0.3, rho=1.0)
     system = fem.assemble(
-        mesh, material, degree=degree, prescribed=fem.Prescribed(tags["left"], components=(0,)),
+        mesh,
+        material,
+        degree=degree,
+        prescribed=fem.Prescribed(tags["left"], components=(0,)),
         loads=fem.Traction(tags["top"], (0.0, -0.5 * HERTZ.force / x[-1])),
     )
     plane = vc.HalfSpace((0.0, 0.0), (0.0, 1.0))
     surface = fem.contact_surface(system, tags["bottom"], obstacle=plane)
     state = vc.static_equilibrium(vc.ContactProblem(system, surface))
     every, r_n = surface.whole(), surface.everywhere(state.r_n)
-    at, pressure, exact = every.points[:, 0], r_n / every.weights, HERTZ.pressure(every.points[:, 0])
+    at, pressure, exact = (
+        every.points[:, 0],
+        r_n / every.weights,
+        HERTZ.pressure(every.points[:, 0]),
+    )
     core = at < 0.5 * HALF_WIDTH
     return {
         "force": 2.0 * r_n.sum() / HERTZ.force - 1.0,
@@ -128,19 +167,30 @@ def test_v2_3_cylinder_of_curved_cells(simplices: bool) -> None:
     coarse, fine = (cylinder(per_a, 2, simplices) for per_a in (5.65, 11.3))
     for found, per_a in ((coarse, 5.65), (fine, 11.3)):
         assert abs(found["force"]) < 1e-9 and abs(found["edge"]) < 0.5 / per_a
-    assert coarse["profile"] < 0.02 and fine["profile"] < 0.01 and fine["profile"] < 0.7 * coarse["profile"]
+    assert (
+        coarse["profile"] < 0.02
+        and fine["profile"] < 0.01
+        and fine["profile"] < 0.7 * coarse["profile"]
+    )
     assert abs(coarse["peak"]) < 3e-3 and abs(fine["peak"]) < 2e-3
 
 
 def cook(n: int, degree: int, simplices: bool) -> float:
     """How deep the middle of the loaded side is, upwards."""
+
     def placed(x: Array) -> Array:
         return np.column_stack([48.0 * x[:, 0], 44.0 * x[:, 0] + x[:, 1] * (44.0 - 28.0 * x[:, 0])])
 
-    mesh, tags = fem.build_mesh(BlockMesh(divisions=(n, n), simplices=simplices, deform=placed), COMM)
+    mesh, tags = fem.build_mesh(
+        BlockMesh(divisions=(n, n), simplices=simplices, deform=placed), COMM
+    )
     system = fem.assemble(
-        mesh, vc.LinearElastic(E=1.0, nu=1.0 / 3.0, rho=1.0), degree=degree, section=vc.PlaneStress(1.0),
-        clamped=tags["left"], loads=fem.Traction(tags["right"], (0.0, 1.0 / 16.0)),
+        mesh,
+        vc.LinearElastic(E=1.0, nu=1.0 / 3.0, rho=1.0),
+        degree=degree,
+        section=vc.PlaneStress(1.0),
+        clamped=tags["left"],
+        loads=fem.Traction(tags["right"], (0.0, 1.0 / 16.0)),
     )
     state = vc.static_equilibrium(linear(system))
     middle = system.space.find_nodes(np.array([[48.0, 52.0]]))
@@ -154,7 +204,11 @@ def test_cooks_membrane() -> None:
     assert 23.96 * 0.993 < p2 < 23.97 and 23.96 * 0.997 < q2 < 23.97 and q1 < 23.96 * 0.985
 
 
-BARS = {"P2 bar": {"dimension": 1}, "P2": {"dimension": 2, "triangles": True}, "Q2": {"dimension": 2}}
+BARS = {
+    "P2 bar": {"dimension": 1},
+    "P2": {"dimension": 2, "triangles": True},
+    "Q2": {"dimension": 2},
+}
 
 
 def followed(case: Any, name: str, t_end: float) -> tuple[Array, Array, Array, Array, float]:
@@ -173,7 +227,9 @@ def followed(case: Any, name: str, t_end: float) -> tuple[Array, Array, Array, A
     return t, *(value / bar.section for value in values), dt
 
 
-@pytest.mark.parametrize("name", ["P2", *(pytest.param(name, marks=pytest.mark.serial) for name in ("P2 bar", "Q2"))])
+@pytest.mark.parametrize(
+    "name", ["P2", *(pytest.param(name, marks=pytest.mark.serial) for name in ("P2 bar", "Q2"))]
+)
 def test_v1_1_thrown_bar(name: str) -> None:
     """The force in the window within 5 % of 300 (measured 1.6; P1 0.02), contact 2/3 s ± 4 dt, impulse 200 within 1 %,
     energy within 0.1 %."""
@@ -195,7 +251,9 @@ def test_v1_2_and_v1_3_bouncing_bars(name: str) -> None:
     case = BouncingBar()
     t, _, energy, mean, dt = followed(case, name, 2.5)
     assert dt * mean.sum() == pytest.approx(800.0 / 3.0, rel=5e-3)
-    assert (energy.min() + case.energy) / 500.0 >= 0.995 and (energy.max() + case.energy) / 500.0 <= 1.001
+    assert (energy.min() + case.energy) / 500.0 >= 0.995 and (
+        energy.max() + case.energy
+    ) / 500.0 <= 1.001
     t, _, energy, mean, dt = followed(PeriodicBar(), name, 3.0)
     assert dt * mean.sum() == pytest.approx(0.5, rel=0.03)
     assert energy.min() >= 0.98 * 0.125 and energy.max() <= (1.0 + 1e-9) * 0.125

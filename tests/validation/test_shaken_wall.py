@@ -28,7 +28,9 @@ from vi_contact.solvers.normal.hildreth import Hildreth
 pytestmark = pytest.mark.slow
 
 ROWS = (10, 20, 40, 100, 200, 400)
-one_rank = pytest.mark.serial  # whole marches, slow on several ranks; the last test here shows that these do not matter
+one_rank = (
+    pytest.mark.serial
+)  # whole marches, slow on several ranks; the last test here shows that these do not matter
 
 
 def prepared(case: str) -> tuple[ContactProblem, EffectiveMatrix, PreparedCondensed]:
@@ -113,7 +115,9 @@ def test_v4_1_eigenvalues_of_the_condensed_matrix(case, count, eigenvalues):
     values = np.linalg.eigvalsh(np.linalg.inv(prepared(case)[2].delassus))
     assert len(values) == count
     expected = eigenvalues.split()
-    for value, text in zip(values if len(expected) == count else values[[0, -1]], expected, strict=True):
+    for value, text in zip(
+        values if len(expected) == count else values[[0, -1]], expected, strict=True
+    ):
         assert value == printed(text)
 
 
@@ -131,7 +135,9 @@ def test_v4_1_energy_ledger(case):
     losses = found.losses | {"end": found.energy[-1]}
     for name, text in LEDGERS[case].items():
         assert losses[name] == printed(text), name
-    assert losses["input"] == pytest.approx(losses["impact"] + losses["contact"] + losses["end"], rel=1e-12)
+    assert losses["input"] == pytest.approx(
+        losses["impact"] + losses["contact"] + losses["end"], rel=1e-12
+    )
     largest = found.energy.max()
     assert abs(losses["defect"]) < 1e-12 * largest  # V9.7 asks for 1e-10
     assert abs(losses["algorithmic"]) < 1e-13 * largest  # phi = 1/2 is the midpoint rule (V9.1)
@@ -166,7 +172,9 @@ def test_v4_1_sweeps_of_the_seeds_own_method(case, mean):
     given, A, solver = prepared(case)
     D, surface = np.linalg.inv(solver.delassus), given.surface
     counts = []
-    for _, report in march(given, scheme=SCHEME, solver=Condensed(), dt=model().time_step(), steps=400):
+    for _, report in march(
+        given, scheme=SCHEME, solver=Condensed(), dt=model().time_step(), steps=400
+    ):
         z = D @ surface.normal_values(A.factor.solve(report.step.b))
         v, count = sweeps(D, z, surface.normal_values(report.old.u))
         u_n = surface.normal_values(report.result.x)
@@ -182,12 +190,15 @@ def test_statement_8_hildreth_needs_few_sweeps(case, primal):
     """At most 30 sweeps in any step, in both forms. An open step counts none and the last reactions are the start, so
     the means are below those of the seed's own sweeps."""
     given = problem(case)
-    found = follow(given, dt=model().time_step(), solver=Condensed(Hildreth(primal=primal, tolerance=1e-13)))
+    found = follow(
+        given, dt=model().time_step(), solver=Condensed(Hildreth(primal=primal, tolerance=1e-13))
+    )
     assert 0 < found.iterations.max() <= 30
     assert np.abs(found.u - history(case).u).max() < 1e-10 * np.abs(found.u).max()
 
 
 # V4.0: three forms of one problem -------------------------------------------------------------------------------------
+
 
 @one_rank
 @pytest.mark.parametrize("case", ["a", "b"])
@@ -222,12 +233,15 @@ def test_v4_0_condensed_matrix_is_the_schur_complement(case):
 def test_v4_0_primal_dual_and_active_set_agree(case):
     """(46, 49), (42) and the active set give the same (u_N, S_N) to 1e-10 at every step."""
     solvers = (Condensed(), Condensed(Hildreth(primal=True)), Condensed(Hildreth(primal=False)))
-    checked = cross_check(problem(case), scheme=SCHEME, solvers=solvers, dt=model().time_step(), steps=60)
+    checked = cross_check(
+        problem(case), scheme=SCHEME, solvers=solvers, dt=model().time_step(), steps=60
+    )
     assert checked.worst < 1e-10
     assert all(found.size["r_n"] > 0.0 and found.steps == 60 for found in checked.found)
 
 
 # The statements about Figs. 4 and 5 -----------------------------------------------------------------------------------
+
 
 @one_rank
 @pytest.mark.parametrize("case", ["a", "b"])

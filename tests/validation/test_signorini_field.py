@@ -13,7 +13,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fem_problems import Errors, block, field, field_errors, orders, plane_strain, signorini_field, signorini_pressure
+from fem_problems import (
+    Errors,
+    block,
+    field,
+    field_errors,
+    orders,
+    plane_strain,
+    signorini_field,
+    signorini_pressure,
+)
 from gathered import gathered
 from mpi4py import MPI
 
@@ -30,7 +39,9 @@ from vi_contact.schemes.zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor
 from vi_contact.solvers.condensed import Condensed
 
 SHEAR, NU, X0 = 0.4, 0.3, 1.0 / 7.0
-one_rank = pytest.mark.serial  # finer meshes: the coarser rows of both tables are computed on any number of ranks
+one_rank = (
+    pytest.mark.serial
+)  # finer meshes: the coarser rows of both tables are computed on any number of ranks
 MATERIAL = plane_strain(SHEAR, NU, rho=1.0)
 SIDES = ("left", "right", "top")
 
@@ -53,7 +64,9 @@ class Motion:
     def acceleration(self, t: float) -> float:
         if self.dt is None:
             return -2.0 * pi**2 * sin(2.0 * pi * t)
-        return 0.5 * (Motion().acceleration(t - 0.5 * self.dt) + Motion().acceleration(t + 0.5 * self.dt))
+        return 0.5 * (
+            Motion().acceleration(t - 0.5 * self.dt) + Motion().acceleration(t + 0.5 * self.dt)
+        )
 
     def boundary_acceleration(self, t: float) -> float:
         """(v1 - v0)/dt with v1 = 2 (s1 - s0)/dt - v0 from the start on."""
@@ -61,16 +74,28 @@ class Motion:
             return self.acceleration(t)
         v, v_old = self.velocity(0.0), 0.0
         for k in range(round(t / self.dt + 0.5)):
-            v, v_old = 2.0 * (Motion().position((k + 1) * self.dt) - Motion().position(k * self.dt)) / self.dt - v, v
+            v, v_old = (
+                2.0
+                * (Motion().position((k + 1) * self.dt) - Motion().position(k * self.dt))
+                / self.dt
+                - v,
+                v,
+            )
         return (v - v_old) / self.dt
 
 
 def discrete(n: int, *, simplices: bool = False, moving: Motion | None = None) -> ContactProblem:
     """The body, h = 1/n; ``moving``: everything times s(t), with the body force rho s'' u."""
     mesh, tags = block(
-        MPI.COMM_WORLD, lengths=(2.0, 1.0), corner=(-1.0, 0.0), divisions=(2 * n, n), simplices=simplices
+        MPI.COMM_WORLD,
+        lengths=(2.0, 1.0),
+        corner=(-1.0, 0.0),
+        divisions=(2 * n, n),
+        simplices=simplices,
     )
-    data: dict[str, Any] = {"prescribed": [Prescribed(tags[name], lambda x, t: signorini_field(x)) for name in SIDES]}
+    data: dict[str, Any] = {
+        "prescribed": [Prescribed(tags[name], lambda x, t: signorini_field(x)) for name in SIDES]
+    }
     if moving is not None:
         factors = (moving.position, moving.velocity, moving.boundary_acceleration)
         motions = [lambda x, t, s=s: s(t) * signorini_field(x) for s in factors]
@@ -89,7 +114,9 @@ def errors(problem: ContactProblem, state: State, n: int, *, simplices: bool = F
     """Against the exact field."""
     points, values = field(problem.system, problem.cartesian(state.u), state.t)
     lame, shear = MATERIAL.lame_lambda, MATERIAL.shear_modulus
-    return field_errors(points, values, (2 * n, n), signorini_field, lame=lame, shear=shear, simplices=simplices)
+    return field_errors(
+        points, values, (2 * n, n), signorini_field, lame=lame, shear=shear, simplices=simplices
+    )
 
 
 @cache
@@ -145,7 +172,9 @@ def test_v2_2_contact_set_ends_within_one_element(n, simplices):
     x, state = surface.whole().points[:, 0], gathered(surface, state)
     assert np.array_equal(np.sort(x[state.active]), np.sort(x)[: state.active.sum()])
     assert abs(x[state.active].max() - X0) < 1.0 / n
-    assert surface.everywhere(surface.normal_values(state.u)).max() == 0.0 and state.r_n.min() == 0.0
+    assert (
+        surface.everywhere(surface.normal_values(state.u)).max() == 0.0 and state.r_n.min() == 0.0
+    )
 
 
 @pytest.mark.serial
@@ -159,6 +188,7 @@ def test_v2_2_total_reaction(n):
 
 
 # V2.2d, the moving version --------------------------------------------------------------------------------------------
+
 
 def march_once(n: int, *, averaged: bool = False) -> Errors:
     """Errors after one period, midpoint rule, dt = 1/(4n)."""

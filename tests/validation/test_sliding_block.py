@@ -20,17 +20,31 @@ pytestmark = pytest.mark.serial  # ranks change none of these numbers: cheaper t
 G = 9.81
 
 
-def shaken(mu: float, excitation: Excitation, t_end: float, dt: float) -> tuple[Mapping[str, Array], Array]:
+def shaken(
+    mu: float, excitation: Excitation, t_end: float, dt: float
+) -> tuple[Mapping[str, Array], Array]:
     """(history, displacement of the centre relative to the ground since the gravity stage)."""
-    model = sliding.build(sliding.SlidingBody(sliding.SlidingBlock(mu)), MPI.COMM_WORLD, excitation=excitation)
+    model = sliding.build(
+        sliding.SlidingBody(sliding.SlidingBlock(mu)), MPI.COMM_WORLD, excitation=excitation
+    )
     solution = vc.simulate(
-        model.problem, scheme=vc.MoreauJean(), solver=vc.Condensed(), dt=dt, t_end=t_end, state=model.rest,
-        record=(vc.Energy(), vc.Contact(), vc.Probe({"centre": model.centre})), progress=False,
+        model.problem,
+        scheme=vc.MoreauJean(),
+        solver=vc.Condensed(),
+        dt=dt,
+        t_end=t_end,
+        state=model.rest,
+        record=(vc.Energy(), vc.Contact(), vc.Probe({"centre": model.centre})),
+        progress=False,
     )
     assert 0.0 < solution.facts["worst_certificate"] <= 1e-9
     u, defect = solution.history["u_x_centre"], np.abs(solution.history["energy_defect"]).max()
     # round-off: on five kinds of processor, with steps of 0.5 to 2 ms, at most 0.11 of this; 1.35e-10 of the energy
-    assert 0.0 < defect <= 1e-12 * solution.facts["energy"]["energy_max"] + rounded(model.problem, np.abs(u).max())
+    assert (
+        0.0
+        < defect
+        <= 1e-12 * solution.facts["energy"]["energy_max"] + rounded(model.problem, np.abs(u).max())
+    )
     return solution.history, u - u[0]
 
 
@@ -41,7 +55,9 @@ def test_rectangular_pulse():
     assert u[-1] == pytest.approx(-0.147150, rel=0.01)
     t = history["t"]
     assert np.ptp(u[t > 0.502]) < 1e-6 and u[np.searchsorted(t, 0.48)] > u[-1] + 1e-4
-    assert history["loss_friction"][-1] == pytest.approx(0.2 * 2400.0 * 0.5 * G * 0.147150, rel=0.01)
+    assert history["loss_friction"][-1] == pytest.approx(
+        0.2 * 2400.0 * 0.5 * G * 0.147150, rel=0.01
+    )
     assert history["contact_resultant"][-1] == pytest.approx(2400.0 * 0.5 * G, rel=1e-3)
 
 

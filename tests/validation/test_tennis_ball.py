@@ -26,7 +26,10 @@ SCHEMES: dict[str, Any] = {"midpoint": vc.Midpoint(), "default": None}
 one_rank = pytest.mark.serial  # whole marches, slow on several ranks: these have one of the runs
 every_run = pytest.mark.parametrize(
     ("scheme", "law"),
-    [pytest.param(*run, marks=() if run == ("default", "none") else one_rank) for run in product(SCHEMES, LAWS)],
+    [
+        pytest.param(*run, marks=() if run == ("default", "none") else one_rank)
+        for run in product(SCHEMES, LAWS)
+    ],
 )
 
 
@@ -44,13 +47,24 @@ def run(law: str, scheme: str, push: Push = PUSH, size: float = 0.04) -> dict[st
     of the last contact."""
     disk = model(push, size)
     solution = vc.simulate(
-        disk.problem(friction=LAWS[law]), scheme=SCHEMES[scheme], dt=disk.disk.time_step, t_end=4.0, progress=False,
-        record=(vc.Energy(), vc.Contact(), Momentum((0.0, disk.disk.radius)), vc.Probe(disk.probes())),
+        disk.problem(friction=LAWS[law]),
+        scheme=SCHEMES[scheme],
+        dt=disk.disk.time_step,
+        t_end=4.0,
+        progress=False,
+        record=(
+            vc.Energy(),
+            vc.Contact(),
+            Momentum((0.0, disk.disk.radius)),
+            vc.Probe(disk.probes()),
+        ),
     )
     assert 0.0 < solution.facts["worst_certificate"] <= 1e-9
     history = dict(solution.history)
     force = history["contact_resultant"]
-    history["force"] = force if scheme == "midpoint" else np.append(0.0, 0.5 * (force[1:] + force[:-1]))
+    history["force"] = (
+        force if scheme == "midpoint" else np.append(0.0, 0.5 * (force[1:] + force[:-1]))
+    )
     history["energy"] = history["energy_kinetic"] + history["energy_strain"]
     history["last"] = np.flatnonzero(history["contact_active"])[-1]
     return history
@@ -63,7 +77,9 @@ def test_flight(scheme, law):
     as the source warns."""
     history = run(law, scheme)
     last = int(history["last"])
-    flight = slice(last + 2, None)  # the force of a step is the mean of both ends in the default scheme
+    flight = slice(
+        last + 2, None
+    )  # the force of a step is the mean of both ends in the default scheme
     assert 1.2 < history["t"][last] < 1.4 and history["contact_active"][1 : last + 1].min() >= 1.0
     assert not history["pressure"][flight].any() and history["contact_min_gap"][-1] > 0.1
     for name in ("energy", "momentum_y"):
@@ -90,7 +106,9 @@ def test_momentum_and_energy_have_their_sources(scheme, law):
     largest = history["energy"].max()
     assert np.max(np.abs(history["work_input"] - losses - history["energy"])) < 1e-10 * largest
     assert np.abs(history["loss_contact"]).max() < 1e-3 * largest
-    if scheme == "midpoint":  # V9.1; the default scheme has the work of mean reactions, which may be of either sign
+    if (
+        scheme == "midpoint"
+    ):  # V9.1; the default scheme has the work of mean reactions, which may be of either sign
         assert np.diff(history["loss_contact"]).min() > -1e-14 * largest
         assert np.diff(history["loss_friction"]).min() > -1e-14 * largest
 
@@ -115,7 +133,9 @@ def test_gentle_push_of_the_boundary_elements():
     assert free["t"][free["last"]] == pytest.approx(2.69, abs=2 * 0.01 + 1e-9)
     velocity = free["momentum_y"][-1] / model(GENTLE, 0.02).mass
     assert velocity == pytest.approx(0.06793, rel=5e-3)
-    assert rubbed["momentum_y"][-1] / free["momentum_y"][-1] == pytest.approx(0.06789 / 0.06793, abs=1.5e-4)
+    assert rubbed["momentum_y"][-1] / free["momentum_y"][-1] == pytest.approx(
+        0.06789 / 0.06793, abs=1.5e-4
+    )
     assert rubbed["energy"][-1] < free["energy"][-1]
 
 
@@ -142,7 +162,9 @@ def test_gap_of_the_moving_plane():
     assert np.all(surface.normals == (0.0, -1.0)) and np.ptp(x) > R
     for t in (0.0, 0.3, 1.0, 1.3, 2.5):
         s = 0.025 * (1.0 - np.cos(np.pi * t)) if t < 2.0 else 0.0
-        assert surface.everywhere(surface.gap(t)) == pytest.approx(R - np.sqrt(R**2 - x**2) - s, abs=1e-12)
+        assert surface.everywhere(surface.gap(t)) == pytest.approx(
+            R - np.sqrt(R**2 - x**2) - s, abs=1e-12
+        )
 
 
 @one_rank
@@ -153,7 +175,9 @@ def test_disk_mesh():
     assert images == {(x, y) for x, y in mesh.points + 0.0} and (0.0, 0.0) in images
     a, b, c = np.moveaxis(mesh.points[mesh.cells], 1, 0)
     (x1, y1), (x2, y2) = (b - a).T, (c - a).T
-    assert 0.5 * np.abs(x1 * y2 - x2 * y1).sum() == pytest.approx(np.pi * 0.25 * (1.0 - 0.1**2 / 6.0), rel=1e-4)
+    assert 0.5 * np.abs(x1 * y2 - x2 * y1).sum() == pytest.approx(
+        np.pi * 0.25 * (1.0 - 0.1**2 / 6.0), rel=1e-4
+    )
     side = np.unique(np.concatenate([rows.ravel() for rows in mesh.facet_groups.values()]))
     assert np.linalg.norm(mesh.points[side] - (0.0, 0.5), axis=1) == pytest.approx(0.5, rel=1e-12)
     foot = mesh.points[np.unique(mesh.facet_groups["foot"])]
@@ -164,7 +188,13 @@ def test_disk_mesh():
 
 @pytest.mark.serial
 def test_bad_input_is_refused():
-    for wrong in ({"size": 0.0}, {"size": 0.4}, {"foot": 1.6}, {"foot": 0.01}, {"radius": float("nan")}):
+    for wrong in (
+        {"size": 0.0},
+        {"size": 0.4},
+        {"foot": 1.6},
+        {"foot": 0.01},
+        {"radius": float("nan")},
+    ):
         with pytest.raises(InputError, match="of a disk|disk of radius"):
             DiskMesh(**({"radius": 0.5, "size": 0.04} | wrong))
     with pytest.raises(InputError, match="rise is 0.0"):
@@ -172,13 +202,20 @@ def test_bad_input_is_refused():
 
 
 @one_rank
-def test_the_tennis_ball_demo(comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_tennis_ball_demo(
+    comm: Any, shared_tmp: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """V7.3 with cells of 0.1: certified, ledgers closed, no change of energy in flight; figures drawn."""
     numbers = demo("tennis_ball").main(quick=True, out=shared_tmp, progress=False)
     comm.Barrier()  # rank 0 draws
     for name in ("no friction", "Coulomb 2", "Tresca 2"):
-        assert 0.0 < numbers[f"{name}: certificate"] <= 1e-9 and 0.0 < numbers[f"{name}: ledger defect"] <= 1e-10
-        assert max(numbers[f"{name}: change of energy"], numbers[f"{name}: angular momentum"]) < 1e-10
+        assert (
+            0.0 < numbers[f"{name}: certificate"] <= 1e-9
+            and 0.0 < numbers[f"{name}: ledger defect"] <= 1e-10
+        )
+        assert (
+            max(numbers[f"{name}: change of energy"], numbers[f"{name}: angular momentum"]) < 1e-10
+        )
         assert numbers[f"{name}: velocity"] == pytest.approx(0.066, rel=0.06)
     for figure in ("snapshots", "tractions", "energies"):
         assert (shared_tmp / f"{figure}.png").stat().st_size > 10_000

@@ -20,11 +20,20 @@ BENT = 0.2  # [1/m]: curvature of the curved faces
 
 
 @pytest.mark.serial  # fem/test_thrown_bodies_on_ranks.py has what may depend on ranks
-@pytest.mark.parametrize(("bent", "gap", "friction", "simplices"), [
-    (0.0, 0.0, 0.0, False), (0.0, 0.0, 0.4, True), (BENT, 0.0, 0.0, True), (BENT, 0.0, 0.4, False),
-    (BENT, 0.02, 0.0, False),
-], ids=["flat", "flat-rough", "curved", "curved-rough", "curved-apart"])
-@pytest.mark.parametrize("scheme", [vc.Trapezoidal(), vc.Midpoint(), vc.MoreauJean()], ids=lambda s: type(s).__name__)
+@pytest.mark.parametrize(
+    ("bent", "gap", "friction", "simplices"),
+    [
+        (0.0, 0.0, 0.0, False),
+        (0.0, 0.0, 0.4, True),
+        (BENT, 0.0, 0.0, True),
+        (BENT, 0.0, 0.4, False),
+        (BENT, 0.02, 0.0, False),
+    ],
+    ids=["flat", "flat-rough", "curved", "curved-rough", "curved-apart"],
+)
+@pytest.mark.parametrize(
+    "scheme", [vc.Trapezoidal(), vc.Midpoint(), vc.MoreauJean()], ids=lambda s: type(s).__name__
+)
 def test_a_whole_collision(scheme, bent, gap, friction, simplices):
     """Momentum, angular momentum and the ledger to 1e-11 of the largest. Rough curved faces are polygons that do not
     fit, and friction acts on both sides of the gaps between them: its moment is all that angular momentum changes by,
@@ -49,9 +58,20 @@ def test_a_whole_collision(scheme, bent, gap, friction, simplices):
         defects.append(energy_balance(problem, report.old, state, balance).defect)
         energy = max(energy, energies(equations, state.u, state.v).total)
         sets.append(status(report))
-    counts, scale, drift = np.array(sets), np.abs(start).max(), np.abs(np.array(motions) - start).max(axis=0)
-    assert np.abs(np.diff(motions, axis=0) + moments).max() < 1e-11 * scale and drift[:3].max() < 1e-11 * scale
+    counts, scale, drift = (
+        np.array(sets),
+        np.abs(start).max(),
+        np.abs(np.array(motions) - start).max(axis=0),
+    )
+    assert (
+        np.abs(np.diff(motions, axis=0) + moments).max() < 1e-11 * scale
+        and drift[:3].max() < 1e-11 * scale
+    )
     assert drift[3:].max() < (2e-4 if bent and friction else 1e-11) * scale
     assert np.abs(np.cumsum(defects)).max() < 1e-11 * energy
-    assert np.all(counts[-3:] == OPEN) and np.any(counts == SLIPS) and np.any(counts == STICKS) == (friction > 0.0)
+    assert (
+        np.all(counts[-3:] == OPEN)
+        and np.any(counts == SLIPS)
+        and np.any(counts == STICKS) == (friction > 0.0)
+    )
     assert np.abs(momenta(problem, state.v) - before).max() > 0.3 * np.abs(before).max()

@@ -24,7 +24,10 @@ FORM = Lubkin(force=2.0, a=1.3, mu=0.4, G=5.0)
 def carried(c: float) -> float:
     """The moment of τ: 2 π ∫ r² τ dr."""
     total = 0.0
-    for edge, start in ((c, 0.0), (FORM.a, np.arcsin(c / FORM.a))):  # r = edge sin: smooth at both roots
+    for edge, start in (
+        (c, 0.0),
+        (FORM.a, np.arcsin(c / FORM.a)),
+    ):  # r = edge sin: smooth at both roots
         angle, w = gauss(start, 0.5 * np.pi)
         r = edge * np.sin(angle)
         total += 2.0 * np.pi * float((w * edge * np.cos(angle) * r**2) @ FORM.traction(r, c))
@@ -75,10 +78,15 @@ def test_v2_11_displacements_below_the_twist():
             share = FORM.traction([r], c)[0] * w * FORM.a * np.cos(s) * 2.0 * np.pi / len(angle)
             places.append(ring[:, [0, 2]])
             forces.append(share * turned(ring, 1.0))
-    ringed = under_point_loads(points, np.concatenate(places), np.concatenate(forces), G=FORM.G, nu=0.3)
+    ringed = under_point_loads(
+        points, np.concatenate(places), np.concatenate(forces), G=FORM.G, nu=0.3
+    )
     assert np.abs(ringed - FORM.field(points, c)).max() < 1e-4 * np.abs(ringed).max()
     away = 1e3 * points
-    for moment, field in ((FORM.no_slip(0.01), FORM.stuck_field(away, 0.01)), (FORM.moment(c), FORM.field(away, c))):
+    for moment, field in (
+        (FORM.no_slip(0.01), FORM.stuck_field(away, 0.01)),
+        (FORM.moment(c), FORM.field(away, c)),
+    ):
         share = moment / (8.0 * np.pi * FORM.G * np.linalg.norm(away, axis=1) ** 3)
         assert np.allclose(field, turned(away, 1.0) * share[:, None], rtol=1e-5)
 
@@ -96,7 +104,11 @@ def test_v2_11_slip_from_the_edge():
     1 % (0.3), radius of stick to 0.12 a, half a cell (0.05), τ in L2 to 15 % where most slips (5)."""
     stages = twisted().compared()
     for found in stages:
-        assert abs(found["force"]) < 3e-3 and abs(found["moment"]) < 0.03 and abs(found["stick"]) < 0.12
+        assert (
+            abs(found["force"]) < 3e-3
+            and abs(found["moment"]) < 0.03
+            and abs(found["stick"]) < 0.12
+        )
     assert abs(stages[-1]["moment"]) < 0.01 and stages[-1]["profile"] < 0.15
 
 
@@ -113,7 +125,9 @@ def test_v2_11_no_slip():
 def test_v2_11_ranks_agree():
     """All ranks together and each alone: the same points are open, stick and slip; nodal forces to 1e-9 P."""
     stages = range(1, 1 + len(STICK))
-    together, alone = (Torsion(3, (1.0, 1.1), comm).rubbed.stages(stages) for comm in (COMM, MPI.COMM_SELF))
+    together, alone = (
+        Torsion(3, (1.0, 1.1), comm).rubbed.stages(stages) for comm in (COMM, MPI.COMM_SELF)
+    )
     assert all({*stages[-1].status(MU)} == {0, 1, 2} for stages in together)
     for one, other in zip(sum(together, []), sum(alone, []), strict=True):
         assert np.array_equal(one.status(MU), other.status(MU))

@@ -59,40 +59,70 @@ class Collision:
     dt: float
 
 
-def collide(case: TwoBars, d: int, courant: float, *, triangles: bool = False, **how: Any) -> Collision:
+def collide(
+    case: TwoBars, d: int, courant: float, *, triangles: bool = False, **how: Any
+) -> Collision:
     """Two bars, or strips with nu = 0, that touch at the start; rho = 1, so that c = z."""
     h = case.length1 / ELEMENTS
     section = {1: 1.0, 2: ACROSS * h}[d]
 
     def bar(length: float) -> BlockMesh:
         cells = round(length / h)
-        lengths, divisions = ((length,), (cells,)) if d == 1 else ((section, length), (ACROSS, cells))
+        lengths, divisions = (
+            ((length,), (cells,)) if d == 1 else ((section, length), (ACROSS, cells))
+        )
         return BlockMesh(lengths=lengths, divisions=divisions, simplices=triangles)
 
-    mesh, tags = build_mesh(mesh_of := TwoBlocks(lower=bar(case.length1), upper=bar(case.length2)), COMM)
-    cells = (tags["lower"], LinearElastic(case.c1**2, 0.0, 1.0)), (tags["upper"], LinearElastic(case.c2**2, 0.0, 1.0))
+    mesh, tags = build_mesh(
+        mesh_of := TwoBlocks(lower=bar(case.length1), upper=bar(case.length2)), COMM
+    )
+    cells = (
+        (tags["lower"], LinearElastic(case.c1**2, 0.0, 1.0)),
+        (tags["upper"], LinearElastic(case.c2**2, 0.0, 1.0)),
+    )
     system = assemble(mesh, cells)
-    system = thrown(system, lambda x: case.speed * np.tile(np.eye(d)[-1], (len(x), 1)), np.zeros_like)
-    problem = ContactProblem(system, contact_pair(system, *(tags[side] for side in mesh_of.interface)))
+    system = thrown(
+        system, lambda x: case.speed * np.tile(np.eye(d)[-1], (len(x), 1)), np.zeros_like
+    )
+    problem = ContactProblem(
+        system, contact_pair(system, *(tags[side] for side in mesh_of.interface))
+    )
     dt, rows = courant * h / max(case.c1, case.c2), []
     for state, report in march(problem, dt=dt, steps=round(1.5 * case.duration / dt), **how):
         assert report.certificate.worst <= 1e-9
         equations = report.problem.equations
         energy = equations.kinetic_energy(state.v) + equations.strain_energy(state.u)
-        rows.append((state.t, *COMM.allreduce(np.array([state.r_n.sum(), report.balance.r_n.sum()])), energy))
+        rows.append(
+            (
+                state.t,
+                *COMM.allreduce(np.array([state.r_n.sum(), report.balance.r_n.sum()])),
+                energy,
+            )
+        )
     t, *values = np.array(rows).T
     masses = section * np.array([case.length1, case.length2])
-    return Collision(t, *(x / section for x in values), momenta(report.problem, state.v)[:, -1] / masses, dt)
+    return Collision(
+        t, *(x / section for x in values), momenta(report.problem, state.v)[:, -1] / masses, dt
+    )
 
 
-BODIES: dict[str, dict[str, Any]] = {"bars": {"d": 1}, "strips": {"d": 2}, "triangles": {"d": 2, "triangles": True}}
+BODIES: dict[str, dict[str, Any]] = {
+    "bars": {"d": 1},
+    "strips": {"d": 2},
+    "triangles": {"d": 2, "triangles": True},
+}
 
 
 @pytest.mark.serial
 @pytest.mark.parametrize(
     ("body", "courant"),
-    [("bars", 1.0), ("bars", 0.5), pytest.param("bars", 0.1, marks=pytest.mark.serial), ("strips", 0.5),
-     ("triangles", 1.0)],
+    [
+        ("bars", 1.0),
+        ("bars", 0.5),
+        pytest.param("bars", 0.1, marks=pytest.mark.serial),
+        ("strips", 0.5),
+        ("triangles", 1.0),
+    ],
 )
 def test_v1_4_default_scheme(body, courant):
     """Pressure rho c v0/2 in the mean within 0.2 %, at every step within 3 %; duration 2 L1/c within 5 %, velocities
@@ -102,9 +132,13 @@ def test_v1_4_default_scheme(body, courant):
     window = (found.t > 0.1 * case.duration) & (found.t < 0.9 * case.duration)
     assert found.mean[window].mean() == pytest.approx(case.pressure, rel=2e-3)
     assert np.abs(found.pressure[window] / case.pressure - 1.0).max() < 0.03
-    assert found.t[found.pressure > 0.5 * case.pressure][-1] == pytest.approx(case.duration, rel=0.05)
+    assert found.t[found.pressure > 0.5 * case.pressure][-1] == pytest.approx(
+        case.duration, rel=0.05
+    )
     assert found.mean.sum() * found.dt == pytest.approx(case.impulse, rel=0.01)
-    assert found.velocities == pytest.approx([case.velocity1, case.velocity2], abs=0.01 * case.speed)
+    assert found.velocities == pytest.approx(
+        [case.velocity1, case.velocity2], abs=0.01 * case.speed
+    )
     restitution = (found.velocities[1] - found.velocities[0]) / case.speed
     assert restitution == pytest.approx(case.restitution, abs=0.015)
     assert np.abs(found.energy / found.energy[0] - 1.0).max() < 0.01
@@ -137,17 +171,24 @@ def test_v1_4_contact_stabilised(body):
 # V2.1 -----------------------------------------------------------------------------------------------------------------
 
 P = 1.0e8
-STEEL, BRASS = LinearElastic(E=2.1e11, nu=0.3, rho=7850.0), LinearElastic(E=1.0e11, nu=0.2, rho=8400.0)
+STEEL, BRASS = (
+    LinearElastic(E=2.1e11, nu=0.3, rho=7850.0),
+    LinearElastic(E=1.0e11, nu=0.2, rho=8400.0),
+)
 
 
 def strains(material: LinearElastic, d: int) -> Array:
     """Of the uniaxial pressure P along y, free sideways, plane strain or space."""
     E, nu = material.E, material.nu
-    down, aside = (P * (1.0 - nu**2) / E, nu * (1.0 + nu) * P / E) if d == 2 else (P / E, nu * P / E)
+    down, aside = (
+        (P * (1.0 - nu**2) / E, nu * (1.0 + nu) * P / E) if d == 2 else (P / E, nu * P / E)
+    )
     return np.array([aside, -down, aside])[:d]
 
 
-@pytest.mark.parametrize("solver", [Condensed(), Volume(method=ReducedNewton())], ids=["condensed", "volume"])
+@pytest.mark.parametrize(
+    "solver", [Condensed(), Volume(method=ReducedNewton())], ids=["condensed", "volume"]
+)
 @pytest.mark.parametrize("simplices", [False, True], ids=["tensor", "simplices"])
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("swapped", [False, True], ids=["upper-lower", "lower-upper"])
@@ -166,9 +207,13 @@ def test_v2_1_pressure_through_an_interface(d, simplices, solver, swapped):
     built, tags = build_mesh(mesh, COMM)
     hold = [
         Prescribed(tags[f"{name}_{side}"], components=(i,))
-        for name in ("lower", "upper") for side, i in (("left", 0), ("back", 2))[: d - 1]
+        for name in ("lower", "upper")
+        for side, i in (("left", 0), ("back", 2))[: d - 1]
     ]
-    hold += [Prescribed(tags["lower_bottom"], components=(1,)), held_by(tags, "upper_top", upper, 1)]
+    hold += [
+        Prescribed(tags["lower_bottom"], components=(1,)),
+        held_by(tags, "upper_top", upper, 1),
+    ]
     system = assemble(built, [(tags["lower"], BRASS), (tags["upper"], STEEL)], prescribed=hold)
     sides = [tags[side] for side in mesh.interface]
     surface = contact_pair(system, *(sides[::-1] if swapped else sides))
@@ -176,16 +221,28 @@ def test_v2_1_pressure_through_an_interface(d, simplices, solver, swapped):
     state = static_equilibrium(problem, solver=solver)
     exact = per_body(system, lower, upper)
     found = problem.cartesian(state.u)
-    error, size = (float(COMM.allreduce(float(np.abs(x).max(initial=0.0)), op=MPI.MAX)) for x in (found - exact, exact))
+    error, size = (
+        float(COMM.allreduce(float(np.abs(x).max(initial=0.0)), op=MPI.MAX))
+        for x in (found - exact, exact)
+    )
     assert error < 1e-12 * size
-    assert np.abs(surface.everywhere(state.r_n / surface.weights) / P - 1.0).max() < 1e-12 and state.active.all()
+    assert (
+        np.abs(surface.everywhere(state.r_n / surface.weights) / P - 1.0).max() < 1e-12
+        and state.active.all()
+    )
 
 
 # Dynamics -------------------------------------------------------------------------------------------------------------
 
 
 def meeting(
-    comm: Any, d: int = 2, *, friction: Any = None, mass: Any = None, angle: float = 0.3, fine: int = 1
+    comm: Any,
+    d: int = 2,
+    *,
+    friction: Any = None,
+    mass: Any = None,
+    angle: float = 0.3,
+    fine: int = 1,
 ) -> ContactProblem:
     """The upper block thrown obliquely, and turning, on the free lower one; nothing else acts on them."""
     divisions = tuple(fine * n for n in (6, 5, 4))
@@ -228,7 +285,9 @@ def test_v9_8_what_one_body_gains_the_other_loses(d, friction, scheme, mass):
             assert new[1] - old[1] == pytest.approx(-impulse, abs=1e-12 * size)
         else:
             limit = friction.limit(state.r_n, problem.surface.weights, 1.0)
-            slip = np.linalg.norm(problem.surface.tangential_values(report.result.x) - report.step.slip0, axis=1)
+            slip = np.linalg.norm(
+                problem.surface.tangential_values(report.result.x) - report.step.slip0, axis=1
+            )
             slid.append((np.sum(slip[limit > 0.0] > 0.0), np.sum(slip[limit > 0.0] == 0.0)))
         old = new
     assert np.abs(old[0]).max() > 0.1 * size
@@ -255,7 +314,9 @@ def test_any_number_of_ranks(friction, scheme, mass):
 def test_condensed_and_volume_agree(d, scheme, mass):
     """Every step from the same state, to 1e-9."""
     solvers = (Condensed(), Volume(method=ReducedNewton()))
-    compared = cross_check(meeting(COMM, d, mass=mass), scheme=scheme, solvers=solvers, dt=1e-3, steps=30)
+    compared = cross_check(
+        meeting(COMM, d, mass=mass), scheme=scheme, solvers=solvers, dt=1e-3, steps=30
+    )
     assert compared.worst <= 1e-9
 
 
@@ -276,7 +337,11 @@ def test_redistributed_mass_keeps_the_inertia_of_each_body(d, frictional):
     for i in range(d):
         for j in range(i + 1, d):
             plane = np.eye(d)[i], np.eye(d)[j]
-            rigid.append(nodal(system, lambda x, p=plane: np.outer(x @ p[0], p[1]) - np.outer(x @ p[1], p[0])))
+            rigid.append(
+                nodal(
+                    system, lambda x, p=plane: np.outer(x @ p[0], p[1]) - np.outer(x @ p[1], p[0])
+                )
+            )
     motions = [motion * (system.space.bodies == body) for body in (0, 1) for motion in rigid]
     grams = []
     for problem in problems:

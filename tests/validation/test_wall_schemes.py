@@ -18,13 +18,20 @@ from vi_contact.schemes.trapezoidal import Trapezoidal
 
 COMM = MPI.COMM_WORLD
 MASSLESS: dict[str, Any] = {  # on their own mass, without impact law
-    "trapezoidal": Trapezoidal(), "newmark": vc.Newmark(), "hht": vc.HHT(-0.1), "houbolt": vc.Houbolt(),
-    "generalised-alpha": vc.GeneralisedAlpha.spectral_radius(0.8), "moreau-jean": vc.MoreauJean(),
-    "contact-stabilised": vc.ContactStabilisedNewmark(), "kane": vc.ContactStabilisedNewmark(projected=False),
+    "trapezoidal": Trapezoidal(),
+    "newmark": vc.Newmark(),
+    "hht": vc.HHT(-0.1),
+    "houbolt": vc.Houbolt(),
+    "generalised-alpha": vc.GeneralisedAlpha.spectral_radius(0.8),
+    "moreau-jean": vc.MoreauJean(),
+    "contact-stabilised": vc.ContactStabilisedNewmark(),
+    "kane": vc.ContactStabilisedNewmark(projected=False),
     "midpoint": vc.Midpoint(),
 }
 IMPULSIVE: dict[str, Any] = {  # on consistent mass with the source's inelastic rule
-    "zwt": vc.ZienkiewiczWoodTaylor(phi=0.5), "ss22": vc.SS22(), "newmark-consistent": vc.Newmark(),
+    "zwt": vc.ZienkiewiczWoodTaylor(phi=0.5),
+    "ss22": vc.SS22(),
+    "newmark-consistent": vc.Newmark(),
 }
 SCHEMES = MASSLESS | IMPULSIVE
 
@@ -33,23 +40,34 @@ def wall() -> WallModel:
     return build(Wall(), COMM, base_inertia="catalogue")
 
 
-def run(model: WallModel, case: str, name: str, *, refined: int = 1, steps: int = 400, record: Any = ()) -> Solution:
+def run(
+    model: WallModel, case: str, name: str, *, refined: int = 1, steps: int = 400, record: Any = ()
+) -> Solution:
     """All recorders unless told which."""
     scheme = SCHEMES[name]
-    law: dict[str, Any] = {"impact": None, "mass": scheme.mass} if name in MASSLESS else {
-        "impact": Inelastic(), "mass": ConsistentMass()}
+    law: dict[str, Any] = (
+        {"impact": None, "mass": scheme.mass}
+        if name in MASSLESS
+        else {"impact": Inelastic(), "mass": ConsistentMass()}
+    )
     return simulate(
-        model.problem(case, **law), scheme=scheme,
-        dt=model.time_step() / refined, steps=steps * refined,
-        record=record or (Energy(), Contact(), Probe(model.probes())), progress=False,
+        model.problem(case, **law),
+        scheme=scheme,
+        dt=model.time_step() / refined,
+        steps=steps * refined,
+        record=record or (Energy(), Contact(), Probe(model.probes())),
+        progress=False,
     )
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "case"), [  # on two ranks one: test_on_finite_elements.py has others there
-    pytest.param(name, case, marks=() if name == "zwt" else pytest.mark.serial)
-    for name, case in zip(SCHEMES, "ab" * 6, strict=True)
-])
+@pytest.mark.parametrize(
+    ("name", "case"),
+    [  # on two ranks one: test_on_finite_elements.py has others there
+        pytest.param(name, case, marks=() if name == "zwt" else pytest.mark.serial)
+        for name, case in zip(SCHEMES, "ab" * 6, strict=True)
+    ],
+)
 def test_every_scheme_is_certified_and_closes_its_ledger(name: str, case: str) -> None:
     """V9.7 over the seed's 400 steps, in either case by turns; position-level schemes never penetrate."""
     solution = run(wall(), case, name)
@@ -76,7 +94,9 @@ def test_schemes_agree_when_dt_is_fine() -> None:
     have no other, within 10 %."""
     model = wall()
     found = {
-        name: run(model, "b", name, refined=16, steps=100, record=[Probe(model.probes())]).history["u_x_12"].min()
+        name: run(model, "b", name, refined=16, steps=100, record=[Probe(model.probes())])
+        .history["u_x_12"]
+        .min()
         for name in ("zwt", "trapezoidal", "hht", "contact-stabilised", "generalised-alpha")
     }
     assert max(found.values()) == pytest.approx(min(found.values()), rel=0.1), found
@@ -89,6 +109,10 @@ def test_the_default_needs_no_names() -> None:
     chosen = simulate(problem, dt=model.time_step(), steps=30, progress=False)
     named = simulate(problem, scheme=Trapezoidal(), dt=model.time_step(), steps=30, progress=False)
     assert np.array_equal(chosen.state.u, named.state.u)
-    assert chosen.facts["scheme"].startswith("Trapezoidal") and chosen.facts["mass"].startswith("Redistributed")
+    assert chosen.facts["scheme"].startswith("Trapezoidal") and chosen.facts["mass"].startswith(
+        "Redistributed"
+    )
     seed = simulate(model.problem("b"), dt=model.time_step(), steps=3, progress=False)
-    assert seed.facts["scheme"].startswith("Zienkiewicz") and seed.facts["mass"] == "ConsistentMass()"
+    assert (
+        seed.facts["scheme"].startswith("Zienkiewicz") and seed.facts["mass"] == "ConsistentMass()"
+    )

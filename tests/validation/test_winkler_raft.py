@@ -22,7 +22,9 @@ from vi_contact.meshes.block import BlockMesh
 
 B, L, H, K, P = 12.0, 9.0, 4.0, 2.0e7, 1.2e7  # m, Pa/m, N
 RAFT = LinearElastic(E=1.0e13, nu=0.0, rho=1.0)
-SAG = 60.0 / 384.0 * K * B**4 / (RAFT.E * H**3)  # of a beam with this load, over its settlement on springs
+SAG = (
+    60.0 / 384.0 * K * B**4 / (RAFT.E * H**3)
+)  # of a beam with this load, over its settlement on springs
 
 
 class Standing:
@@ -30,19 +32,23 @@ class Standing:
 
     def __init__(self, n, m, load):
         mesh, tags = fem.build_mesh(
-            BlockMesh(lengths=(B, H, L), divisions=(n, 1, m), corner=(-0.5 * B, 0.0, -0.5 * L)), MPI.COMM_WORLD
+            BlockMesh(lengths=(B, H, L), divisions=(n, 1, m), corner=(-0.5 * B, 0.0, -0.5 * L)),
+            MPI.COMM_WORLD,
         )
 
         def pressed(points, t):
-            tilted = 1.0 + 12.0 * load[0] * points[:, 0] / B**2 + 12.0 * load[1] * points[:, 2] / L**2
+            tilted = (
+                1.0 + 12.0 * load[0] * points[:, 0] / B**2 + 12.0 * load[1] * points[:, 2] / L**2
+            )
             return np.outer(tilted, [0.0, -P / (B * L), 0.0])
 
         system = fem.assemble(mesh, RAFT, loads=fem.Traction(tags["top"], pressed))
         surface = fem.contact_surface(system, tags["bottom"], obstacle=Touching()).on_springs(K)
         state = static_equilibrium(ContactProblem(system, surface))
         down = surface.normal_values(state.u)
-        points, self.weights, forces, self.down = map(surface.everywhere,
-                                                      (surface.points, surface.weights, state.r_n, down))
+        points, self.weights, forces, self.down = map(
+            surface.everywhere, (surface.points, surface.weights, state.r_n, down)
+        )
         self.x, self.pressure = points[:, [0, 2]], forces / self.weights
         assert forces.sum() == pytest.approx(P, rel=1e-9)
         assert (forces @ self.x / P)[[0, 1]] == pytest.approx(load, abs=1e-9 * B)
@@ -79,10 +85,17 @@ def test_v2_10_raft_that_lifts_off(e):
         settlement, rotation, across = found.plane
         assert abs(across) < 1e-11 * rotation
         closed = 0.5 * B + settlement / rotation
-        errors.append([np.abs(found.pressure - exact).max() / largest, abs(rotation * K * a / largest - 1.0),
-                       abs(closed / a - 1.0)])
+        errors.append(
+            [
+                np.abs(found.pressure - exact).max() / largest,
+                abs(rotation * K * a / largest - 1.0),
+                abs(closed / a - 1.0),
+            ]
+        )
     assert np.all(errors[1] < np.array([3.3e-3, 6.6e-3, 4e-3]))
-    assert np.all(np.divide(*errors) > 5.0)  # 16, but for where the end of contact lies between two nodes
+    assert np.all(
+        np.divide(*errors) > 5.0
+    )  # 16, but for where the end of contact lies between two nodes
 
 
 def test_v2_10_raft_that_stands_on_a_corner():

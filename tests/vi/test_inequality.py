@@ -42,7 +42,11 @@ def conducting(u: Any, v: Any) -> Any:
 
 def film(u: Any, v: Any) -> Any:
     """A soap film: the derivative of its area."""
-    return ufl.inner(ufl.grad(u), ufl.grad(v)) / ufl.sqrt(1.0 + ufl.inner(ufl.grad(u), ufl.grad(u))) * ufl.dx
+    return (
+        ufl.inner(ufl.grad(u), ufl.grad(v))
+        / ufl.sqrt(1.0 + ufl.inner(ufl.grad(u), ufl.grad(u)))
+        * ufl.dx
+    )
 
 
 def owned(f: Any) -> Any:
@@ -54,29 +58,46 @@ def owned(f: Any) -> Any:
 @pytest.mark.parametrize("method", METHODS, ids=name_of)
 def test_a_linear_problem_on_every_route(comm: Any, method: Any) -> None:
     known = Known(space(square(comm, 12), ("Lagrange", 1)), laplace)
-    result = vi.solve(known.linear, known.u, lower=known.lower, upper=known.upper, bcs=[known.bc], method=method)
+    result = vi.solve(
+        known.linear, known.u, lower=known.lower, upper=known.upper, bcs=[known.bc], method=method
+    )
     known.check(result, error=1e-11)
     assert result.method == name_of(method) and result.iterations == 1 and result.u is known.u
 
 
 @pytest.mark.two_ranks
-@pytest.mark.parametrize(("element", "cell", "width", "form"), [
-    (("Lagrange", 2), "quadrilateral", 1, laplace), (("Lagrange", 1), "triangle", 2, elastic),
-    (("Lagrange", 1), "triangle", 1, convection),
-], ids=["Q2", "elastic", "convection"])
-def test_other_elements_and_forms(comm: Any, element: Any, cell: str, width: int, form: Any) -> None:
+@pytest.mark.parametrize(
+    ("element", "cell", "width", "form"),
+    [
+        (("Lagrange", 2), "quadrilateral", 1, laplace),
+        (("Lagrange", 1), "triangle", 2, elastic),
+        (("Lagrange", 1), "triangle", 1, convection),
+    ],
+    ids=["Q2", "elastic", "convection"],
+)
+def test_other_elements_and_forms(
+    comm: Any, element: Any, cell: str, width: int, form: Any
+) -> None:
     """A linear F(u; v): recognised as such. On Q2 all ∫phi_i > 0; with convection nothing is minimised."""
     known = Known(space(square(comm, 10, cell), element, width), form)
     result = vi.solve(known.F, known.u, lower=known.lower, upper=known.upper, bcs=[known.bc])
     known.check(result, error=1e-11)
-    assert result.iterations == 1 and result.method == ("ReducedNewton" if form is convection else "TaoTron")
+    assert result.iterations == 1 and result.method == (
+        "ReducedNewton" if form is convection else "TaoTron"
+    )
 
 
 @pytest.mark.two_ranks
 def test_convection_by_the_semismooth_method(comm: Any) -> None:
     known = Known(space(square(comm, 10), ("Lagrange", 1)), convection)
-    result = vi.solve(known.linear, known.u, lower=known.lower, upper=known.upper, bcs=[known.bc],
-                      method=SemismoothNewton())
+    result = vi.solve(
+        known.linear,
+        known.u,
+        lower=known.lower,
+        upper=known.upper,
+        bcs=[known.bc],
+        method=SemismoothNewton(),
+    )
     known.check(result, error=1e-10)
 
 
@@ -91,7 +112,9 @@ def test_no_load_but_what_rounding_leaves_of_it(comm: Any, method: Any) -> None:
     for _ in range(4):
         u.x.array[:] = noise.random(len(u.x.array))
         u.x.scatter_forward()
-        result = vi.solve(laplace(u, v) + 20.0 * u * v * ufl.dx, u, lower=lower, upper=1.0, method=method)
+        result = vi.solve(
+            laplace(u, v) + 20.0 * u * v * ufl.dx, u, lower=lower, upper=1.0, method=method
+        )
         assert result.certificate.worst <= 1e-9
         assert owned(u).min() > 0.05 and np.all(owned(u)[owned(lower) == 1.0] == 1.0)
 
@@ -111,8 +134,17 @@ def test_units_change_nothing(comm: Any, tiny: float, force: float) -> None:
     """PETSc's own zero tolerance, 1e-8 in the unit of u, leaves the active set to chance in the first."""
     for method in (None, ReducedNewton()):
         known = Known(space(square(comm, 12), ("Lagrange", 1)), laplace, tiny=tiny, force=force)
-        known.check(vi.solve(known.linear, known.u, lower=known.lower, upper=known.upper, bcs=[known.bc],
-                             method=method), error=1e-11)
+        known.check(
+            vi.solve(
+                known.linear,
+                known.u,
+                lower=known.lower,
+                upper=known.upper,
+                bcs=[known.bc],
+                method=method,
+            ),
+            error=1e-11,
+        )
 
 
 @pytest.mark.two_ranks
@@ -134,7 +166,9 @@ def test_projection_of_constants_on_cells(comm: Any) -> None:
     F, n = (u - target) * ufl.TestFunction(V) * ufl.dx, len(owned(u))
     for lower, upper, wanted in (
         (-0.1, fem.Constant(V.mesh, 0.1), np.clip(target.x.array, -0.1, 0.1)),
-        (-np.inf, [0.1], np.minimum(target.x.array, 0.1)), (-1e20, 1e20, target.x.array), (None, None, target.x.array),
+        (-np.inf, [0.1], np.minimum(target.x.array, 0.1)),
+        (-1e20, 1e20, target.x.array),
+        (None, None, target.x.array),
     ):
         result = vi.solve(F, u, lower=lower, upper=upper)
         assert np.max(np.abs(u.x.array - wanted), initial=0.0) <= 1e-14
@@ -166,7 +200,10 @@ def test_a_string_above_a_floor(comm: Any) -> None:
     result = vi.solve(laplace(u, v) + 8.0 * v * ufl.dx, u, lower=-0.25, bcs=[clamped(V)])
     x = V.tabulate_dof_coordinates()[:, 0]
     near = np.minimum(x, 1.0 - x)
-    assert np.max(np.abs(u.x.array - np.where(near < 0.25, 4.0 * near**2 - 2.0 * near, -0.25))) <= 1e-14
+    assert (
+        np.max(np.abs(u.x.array - np.where(near < 0.25, 4.0 * near**2 - 2.0 * near, -0.25)))
+        <= 1e-14
+    )
     assert result.active == (17, 0)
     push = comm.allreduce(float(np.sum(owned(result.lambda_lower))))
     assert push == pytest.approx(4.0, abs=1e-12)  # the load on the half that lies on the floor
@@ -176,14 +213,18 @@ def test_a_component_is_bounded_and_another_held(comm: Any) -> None:
     """A block pushed against a wall: u_x <= 0.01 everywhere, u_y = 0, u_x = 0 on the left; bar theory."""
     V = space(square(comm, 4), ("Lagrange", 1), 2)
     on = V.mesh
-    left = fem.locate_dofs_topological(V.sub(0), 1, mesh.locate_entities_boundary(on, 1, lambda x: np.isclose(x[0], 0)))
+    left = fem.locate_dofs_topological(
+        V.sub(0), 1, mesh.locate_entities_boundary(on, 1, lambda x: np.isclose(x[0], 0))
+    )
     every = mesh.locate_entities(on, 2, lambda x: np.full(x.shape[1], True))
     on.topology.create_connectivity(2, 2)
     rollers = fem.locate_dofs_topological(V.sub(1), 2, every)
     u, v = fem.Function(V), ufl.TestFunction(V)
     bcs = [fem.dirichletbc(0.0, left, V.sub(0)), fem.dirichletbc(0.0, rollers, V.sub(1))]
     stiff = 2.0 + 1.0  # of a strip that cannot become wider
-    F = elastic(u, v) - 0.09 * v[0] * ufl.ds  # on all sides: 0.27 in all, what is 0.09 (1 + 2 x) / stiff without wall
+    F = (
+        elastic(u, v) - 0.09 * v[0] * ufl.ds
+    )  # on all sides: 0.27 in all, what is 0.09 (1 + 2 x) / stiff without wall
     free = vi.solve(F, u, bcs=bcs)
     largest = comm.allreduce(float(np.max(u.x.array)), op=_largest())
     assert free.active == (0, 0) and largest > 0.01
@@ -202,14 +243,20 @@ def _largest() -> Any:
 
 def test_a_failure_is_one_sentence_and_keeps_the_best(comm: Any) -> None:
     known = Known(space(square(comm, 8), ("Lagrange", 1)), conducting)
-    with pytest.raises(StepFailure, match=r"after 1 Newton steps, above 1e-09.*more iterations") as failure:
-        vi.solve(known.F, known.u, lower=known.lower, upper=known.upper, bcs=[known.bc], iterations=1)
+    with pytest.raises(
+        StepFailure, match=r"after 1 Newton steps, above 1e-09.*more iterations"
+    ) as failure:
+        vi.solve(
+            known.F, known.u, lower=known.lower, upper=known.upper, bcs=[known.bc], iterations=1
+        )
     assert "\n" not in str(failure.value)
     off = np.abs(known.u.x.array - known.exact.x.array)
     assert np.all(np.isfinite(off)) and np.max(off) < 0.3  # where it began: 0.35
     v = ufl.TestFunction(known.V)
     with pytest.raises(StepFailure, match="is not a number"):
-        vi.solve(laplace(known.u, v) + ufl.sqrt(known.u - 10.0) * v * ufl.dx, known.u, bcs=[known.bc])
+        vi.solve(
+            laplace(known.u, v) + ufl.sqrt(known.u - 10.0) * v * ufl.dx, known.u, bcs=[known.bc]
+        )
 
 
 def test_a_linear_form_that_is_not_positive_is_told(comm: Any) -> None:
@@ -217,7 +264,9 @@ def test_a_linear_form_that_is_not_positive_is_told(comm: Any) -> None:
     V = space(square(comm, 6), ("Lagrange", 1))
     u, v = fem.Function(V), ufl.TestFunction(V)
     F = laplace(u, v) - 400.0 * u * v * ufl.dx + v * ufl.dx
-    with pytest.raises(StepFailure, match="the linear problem is not solved: check that bcs or bounds") as failure:
+    with pytest.raises(
+        StepFailure, match="the linear problem is not solved: check that bcs or bounds"
+    ) as failure:
         vi.solve(F, u, upper=1.0, bcs=[clamped(V)], method=TaoTron())
     assert " A " not in str(failure.value) and "\n" not in str(failure.value)
 

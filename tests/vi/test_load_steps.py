@@ -33,10 +33,16 @@ def neo_hookean(u: Any, E: float, nu: float = 0.3) -> Any:
 class Pressed:
     """A unit square or cube of rubber on the floor z = 0, whose top is moved."""
 
-    def __init__(self, comm: Any, n: int, d: int, E: float = 1.0, element: tuple[str, int] = ("Lagrange", 1)) -> None:
+    def __init__(
+        self, comm: Any, n: int, d: int, E: float = 1.0, element: tuple[str, int] = ("Lagrange", 1)
+    ) -> None:
         on = square(comm, n) if d == 2 else mesh.create_unit_cube(comm, n, n, n)
         self.V = space(on, element, d)
-        self.u, self.g, self.floor = fem.Function(self.V), fem.Function(self.V), fem.Function(self.V)
+        self.u, self.g, self.floor = (
+            fem.Function(self.V),
+            fem.Function(self.V),
+            fem.Function(self.V),
+        )
         facets = mesh.locate_entities_boundary(on, d - 1, lambda x: np.isclose(x[d - 1], 1.0))
         self.bc = fem.dirichletbc(self.g, fem.locate_dofs_topological(self.V, d - 1, facets))
         facets = mesh.locate_entities_boundary(on, d - 1, lambda x: np.isclose(x[d - 1], 0.0))
@@ -85,7 +91,9 @@ def test_the_road_does_not_change_the_answer(comm: Any) -> None:
 
 
 @pytest.mark.two_ranks
-@pytest.mark.parametrize(("d", "n", "element"), [(3, 3, ("Lagrange", 1)), (2, 4, ("Lagrange", 2))], ids=["space", "P2"])
+@pytest.mark.parametrize(
+    ("d", "n", "element"), [(3, 3, ("Lagrange", 1)), (2, 4, ("Lagrange", 2))], ids=["space", "P2"]
+)
 def test_other_cells(comm: Any, d: int, n: int, element: tuple[str, int]) -> None:
     block = Pressed(comm, n, d, 1.0, element)
     block.move(*(0.0,) * (d - 1), -0.25)
@@ -127,7 +135,9 @@ def test_a_failure_gives_the_first_guess_back(comm: Any) -> None:
     stretch = 1.0 + u.dx(0)
     energy = (0.5 * stretch**2 - ufl.ln(stretch) + ufl.ln(stretch) ** 2) * ufl.dx
     for given in ({"form": ufl.derivative(energy, u)}, {"energy": energy}):
-        with pytest.raises(StepFailure, match=r"smaller load steps?.*u holds the first guess") as failure:
+        with pytest.raises(
+            StepFailure, match=r"smaller load steps?.*u holds the first guess"
+        ) as failure:
             vi.solve(u=u, lower=-2.0, bcs=[clamped(V, g)], **given)
         assert " A " not in str(failure.value) and "\n" not in str(failure.value)
         assert np.all(u.x.array == 0.25)
@@ -147,13 +157,28 @@ def loud() -> Iterator[None]:
 def test_beside_snes(comm: Any, tmp_path: Path, loud: None) -> None:
     """vi.solve takes all steps that SNES takes, to the same u, with no more Newton steps than SNES has factors."""
     benchmark = loaded(ROOT / "benchmarks" / "load_steps.py")
-    wanted = {"cells", "step", "solved", "iterations", "linear", "certificate", "failures", "snes_solved",
-              "snes_iterations", "snes_factorisations", "snes_failures", "ratio", "difference"}
+    wanted = {
+        "cells",
+        "step",
+        "solved",
+        "iterations",
+        "linear",
+        "certificate",
+        "failures",
+        "snes_solved",
+        "snes_iterations",
+        "snes_factorisations",
+        "snes_failures",
+        "ratio",
+        "difference",
+    }
     assert benchmark.main(["--cells", "16", "--json", str(tmp_path / "found.json")]) == 0
     rows = json.loads((tmp_path / "found.json").read_text())["rows"]
     assert [(one["cells"], one["step"]) for one in rows] == [(16, 0.1), (16, 0.2)]
     for one in rows:
         assert set(one) == wanted
-        assert one["failures"] == 0 and one["solved"] == round(0.8 / one["step"]) >= one["snes_solved"]
+        assert (
+            one["failures"] == 0 and one["solved"] == round(0.8 / one["step"]) >= one["snes_solved"]
+        )
         assert one["certificate"] <= 1e-9 and one["difference"] <= 1e-6
         assert one["iterations"] <= one["snes_factorisations"]

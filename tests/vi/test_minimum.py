@@ -58,8 +58,11 @@ def test_a_load_and_bounds_choose_the_well(comm: Any) -> None:
 def test_a_wall_between_two_wells(comm: Any, d: int) -> None:
     """Held at -1 and 1 at its ends, u is tanh(x / (√2 width)) between them, whatever it begins from."""
     n, width = (64, 0.15) if d == 1 else (8, 0.2)
-    on = mesh.create_interval(comm, n, [-0.5, 0.5]) if d == 1 else mesh.create_box(
-        comm, [[-0.5, 0.0, 0.0], [0.5, 0.25, 0.25]], [n, 2, 2])
+    on = (
+        mesh.create_interval(comm, n, [-0.5, 0.5])
+        if d == 1
+        else mesh.create_box(comm, [[-0.5, 0.0, 0.0], [0.5, 0.25, 0.25]], [n, 2, 2])
+    )
     V = space(on, ("Lagrange", 2))
     sides = mesh.locate_entities_boundary(on, d - 1, lambda x: np.isclose(np.abs(x[0]), 0.5))
     dofs = fem.locate_dofs_topological(V, d - 1, sides)
@@ -69,7 +72,9 @@ def test_a_wall_between_two_wells(comm: Any, d: int) -> None:
         u = fem.Function(V)
         u.interpolate(guess)
         energy = double_well(u, width)
-        result = vi.solve(energy=energy, u=u, lower=-1.0, upper=1.0, bcs=[fem.dirichletbc(exact, dofs)])
+        result = vi.solve(
+            energy=energy, u=u, lower=-1.0, upper=1.0, bcs=[fem.dirichletbc(exact, dofs)]
+        )
         assert result.certificate.worst <= 1e-9
         assert np.max(np.abs(u.x.array - exact.x.array)) <= 0.01
 
@@ -118,7 +123,10 @@ def test_failures_are_one_sentence(comm: Any) -> None:
     V = space(square(comm, 4), ("Lagrange", 1))
     for energy, words in (
         (lambda u: -(u**2) * ufl.dx + u * ufl.dx, "bounded below"),
-        (lambda u: ufl.ln(u - 1.0) * ufl.dx, "not a number there: check the energy and the first guess"),
+        (
+            lambda u: ufl.ln(u - 1.0) * ufl.dx,
+            "not a number there: check the energy and the first guess",
+        ),
     ):
         u = fem.Function(V)
         with pytest.raises(StepFailure, match=words) as failure:
@@ -130,7 +138,9 @@ def test_failures_are_one_sentence(comm: Any) -> None:
         vi.solve(energy=double_well(u, 0.1), u=u, iterations=1)
 
 
-def test_a_form_that_is_not_positive_offers_the_energy(comm: Any, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_form_that_is_not_positive_offers_the_energy(
+    comm: Any, caplog: pytest.LogCaptureFixture
+) -> None:
     """Newton's method for F goes to the hill between the wells, where it is not far. A failure offers energy=, an
     answer is told to be no minimum, and energy= finds one."""
     u = fem.Function(space(square(comm, 8), ("Lagrange", 1)))
@@ -141,7 +151,9 @@ def test_a_form_that_is_not_positive_offers_the_energy(comm: Any, caplog: pytest
         u.interpolate(lambda x: 0.2 * np.sin(40.0 * x[0] * x[1]))
 
     begin()
-    with pytest.raises(StepFailure, match=r"the Jacobian of F is not positive.*as energy= in the place of F"):
+    with pytest.raises(
+        StepFailure, match=r"the Jacobian of F is not positive.*as energy= in the place of F"
+    ):
         vi.solve(F, u, iterations=1)
     begin()
     hill = vi.solve(F, u)

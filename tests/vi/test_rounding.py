@@ -21,7 +21,12 @@ INF = np.inf
 SIZES = {
     "values": ([0.0, -0.3], [-INF, -INF], [INF, INF], 0.3),
     "a bound that keeps u from zero": ([0.0, 0.0, 0.0], [0.1, 1e-17, 3e-34], [INF] * 3, 0.1),
-    "an upper bound that is zero at the rim": ([0.0, 0.0, 0.0], [-INF] * 3, [1.0, 0.4, -2.2e-16], 1.0),
+    "an upper bound that is zero at the rim": (
+        [0.0, 0.0, 0.0],
+        [-INF] * 3,
+        [1.0, 0.4, -2.2e-16],
+        1.0,
+    ),
     "walls": ([0.0, 0.0, 0.0], [-1e20, 1e-9, -2e-9], [1e7, 1e7, 1e7], 2e-9),
     "walls alone": ([0.0, 0.0], [-1e20, -1e20], [1e20, 1e20], 1e20),
     "no bounds, no values": ([0.0], [-INF], [INF], 0.0),
@@ -113,7 +118,9 @@ def test_a_body_that_rests_on_its_floor(comm: Any, shift: float, load: float) ->
     result = vi.solve(form, u, lower=floor, bcs=[held_sideways(V)])
     assert result.certificate.worst <= 1e-9
     assert np.max(np.abs(u.x.array), initial=0.0) <= max(load, 4e-15)
-    pressed = comm.allreduce(float(np.sum(result.lambda_lower.x.array[: 2 * V.dofmap.index_map.size_local])))
+    pressed = comm.allreduce(
+        float(np.sum(result.lambda_lower.x.array[: 2 * V.dofmap.index_map.size_local]))
+    )
     assert pressed == pytest.approx(load, rel=1e-6 if load else 0.0, abs=1e-14)
 
 

@@ -42,63 +42,141 @@ def filled(V: Any, *values: tuple[float, float]) -> Any:
 
 Call = Callable[[SimpleNamespace], Any]
 CASES: dict[str, tuple[Call, str]] = {
-    "functional": (lambda s: vi.solve(s.u**2 * ufl.dx, s.u), "F is a form of rank 0, and a linear form is needed"),
+    "functional": (
+        lambda s: vi.solve(s.u**2 * ufl.dx, s.u),
+        "F is a form of rank 0, and a linear form is needed",
+    ),
     "no form": (lambda s: vi.solve(1.0, s.u), r"the form is 1.0, J None; give a UFL form F"),
-    "nothing": (lambda s: vi.solve(u=s.u), r"there is nothing to solve: give the form F\(u; v\), or energy="),
-    "both": (lambda s: vi.solve(s.F, s.u, energy=s.Pi), "both a form and energy= are given: give one of them"),
-    "energy of rank 1": (lambda s: vi.solve(energy=s.F, u=s.u), "energy is a form of rank 1, and a functional is"),
-    "no energy": (lambda s: vi.solve(energy=2.0, u=s.u), "energy is 2.0, and a functional is needed"),
-    "energy of another": (lambda s: vi.solve(energy=fem.Function(s.V) ** 2 * ufl.dx, u=s.u),
-                          "energy does not depend on u"),
-    "energy and J": (lambda s: vi.solve(energy=s.Pi, u=s.u, J=s.a), "J is given beside energy=.*leave J out"),
-    "energy and method": (lambda s: vi.solve(energy=s.Pi, u=s.u, method=TaoTron()),
-                          r"method is TaoTron\(\), which solves the linear steps of a form; leave it out"),
-    "energy's options": (lambda s: vi.solve(energy=s.Pi, u=s.u, petsc_options={"pc_type": "incomplete"}),
-                         "PETSc does not accept the options under vi_contact_vi_"),
+    "nothing": (
+        lambda s: vi.solve(u=s.u),
+        r"there is nothing to solve: give the form F\(u; v\), or energy=",
+    ),
+    "both": (
+        lambda s: vi.solve(s.F, s.u, energy=s.Pi),
+        "both a form and energy= are given: give one of them",
+    ),
+    "energy of rank 1": (
+        lambda s: vi.solve(energy=s.F, u=s.u),
+        "energy is a form of rank 1, and a functional is",
+    ),
+    "no energy": (
+        lambda s: vi.solve(energy=2.0, u=s.u),
+        "energy is 2.0, and a functional is needed",
+    ),
+    "energy of another": (
+        lambda s: vi.solve(energy=fem.Function(s.V) ** 2 * ufl.dx, u=s.u),
+        "energy does not depend on u",
+    ),
+    "energy and J": (
+        lambda s: vi.solve(energy=s.Pi, u=s.u, J=s.a),
+        "J is given beside energy=.*leave J out",
+    ),
+    "energy and method": (
+        lambda s: vi.solve(energy=s.Pi, u=s.u, method=TaoTron()),
+        r"method is TaoTron\(\), which solves the linear steps of a form; leave it out",
+    ),
+    "energy's options": (
+        lambda s: vi.solve(energy=s.Pi, u=s.u, petsc_options={"pc_type": "incomplete"}),
+        "PETSc does not accept the options under vi_contact_vi_",
+    ),
     "three forms": (lambda s: vi.solve((s.a, s.L, s.L), s.u), "the form is "),
-    "a of rank 1": (lambda s: vi.solve((s.L, s.L), s.u), "a is a form of rank 1, and a bilinear form is needed"),
-    "L of rank 2": (lambda s: vi.solve((s.a, s.a), s.u), "L is a form of rank 2, and a linear form is needed"),
+    "a of rank 1": (
+        lambda s: vi.solve((s.L, s.L), s.u),
+        "a is a form of rank 1, and a bilinear form is needed",
+    ),
+    "L of rank 2": (
+        lambda s: vi.solve((s.a, s.a), s.u),
+        "L is a form of rank 2, and a linear form is needed",
+    ),
     "J of rank 1": (lambda s: vi.solve(s.F, s.u, J=s.L), "J is a form of rank 1"),
     "J beside a": (lambda s: vi.solve((s.a, s.L), s.u, J=s.a), "whose Jacobian is a"),
-    "u in a": (lambda s: vi.solve((s.u * s.w * s.v * ufl.dx, s.L), s.u), "not linear in it: give F"),
+    "u in a": (
+        lambda s: vi.solve((s.u * s.w * s.v * ufl.dx, s.L), s.u),
+        "not linear in it: give F",
+    ),
     "u in L": (lambda s: vi.solve((s.a, s.u * s.v * ufl.dx), s.u), "a or L contains u itself"),
     "no u": (lambda s: vi.solve(s.L, s.u), "F does not depend on u"),
-    "arity": (lambda s: vi.solve((s.w**2 * s.v * ufl.dx, s.L), s.u), "F or J is not linear in u or in v"),
-    "mixed arity": (lambda s: vi.solve(s.F + s.u * ufl.dx, s.u), "F or J is not linear in u or in v"),
-    "test function": (lambda s: vi.solve(s.u * ufl.TestFunction(space(s.V.mesh, ("Lagrange", 2))) * ufl.dx, s.u),
-                      "on another space"),
+    "arity": (
+        lambda s: vi.solve((s.w**2 * s.v * ufl.dx, s.L), s.u),
+        "F or J is not linear in u or in v",
+    ),
+    "mixed arity": (
+        lambda s: vi.solve(s.F + s.u * ufl.dx, s.u),
+        "F or J is not linear in u or in v",
+    ),
+    "test function": (
+        lambda s: vi.solve(s.u * ufl.TestFunction(space(s.V.mesh, ("Lagrange", 2))) * ufl.dx, s.u),
+        "on another space",
+    ),
     "u": (lambda s: vi.solve(s.F, s.w), "give the DOLFINx Function"),
-    "bound's mesh": (lambda s: vi.solve(s.F, s.u, lower=fem.Function(s.other)),
-        "lower is .*give a Function on u.function_space itself"),
-    "bound's shape": (lambda s: vi.solve(s.F, s.u, upper=[1.0, 2.0]),
-        "upper is .*; give a Function on u.function_space"),
+    "bound's mesh": (
+        lambda s: vi.solve(s.F, s.u, lower=fem.Function(s.other)),
+        "lower is .*give a Function on u.function_space itself",
+    ),
+    "bound's shape": (
+        lambda s: vi.solve(s.F, s.u, upper=[1.0, 2.0]),
+        "upper is .*; give a Function on u.function_space",
+    ),
     "bound's kind": (lambda s: vi.solve(s.F, s.u, upper="high"), "upper is 'high'"),
     "expression": (lambda s: vi.solve(s.F, s.u, upper=2.0 * s.u), "upper is .*give a Function"),
-    "NaN bound": (lambda s: vi.solve(s.F, s.u, lower=filled(s.V, (0.5, np.nan))),
-        r"at \(0.5, 0.5, 0\), .*: a bound is not a number"),
-    "crossed": (lambda s: vi.solve(s.F, s.u, lower=filled(s.V, (0.75, 2.0)), upper=1.0),
-                r"at \(0.75, 0.75, 0\), where u is 0 in \[2, 1\]: lower is above"),
-    "infinite": (lambda s: vi.solve(s.F, s.u, lower=np.inf), r"in \[inf, inf\]: no number is allowed"),
-    "clamped outside": (lambda s: vi.solve(s.F, s.u, lower=0.5, bcs=[s.bc]),
-                        r"where u is 0 in \[0.5, inf\]: bcs prescribe a value beyond a bound"),
-    "NaN clamped": (lambda s: vi.solve(s.F, s.u, bcs=[clamped(s.V, filled(s.V, (0.0, np.nan)))]),
-        "bcs are NaN or infinite"),
-    "NaN guess": (lambda s: vi.solve(s.F, filled_guess(s), lower=0.0), "first guess or bcs are NaN or infinite"),
-    "bc elsewhere": (lambda s: vi.solve(s.F, s.u, bcs=[clamped(space(s.V.mesh, ("Lagrange", 2)))]),
-                     "bcs is wrong: give a list of dirichletbc"),
-    "bc no bc": (lambda s: vi.solve(s.F, s.u, bcs=[0.0]), "bcs is wrong: give a list of dirichletbc"),
+    "NaN bound": (
+        lambda s: vi.solve(s.F, s.u, lower=filled(s.V, (0.5, np.nan))),
+        r"at \(0.5, 0.5, 0\), .*: a bound is not a number",
+    ),
+    "crossed": (
+        lambda s: vi.solve(s.F, s.u, lower=filled(s.V, (0.75, 2.0)), upper=1.0),
+        r"at \(0.75, 0.75, 0\), where u is 0 in \[2, 1\]: lower is above",
+    ),
+    "infinite": (
+        lambda s: vi.solve(s.F, s.u, lower=np.inf),
+        r"in \[inf, inf\]: no number is allowed",
+    ),
+    "clamped outside": (
+        lambda s: vi.solve(s.F, s.u, lower=0.5, bcs=[s.bc]),
+        r"where u is 0 in \[0.5, inf\]: bcs prescribe a value beyond a bound",
+    ),
+    "NaN clamped": (
+        lambda s: vi.solve(s.F, s.u, bcs=[clamped(s.V, filled(s.V, (0.0, np.nan)))]),
+        "bcs are NaN or infinite",
+    ),
+    "NaN guess": (
+        lambda s: vi.solve(s.F, filled_guess(s), lower=0.0),
+        "first guess or bcs are NaN or infinite",
+    ),
+    "bc elsewhere": (
+        lambda s: vi.solve(s.F, s.u, bcs=[clamped(space(s.V.mesh, ("Lagrange", 2)))]),
+        "bcs is wrong: give a list of dirichletbc",
+    ),
+    "bc no bc": (
+        lambda s: vi.solve(s.F, s.u, bcs=[0.0]),
+        "bcs is wrong: give a list of dirichletbc",
+    ),
     "one bc": (lambda s: vi.solve(s.F, s.u, bcs=s.bc), "bcs is wrong: give a list of dirichletbc"),
-    "moments": (lambda s: vi.solve(s.F, fem.Function(space(s.V.mesh, ("N1curl", 1)))), "not values of one field"),
+    "moments": (
+        lambda s: vi.solve(s.F, fem.Function(space(s.V.mesh, ("N1curl", 1)))),
+        "not values of one field",
+    ),
     "method": (lambda s: vi.solve(s.F, s.u, method=Condensed()), "method is Condensed"),
-    "class": (lambda s: vi.solve(s.F, s.u, method=ReducedNewton), r"make an object of it, ReducedNewton"),
+    "class": (
+        lambda s: vi.solve(s.F, s.u, method=ReducedNewton),
+        r"make an object of it, ReducedNewton",
+    ),
     "tolerance": (lambda s: vi.solve(s.F, s.u, tolerance=0.0), "tolerance is 0.0"),
     "iterations": (lambda s: vi.solve(s.F, s.u, iterations=0), "iterations is 0"),
     "options": (lambda s: vi.solve(s.F, s.u, petsc_options="icc"), "give a dict"),
     "prefix": (lambda s: vi.solve(s.F, s.u, prefix=3), "prefix is 3"),
-    "refused option": (lambda s: vi.solve(s.F, s.u, method=ReducedNewton(), petsc_options={"pc_type": "gamg"},
-                                          bcs=[s.bc]), "gamg with vinewtonrsls is refused"),
-    "not symmetric": (lambda s: vi.solve((s.a + s.w.dx(0) * s.v * ufl.dx, s.L), s.u, bcs=[s.bc], method=TaoTron()),
-                      r"TaoTron\(\) minimises, and the form is not symmetric"),
+    "refused option": (
+        lambda s: vi.solve(
+            s.F, s.u, method=ReducedNewton(), petsc_options={"pc_type": "gamg"}, bcs=[s.bc]
+        ),
+        "gamg with vinewtonrsls is refused",
+    ),
+    "not symmetric": (
+        lambda s: vi.solve(
+            (s.a + s.w.dx(0) * s.v * ufl.dx, s.L), s.u, bcs=[s.bc], method=TaoTron()
+        ),
+        r"TaoTron\(\) minimises, and the form is not symmetric",
+    ),
 }
 
 

@@ -24,4 +24,28 @@ from .poincare_steklov import PoincareSteklov as PoincareSteklov
 from .quadrature import Orders as Orders
 from .uzawa_space_time import SpaceTimeUzawa as SpaceTimeUzawa
 
-__all__: list[str] = ['BoundaryContact', 'BoundaryMesh', 'BoundaryMotion', 'BoundaryProblem', 'CompressedBlocks', 'CondensedCompliance', 'Conditions', 'ContactRun', 'EnergeticBlocks', 'Galerkin', 'MultiplierMesh', 'OperatorMatrices', 'Orders', 'PoincareSteklov', 'SpaceTimeUzawa', 'TimeKernels', 'TwoBodies', 'circle', 'conditions_on', 'energetic_blocks', 'march_contact', 'polygon', 'traction_forces']
+__all__: list[str] = [
+    "BoundaryContact",
+    "BoundaryMesh",
+    "BoundaryMotion",
+    "BoundaryProblem",
+    "CompressedBlocks",
+    "CondensedCompliance",
+    "Conditions",
+    "ContactRun",
+    "EnergeticBlocks",
+    "Galerkin",
+    "MultiplierMesh",
+    "OperatorMatrices",
+    "Orders",
+    "PoincareSteklov",
+    "SpaceTimeUzawa",
+    "TimeKernels",
+    "TwoBodies",
+    "circle",
+    "conditions_on",
+    "energetic_blocks",
+    "march_contact",
+    "polygon",
+    "traction_forces",
+]

@@ -39,17 +39,23 @@ class BoundaryMesh:
     def __post_init__(self) -> None:
         points = array("BoundaryMesh", "points", self.points, (None, 2), unit="m")
         counted("BoundaryMesh", "points", len(points), "elements", most=MOST_ELEMENTS)
-        sizes = tuple(integers("BoundaryMesh", "loop_sizes", self.loop_sizes, (None,)).tolist()) or (len(points),)
+        sizes = tuple(
+            integers("BoundaryMesh", "loop_sizes", self.loop_sizes, (None,)).tolist()
+        ) or (len(points),)
         if min(sizes) < 3 or sum(sizes) != len(points):
-            raise InputError(f"BoundaryMesh: loop_sizes is {sizes}; give at least 3 points for each loop, "
-                             f"and {len(points)} for all loops together")
+            raise InputError(
+                f"BoundaryMesh: loop_sizes is {sizes}; give at least 3 points for each loop, "
+                f"and {len(points)} for all loops together"
+            )
         flag("BoundaryMesh", "exterior", self.exterior)
         tags = np.zeros(len(points)) if shape_of(self.labels) == (0,) else self.labels
         labels = integers("BoundaryMesh", "labels", tags, (len(points),))
         for name, value in (("points", points), ("loop_sizes", sizes), ("labels", labels)):
             object.__setattr__(self, name, value)
         if self.lengths.min() <= 1e-12 * self.size:
-            raise InputError(f"BoundaryMesh: element {int(self.lengths.argmin())} has no length; remove doubled points")
+            raise InputError(
+                f"BoundaryMesh: element {int(self.lengths.argmin())} has no length; remove doubled points"
+            )
         check_size(points, sizes)
         check_simple(points, self.after)
         check_orientation(points, sizes, exterior=self.exterior)
@@ -113,8 +119,15 @@ class BoundaryMesh:
 
     def elements_where(self, chosen: Callable[[Array], ArrayLike]) -> NDArray[np.bool_]:
         """Return (n,) elements with both ends where `chosen`((m, 2) points) is true."""
-        function("BoundaryMesh.elements_where", "chosen", chosen, "give a function of points (m, 2)")
-        inside = mask("BoundaryMesh.elements_where", "what chosen(points) returns", chosen(self.points), (len(self),))
+        function(
+            "BoundaryMesh.elements_where", "chosen", chosen, "give a function of points (m, 2)"
+        )
+        inside = mask(
+            "BoundaryMesh.elements_where",
+            "what chosen(points) returns",
+            chosen(self.points),
+            (len(self),),
+        )
         return inside & inside[self.after]
 
     def nodes_of(self, elements: ArrayLike) -> NDArray[np.bool_]:
@@ -132,7 +145,9 @@ class BoundaryMesh:
     def node_normals(self, elements: ArrayLike) -> Array:
         """Return (n, 2) unit normals at nodes, the mean of the masked elements by their lengths; else zero."""
         weighted = self.normals * (self.lengths * self._mask(elements))[:, None]
-        sums = weighted + np.stack([np.bincount(self.after, w, len(self)) for w in weighted.T], axis=1)
+        sums = weighted + np.stack(
+            [np.bincount(self.after, w, len(self)) for w in weighted.T], axis=1
+        )
         length = np.hypot(*sums.T)
         return sums / np.where(length > 0.0, length, 1.0)[:, None]
 
@@ -148,7 +163,9 @@ class BoundaryMesh:
         return mask("BoundaryMesh", "elements", elements, (len(self),))
 
 
-def polygon(corners: ArrayLike, h: float | Sequence[int], *, exterior: bool = False) -> BoundaryMesh:
+def polygon(
+    corners: ArrayLike, h: float | Sequence[int], *, exterior: bool = False
+) -> BoundaryMesh:
     """Mesh a polygon; label of an element = number of its side, side i from corner i to corner i + 1.
 
     corners: (m, 2) [m], counter-clockwise (clockwise for an exterior body). h: greatest element length [m], or the
@@ -168,14 +185,22 @@ def polygon(corners: ArrayLike, h: float | Sequence[int], *, exterior: bool = Fa
         counts = wanted.astype(int)
     counted("polygon", "h", int(counts.sum()), "elements", most=MOST_ELEMENTS)
     fractions = [np.arange(count)[:, None] / count for count in counts]
-    points = np.concatenate([p + f * side for p, f, side in zip(start, fractions, sides, strict=True)])
+    points = np.concatenate(
+        [p + f * side for p, f, side in zip(start, fractions, sides, strict=True)]
+    )
     return BoundaryMesh(points, labels=np.repeat(np.arange(len(start)), counts), exterior=exterior)
 
 
-def circle(radius: float, count: int, *, centre: ArrayLike = (0.0, 0.0), exterior: bool = False) -> BoundaryMesh:
+def circle(
+    radius: float, count: int, *, centre: ArrayLike = (0.0, 0.0), exterior: bool = False
+) -> BoundaryMesh:
     """Return a disk of `count` chords, starting at its lowest point; exterior: the space around a round hole."""
     middle = array("circle", "centre", centre, (2,), unit="m")
     number("circle", "radius", radius, positive=True, unit="m")
-    counted("circle", "count", whole("circle", "count", count, least=3), "elements", most=MOST_ELEMENTS)
+    counted(
+        "circle", "count", whole("circle", "count", count, least=3), "elements", most=MOST_ELEMENTS
+    )
     angle = (-2.0 * np.pi if exterior else 2.0 * np.pi) * (np.arange(count) / count) - 0.5 * np.pi
-    return BoundaryMesh(middle + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1), exterior=exterior)
+    return BoundaryMesh(
+        middle + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1), exterior=exterior
+    )

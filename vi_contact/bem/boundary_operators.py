@@ -39,8 +39,10 @@ def check_body(mesh: BoundaryMesh, material: LinearElastic, orders: Orders) -> N
     instance(owner, "the material", material, LinearElastic, "give a LinearElastic")
     instance(owner, "orders", orders, Orders, "give numbers of points, Orders()")
     if material.xi:
-        raise InputError(f"{owner}: the material has the damping ratio xi = {material.xi:g}, and they are elastic "
-                         "without damping; leave xi out")
+        raise InputError(
+            f"{owner}: the material has the damping ratio xi = {material.xi:g}, and they are elastic "
+            "without damping; leave xi out"
+        )
 
 
 @dataclass(frozen=True)
@@ -64,9 +66,13 @@ class Galerkin:
         self.mesh, self.shear, self.orders = mesh, c_s**2, orders
         self.pairs = ElementPairs(mesh)
 
-    def assemble(self, kernels: Callable[[Array], KernelSet], fronts: Sequence[float] = ()) -> OperatorMatrices:
+    def assemble(
+        self, kernels: Callable[[Array], KernelSet], fronts: Sequence[float] = ()
+    ) -> OperatorMatrices:
         """Return the matrices of the three operators."""
-        single, double, hyper = np.split(self._moments(kernels, fronts), (N_SINGLE, N_SINGLE + N_DOUBLE))
+        single, double, hyper = np.split(
+            self._moments(kernels, fronts), (N_SINGLE, N_SINGLE + N_DOUBLE)
+        )
         return OperatorMatrices(self._single(single), self._double(double), self._hyper(hyper))
 
     def _moments(self, kernels: Callable, fronts: Sequence[float]) -> NDArray:
@@ -90,9 +96,13 @@ class Galerkin:
     def _double(self, moments: NDArray) -> NDArray:
         n, e, f = len(self.mesh), self.pairs.first, self.pairs.second
         local = np.zeros((2, n, 2, 2, n, 2), moments.dtype)
-        swapped = moments.swapaxes(2, 3) * np.array([-1, -1, -1, -1, 1, 1, 1, 1])[:, None, None, None]
+        swapped = (
+            moments.swapaxes(2, 3) * np.array([-1, -1, -1, -1, 1, 1, 1, 1])[:, None, None, None]
+        )
         for x, y, m in ((e, f, moments), (f, e, swapped)):
-            local[:, x, :, :, y] = double_local(self.mesh, self.shear, m, y).transpose(2, 0, 3, 1, 4)
+            local[:, x, :, :, y] = double_local(self.mesh, self.shear, m, y).transpose(
+                2, 0, 3, 1, 4
+            )
         return joined_at_nodes(self.mesh, local, 4).reshape(4 * n, 2 * n)
 
     def _hyper(self, moments: NDArray) -> NDArray:
@@ -102,7 +112,9 @@ class Galerkin:
             for k in range(2):
                 local[c, e, :, k, f, :] = values[c, k]
                 local[k, f, :, c, e, :] = values[c, k].swapaxes(1, 2)
-        return joined_at_nodes(self.mesh, joined_at_nodes(self.mesh, local, 4), 1).reshape(2 * n, 2 * n)
+        return joined_at_nodes(self.mesh, joined_at_nodes(self.mesh, local, 4), 1).reshape(
+            2 * n, 2 * n
+        )
 
     def _hyper_local(self, m: NDArray) -> NDArray:
         """Return (2, 2, p, 2, 2): component of v on the first element, of u on the second, pair, shape of v, of u."""
@@ -112,7 +124,10 @@ class Galerkin:
         dv = SLOPE[:, None] / mesh.lengths[e][:, None, None]
         du = SLOPE / mesh.lengths[f][:, None, None]
         phi, g = m[2].sum((1, 2))[:, None, None], tensor(m[3:6].sum((2, 3)))[..., None, None]
-        sum_u, sum_v = m[6:10].sum(3)[..., None], m[6:10].sum(2)[:, :, None, :]  # summed over shapes of u; of v
+        sum_u, sum_v = (
+            m[6:10].sum(3)[..., None],
+            m[6:10].sum(2)[:, :, None, :],
+        )  # summed over shapes of u; of v
         across_x, across_y = (sum_u[:2] * n_x).sum(0), (sum_v[:2] * n_y).sum(0)
         mu, turned = self.shear, TURN.T @ np.moveaxis(g, (0, 1), (-2, -1)) @ TURN
         values = np.empty((2, 2, *m.shape[1:]), m.dtype)
@@ -122,7 +137,9 @@ class Galerkin:
                 two = 4.0 * mu**2 * turned[..., c, k] - (4.0 * mu * phi if c == k else 0.0)
                 grad_u = sum_u[2] * TURN[0, k] + sum_u[3] * TURN[1, k]
                 grad_v = sum_v[2] * TURN[0, c] + sum_v[3] * TURN[1, c]
-                three = (TURN[c, k] * across_x + n_x[c] * grad_u) * du - (TURN[k, c] * across_y + n_y[k] * grad_v) * dv
+                three = (TURN[c, k] * across_x + n_x[c] * grad_u) * du - (
+                    TURN[k, c] * across_y + n_y[k] * grad_v
+                ) * dv
                 values[c, k] = one + two * dv * du + 2.0 * mu * three
         return values
 
@@ -163,8 +180,27 @@ def integrands(kernels: KernelSet, d: Array, r: Array) -> NDArray:
     g1, g2 = kernels.single
     rows = [g1 - g2 * xx, -g2 * xy, g1 - g2 * yy]
     phi, dphi, ddiff, g1, g2 = kernels.double
-    rows += [dphi * d[0], dphi * d[1], ddiff * d[0], ddiff * d[1], phi, g1 - g2 * xx, -g2 * xy, g1 - g2 * yy]
+    rows += [
+        dphi * d[0],
+        dphi * d[1],
+        ddiff * d[0],
+        ddiff * d[1],
+        phi,
+        g1 - g2 * xx,
+        -g2 * xy,
+        g1 - g2 * yy,
+    ]
     phi, dphi, ddiff, g1, g2, inertia_p, inertia_s = kernels.hyper
-    rows += [inertia_p, inertia_s, phi, g1 - g2 * xx, -g2 * xy, g1 - g2 * yy,
-             dphi * d[0], dphi * d[1], ddiff * d[0], ddiff * d[1]]
+    rows += [
+        inertia_p,
+        inertia_s,
+        phi,
+        g1 - g2 * xx,
+        -g2 * xy,
+        g1 - g2 * yy,
+        dphi * d[0],
+        dphi * d[1],
+        ddiff * d[0],
+        ddiff * d[1],
+    ]
     return np.stack(rows)

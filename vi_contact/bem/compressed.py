@@ -71,11 +71,21 @@ class CompressedBlocks:
         weights = np.pad(weights, ((0, 0), (0, self.reach - weights.shape[1])))
         numbers = np.empty((2 * f, sum(len(part.places) for part in self.stretches)))
         for part in self.stretches:
-            kept = np.hstack([weights[:, part.first : part.smooth], weights[:, part.smooth :] @ part.weights])
-            np.matmul(np.concatenate([kept.real, kept.imag]), part.values, numbers[:, start : start + len(part.places)])
+            kept = np.hstack(
+                [weights[:, part.first : part.smooth], weights[:, part.smooth :] @ part.weights]
+            )
+            np.matmul(
+                np.concatenate([kept.real, kept.imag]),
+                part.values,
+                numbers[:, start : start + len(part.places)],
+            )
             start += len(part.places)
-        for real, imag in zip(*np.split(numbers, 2), strict=True):  # one full matrix at a time: half of the memory
-            single, double, hyper = np.split((real + 1j * imag)[self.places], [16 * n**2, 24 * n**2])
+        for real, imag in zip(
+            *np.split(numbers, 2), strict=True
+        ):  # one full matrix at a time: half of the memory
+            single, double, hyper = np.split(
+                (real + 1j * imag)[self.places], [16 * n**2, 24 * n**2]
+            )
             yield single.reshape(4 * n, -1), double.reshape(4 * n, -1), hyper.reshape(2 * n, -1)
 
     @cached_property
@@ -85,26 +95,43 @@ class CompressedBlocks:
         shapes, at = ((4, 4), (4, 2), (4, 2), (2, 2)), ((0, 0), (4, 4), (8, 6), (10, 4))
         indices = [np.indices((a * n, b * n)).reshape(2, -1) for a, b in shapes]
         indices[2] = indices[2][::-1]
-        rows, columns = np.hstack([part + n * np.array([start]).T for part, start in zip(indices, at, strict=True)])
-        numbers = np.insert(self.places, np.full(8 * n**2, 24 * n**2), self.places[16 * n**2 : 24 * n**2])
+        rows, columns = np.hstack(
+            [part + n * np.array([start]).T for part, start in zip(indices, at, strict=True)]
+        )
+        numbers = np.insert(
+            self.places, np.full(8 * n**2, 24 * n**2), self.places[16 * n**2 : 24 * n**2]
+        )
         order = np.argsort(numbers, kind="stable")
         return numbers[order], rows[order], columns[order]
 
     def applied(self, p: Array, u: Array, jumps: Array) -> list[Array]:
         """Return sum_j V^j p_j, K^j u_j, K^jᵀ jumps_j, D^j u_j of histories (steps, 4n or 2n), latest first."""
-        values, start, n = np.pad(np.hstack([p, u, jumps]), ((0, self.reach - len(p)), (0, 0))), 0, len(self.mesh)
+        values, start, n = (
+            np.pad(np.hstack([p, u, jumps]), ((0, self.reach - len(p)), (0, 0))),
+            0,
+            len(self.mesh),
+        )
         (numbers, rows, columns), total = self._entries, np.zeros(12 * n)
         for part in self.stretches:
-            kept = np.vstack([values[part.first : part.smooth], part.weights.T @ values[part.smooth :]])
+            kept = np.vstack(
+                [values[part.first : part.smooth], part.weights.T @ values[part.smooth :]]
+            )
             some = slice(*np.searchsorted(numbers, [start, start + len(part.places)]))
-            terms = np.einsum("ke,ke->e", part.values[:, numbers[some] - start], kept[:, columns[some]])
+            terms = np.einsum(
+                "ke,ke->e", part.values[:, numbers[some] - start], kept[:, columns[some]]
+            )
             total += np.bincount(rows[some], terms, 12 * n)
             start += len(part.places)
         return np.split(total, [4 * n, 8 * n, 10 * n])
 
 
 def compressed_blocks(
-    mesh: BoundaryMesh, pairs: ElementPairs, speeds: tuple[float, float], dt: float, steps: int, assembled: BlockSteps
+    mesh: BoundaryMesh,
+    pairs: ElementPairs,
+    speeds: tuple[float, float],
+    dt: float,
+    steps: int,
+    assembled: BlockSteps,
 ) -> CompressedBlocks:
     """Keep the blocks for `steps` steps; speeds: (c_P, c_S) [m/s]; assembled: gives the blocks of all steps from a
     function of i that returns the pairs (p,) of elements to integrate at time i dt, or None where it has none."""
@@ -113,14 +140,25 @@ def compressed_blocks(
     n, h, stretches, needed = len(mesh), float(mesh.lengths.max()), [], []
     entries = np.arange(28 * n**2)
     single, double, hyper = np.split(entries, [16 * n**2, 24 * n**2])
-    mirrored = np.concatenate([single.reshape(4 * n, -1).T.ravel(), double, hyper.reshape(2 * n, -1).T.ravel()])
-    single, double, hyper = single.reshape(2, n, 2, 2, n, 2), double.reshape(2, n, 2, 2, n), hyper.reshape(2, n, 2, n)
+    mirrored = np.concatenate(
+        [single.reshape(4 * n, -1).T.ravel(), double, hyper.reshape(2 * n, -1).T.ravel()]
+    )
+    single, double, hyper = (
+        single.reshape(2, n, 2, 2, n, 2),
+        double.reshape(2, n, 2, 2, n),
+        hyper.reshape(2, n, 2, n),
+    )
     full = np.empty((2, n, n))  # minus the least distance, the greatest
-    full[:, pairs.first, pairs.second] = full[:, pairs.second, pairs.first] = -pairs.r_min, pairs.r_max
+    full[:, pairs.first, pairs.second] = full[:, pairs.second, pairs.first] = (
+        -pairs.r_min,
+        pairs.r_max,
+    )
     for axis in (1, 2):
         full = np.maximum(full, np.take(full, np.argsort(mesh.after), axis))
     first = (-full[0] / (speeds[0] * dt)).astype(int)
-    smooth = ((full[1] + h) / (speeds[1] * dt) + 2.5).astype(int)  # half a step late or more: rounding does not matter
+    smooth = ((full[1] + h) / (speeds[1] * dt) + 2.5).astype(
+        int
+    )  # half a step late or more: rounding does not matter
     spans = np.minimum([first - first % MULTIPLE, smooth + -smooth % MULTIPLE], steps)
     above = np.stack(np.triu_indices(n))
     windows, group = np.unique(spans[:, above[0], above[1]], axis=1, return_inverse=True)
@@ -130,10 +168,17 @@ def compressed_blocks(
     counted("boundary elements", f"{asked} steps of {n} elements", total, "numbers", most=NUMBERS)
     for number, (begin, end) in enumerate(windows.T):
         (a, b), behind = above[:, np.ravel(group) == number], tails[int(end)]
-        parts = single[:, a, :, :, b], double[:, a, :, :, b], double[:, b, :, :, a], hyper[:, a, :, b]
+        parts = (
+            single[:, a, :, :, b],
+            double[:, a, :, :, b],
+            double[:, b, :, :, a],
+            hyper[:, a, :, b],
+        )
         places = np.concatenate([part.ravel() for part in parts])
         kept = np.append(np.arange(begin, end), behind[0])
-        stretches.append(Stretch(int(begin), int(end), *behind, places, np.empty((len(kept), len(places)))))
+        stretches.append(
+            Stretch(int(begin), int(end), *behind, places, np.empty((len(kept), len(places))))
+        )
         needed.append((a, b, np.isin(np.arange(-1, steps + 1), np.add.outer(kept, (-1, 0, 1)))))
 
     def among(i: int) -> Mask:

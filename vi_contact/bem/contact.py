@@ -17,7 +17,16 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.algebra import Array, EffectiveMatrix, Indices, Mask, SerialAlgebra, SerialComm, SerialMatrix, max_abs
+from ..core.algebra import (
+    Array,
+    EffectiveMatrix,
+    Indices,
+    Mask,
+    SerialAlgebra,
+    SerialComm,
+    SerialMatrix,
+    max_abs,
+)
 from ..core.checks import array, at, flag, function, instance, integers, optional, provides
 from ..core.corners import FEATURE_ANGLE
 from ..core.errors import InputError
@@ -48,16 +57,22 @@ class Conditions:
     def __post_init__(self) -> None:
         nodes = integers("Conditions", "nodes", self.nodes, (None,))
         if len(nodes) and nodes.min() < 0:
-            raise InputError(f"Conditions: nodes has {nodes.min()}; give numbers of contact nodes from 0 on")
+            raise InputError(
+                f"Conditions: nodes has {nodes.min()}; give numbers of contact nodes from 0 on"
+            )
         normals = array("Conditions", "normals", self.normals, (len(nodes), 2))
         lengths = array("Conditions", "lengths", self.lengths, (len(nodes),), unit="m")
         if not len(nodes) or np.bincount(nodes).max() > 2 or lengths.min() <= 0.0:
-            raise InputError("Conditions: give one condition or more, at most two at a node, and positive lengths")
+            raise InputError(
+                "Conditions: give one condition or more, at most two at a node, and positive lengths"
+            )
         for name, value in (("nodes", nodes), ("normals", normals), ("lengths", lengths)):
             object.__setattr__(self, name, value)
 
 
-def conditions_on(mesh: BoundaryMesh, compliance: CondensedCompliance, *sides: ArrayLike) -> Conditions:
+def conditions_on(
+    mesh: BoundaryMesh, compliance: CondensedCompliance, *sides: ArrayLike
+) -> Conditions:
     """Return the conditions of several sides, masks of elements (n,): a node of two sides gets one for each.
 
     Raises InputError for a side with nodes that were not condensed, and for more than two sides at a node."""
@@ -71,7 +86,9 @@ def conditions_on(mesh: BoundaryMesh, compliance: CondensedCompliance, *sides: A
     chosen = [np.flatnonzero(mesh.nodes_of(side)) for side in sides]
     nodes = place[np.concatenate(chosen)]
     if (nodes < 0).any() or np.bincount(nodes).max() > 2:
-        raise InputError("conditions_on: sides must belong to the contact boundary, and at most two may share a node")
+        raise InputError(
+            "conditions_on: sides must belong to the contact boundary, and at most two may share a node"
+        )
     normals = [mesh.node_normals(side)[found] for side, found in zip(sides, chosen, strict=True)]
     lengths = [mesh.node_lengths(side)[found] for side, found in zip(sides, chosen, strict=True)]
     return Conditions(nodes, np.concatenate(normals), np.concatenate(lengths))
@@ -99,30 +116,66 @@ class BoundaryContact:
 
     def __post_init__(self) -> None:
         owner = "BoundaryContact"
-        instance(owner, "compliance", self.compliance, CondensedCompliance, "give what condensed() returns")
-        provides(owner, "obstacle", self.obstacle, ("gap", "directions"), "give an obstacle, for example Touching()")
-        provides(owner, "friction", self.friction, ("limit", "slope"), "give a friction law, for example Coulomb(mu)")
+        instance(
+            owner,
+            "compliance",
+            self.compliance,
+            CondensedCompliance,
+            "give what condensed() returns",
+        )
+        provides(
+            owner,
+            "obstacle",
+            self.obstacle,
+            ("gap", "directions"),
+            "give an obstacle, for example Touching()",
+        )
+        provides(
+            owner,
+            "friction",
+            self.friction,
+            ("limit", "slope"),
+            "give a friction law, for example Coulomb(mu)",
+        )
         for name in ("towards", "along"):
-            optional(function, owner, name, getattr(self, name), "give a function of the time, or None")
+            optional(
+                function, owner, name, getattr(self, name), "give a function of the time, or None"
+            )
         flag(owner, "bilateral", self.bilateral)
         if self.conditions is not None:
-            instance(owner, "conditions", self.conditions, Conditions, "give those of conditions_on(...), or None")
+            instance(
+                owner,
+                "conditions",
+                self.conditions,
+                Conditions,
+                "give those of conditions_on(...), or None",
+            )
             if self.conditions.nodes.max(initial=0) >= self.count:
-                raise InputError(f"{owner}: conditions name node {self.conditions.nodes.max()} of {self.count} contact "
-                                 "nodes; make them with conditions_on for this compliance")
+                raise InputError(
+                    f"{owner}: conditions name node {self.conditions.nodes.max()} of {self.count} contact "
+                    "nodes; make them with conditions_on for this compliance"
+                )
         self._refuse_corners()
 
     def _refuse_corners(self) -> None:
         """Refuse one condition along a mean normal at a node at which the contact boundary turns."""
         turns, points = self.compliance.turns, self.compliance.points
-        if self.conditions is not None or turns is None or turns.max(initial=0.0) <= FEATURE_ANGLE * (1.0 + 1e-9):
+        if (
+            self.conditions is not None
+            or turns is None
+            or turns.max(initial=0.0) <= FEATURE_ANGLE * (1.0 + 1e-9)
+        ):
             return
         corner, normals = int(np.argmax(turns)), self.compliance.normals
         directions = np.asarray(self.obstacle.directions(points, normals))
-        if np.max(np.abs(directions - normals)) <= 1e-9:  # the obstacle follows the boundary; a plane has one direction
-            raise InputError(f"BoundaryContact: the contact boundary turns by {np.degrees(turns[corner]):.3g} degrees "
-                             f"at {at(points[corner])}: give conditions=conditions_on(mesh, compliance, one side, "
-                             "other side), a condition on each")
+        if (
+            np.max(np.abs(directions - normals)) <= 1e-9
+        ):  # the obstacle follows the boundary; a plane has one direction
+            raise InputError(
+                f"BoundaryContact: the contact boundary turns by {np.degrees(turns[corner]):.3g} degrees "
+                f"at {at(points[corner])}: give conditions=conditions_on(mesh, compliance, one side, "
+                "other side), a condition on each"
+            )
 
     @property
     def count(self) -> int:
@@ -188,15 +241,26 @@ class BoundaryContact:
         number = np.where(self.free, np.cumsum(self.free) - 1, -1)
         owned = number[rows.nodes + self.count * second]
         if (owned < 0).any():
-            raise InputError("BoundaryContact: a support holds a contact node in its contact direction; leave the node "
-                             "out of the contact boundary, or free that direction")
-        tangents = np.where(np.isin(rows.nodes, rows.nodes[second]), -1, number[rows.nodes + self.count])
+            raise InputError(
+                "BoundaryContact: a support holds a contact node in its contact direction; leave the node "
+                "out of the contact boundary, or free that direction"
+            )
+        tangents = np.where(
+            np.isin(rows.nodes, rows.nodes[second]), -1, number[rows.nodes + self.count]
+        )
         size = float(np.ptp(points, axis=0).max())
         (directions, gap), count = self._facing, len(rows.nodes)
         surface = ContactSurface(
-            SerialComm(), points[rows.nodes], directions, rows.lengths,
-            admissible_gap(gap, points[rows.nodes], size), np.full(count, self.bilateral), np.zeros(count),
-            owned, np.arange(count), tangents[:, None],
+            SerialComm(),
+            points[rows.nodes],
+            directions,
+            rows.lengths,
+            admissible_gap(gap, points[rows.nodes], size),
+            np.full(count, self.bilateral),
+            np.zeros(count),
+            owned,
+            np.arange(count),
+            tangents[:, None],
         )
         return surface.moving(self.towards, self.along)
 
@@ -212,35 +276,61 @@ class BoundaryContact:
         found = p_matrix(self.W[0][np.ix_(rows, rows)])
         if not (self.frictional and self.friction.slope(self.surface.weights).any()):
             return found
-        return PMatrix(found.holds, found.sentence.replace("the solution is", "for given limits of friction, which "
-                                                           "those of this law are not, the solution is"))
+        return PMatrix(
+            found.holds,
+            found.sentence.replace(
+                "the solution is",
+                "for given limits of friction, which those of this law are not, the solution is",
+            ),
+        )
 
     @cached_property
     def matrix(self) -> EffectiveMatrix:
         """Return the matrix A of the step."""
         first = self.W[0]
         if not first.size:
-            raise InputError("BoundaryContact: supports hold all contact nodes; free some, or leave out contact")
+            raise InputError(
+                "BoundaryContact: supports hold all contact nodes; free some, or leave out contact"
+            )
         if not self.symmetric:
             if np.linalg.cond(first) > 1.0 / ASYMMETRIC:
-                raise InputError("BoundaryContact: the compliance of one step is singular; use the symmetric "
-                                 "Poincaré-Steklov operator")
-            return EffectiveMatrix(SerialMatrix(np.linalg.inv(first)), SerialAlgebra(symmetric=False))
+                raise InputError(
+                    "BoundaryContact: the compliance of one step is singular; use the symmetric "
+                    "Poincaré-Steklov operator"
+                )
+            return EffectiveMatrix(
+                SerialMatrix(np.linalg.inv(first)), SerialAlgebra(symmetric=False)
+            )
         first = 0.5 * (first + first.T)
         if np.linalg.eigvalsh(first)[0] <= SUPPORTED * first.max():
-            raise InputError("BoundaryContact: the compliance of one step is not positive definite; use the symmetric "
-                             "Poincaré-Steklov operator, and supports along contact directions or tangents only")
+            raise InputError(
+                "BoundaryContact: the compliance of one step is not positive definite; use the symmetric "
+                "Poincaré-Steklov operator, and supports along contact directions or tangents only"
+            )
         return EffectiveMatrix(SerialMatrix(np.linalg.inv(first)), SerialAlgebra())
 
     def step(self, k: int, loads: Array, before: Array, active: Mask) -> StepProblem:
         """Return step k (from 0) after loads (k, f) = -B_nᵀ r_n - B_tᵀ r_t of earlier steps; before: v at its start."""
         dt, surface = self.compliance.dt, self.surface
-        past = self.v_free[k] + summed(self.W[k:0:-1], loads[:k, :, None])[:, 0] if k else self.v_free[0]
+        past = (
+            self.v_free[k] + summed(self.W[k:0:-1], loads[:k, :, None])[:, 0]
+            if k
+            else self.v_free[0]
+        )
         slip0 = surface.slip_origin(before, k * dt, (k + 1) * dt) if self.frictional else None
         return StepProblem(
-            A=self.matrix, b=self.matrix @ past, bound=surface.gap((k + 1) * dt), surface=surface, scale=1.0,
+            A=self.matrix,
+            b=self.matrix @ past,
+            bound=surface.gap((k + 1) * dt),
+            surface=surface,
+            scale=1.0,
             guess=past,  # the size that rounding is measured by, also where contact holds all points at zero
-            active=active, t=(k + 1) * dt, k=k + 1, friction=self.friction, slip0=slip0, rate_factor=1.0 / dt,
+            active=active,
+            t=(k + 1) * dt,
+            k=k + 1,
+            friction=self.friction,
+            slip0=slip0,
+            rate_factor=1.0 / dt,
         )
 
     def load(self, r_n: Array, r_t: Array | None) -> Array:

@@ -21,6 +21,7 @@ from .poincare_steklov import work
 
 log = logging.getLogger(__name__)
 
+
 def march_contact(
     contact: BoundaryContact, *, solver: Condensed | None = None, tolerance: float = TOLERANCE
 ) -> "ContactRun":
@@ -34,15 +35,19 @@ def march_contact(
     number("march_contact", "tolerance", tolerance, positive=True)
     default = Condensed() if contact.symmetric else Condensed(Lemke())
     if not contact.symmetric and not contact.p_matrix.holds:
-        log.warning(f"boundary elements: W[0] {contact.p_matrix.sentence}; other runs may be as right as this one")
+        log.warning(
+            f"boundary elements: W[0] {contact.p_matrix.sentence}; other runs may be as right as this one"
+        )
     prepared = (solver or default).prepare(contact.matrix, contact.surface, 1.0)
 
     def solved(step: StepProblem) -> StepResult:
         result = prepared.solve(step)
         certificate = kkt_residual(step, result)
         if not certificate.worst <= tolerance:
-            raise StepFailure(f"boundary element step {step.k} at t = {step.t:.6g} s stayed above the certificate "
-                              f"tolerance {tolerance:g} ({certificate}): try Condensed() with another method")
+            raise StepFailure(
+                f"boundary element step {step.k} at t = {step.t:.6g} s stayed above the certificate "
+                f"tolerance {tolerance:g} ({certificate}): try Condensed() with another method"
+            )
         return result
 
     return run_steps(contact, solved)
@@ -108,7 +113,10 @@ class ContactRun:
 
 
 def run_steps(
-    contact: BoundaryContact, solved: Callable[[StepProblem], StepResult], *, iterations: Array | None = None,
+    contact: BoundaryContact,
+    solved: Callable[[StepProblem], StepResult],
+    *,
+    iterations: Array | None = None,
     history: tuple[float, ...] = (),
 ) -> ContactRun:
     """Take all steps, each answered by ``solved``, into a run with certificates."""
@@ -124,14 +132,22 @@ def run_steps(
         loads[k] = contact.load(result.r_n, result.r_t)
         x, active = result.x, result.active
         pairs.append((step, result))
-    slip = [nothing if step.slip0 is None else surface.tangential_values(result.x) - step.slip0
-            for step, result in pairs]
+    slip = [
+        nothing if step.slip0 is None else surface.tangential_values(result.x) - step.slip0
+        for step, result in pairs
+    ]
     forces = contact.cartesian(loads)
     return ContactRun(
-        contact, np.array([step.t for step, _ in pairs]), np.array([result.r_n for _, result in pairs]),
+        contact,
+        np.array([step.t for step, _ in pairs]),
+        np.array([result.r_n for _, result in pairs]),
         np.array([nothing if result.r_t is None else result.r_t for _, result in pairs])[:, :, 0],
         np.array([step.bound - surface.normal_values(result.x) for step, result in pairs]),
-        np.array(slip)[:, :, 0], contact.compliance.displacement(forces), forces,
-        np.array([result.active for _, result in pairs]), tuple(kkt_residual(*pair) for pair in pairs),
-        np.array([result.iterations for _, result in pairs]) if iterations is None else iterations, history,
+        np.array(slip)[:, :, 0],
+        contact.compliance.displacement(forces),
+        forces,
+        np.array([result.active for _, result in pairs]),
+        tuple(kkt_residual(*pair) for pair in pairs),
+        np.array([result.iterations for _, result in pairs]) if iterations is None else iterations,
+        history,
     )

@@ -26,7 +26,13 @@ class ElementPairs:
     elements so sharp, or of lengths so different, that an end of one is as near to the other."""
 
     def __init__(self, mesh: BoundaryMesh) -> None:
-        instance("boundary elements", "the mesh", mesh, BoundaryMesh, "give a BoundaryMesh, for example polygon(...)")
+        instance(
+            "boundary elements",
+            "the mesh",
+            mesh,
+            BoundaryMesh,
+            "give a BoundaryMesh, for example polygon(...)",
+        )
         first, second = np.triu_indices(len(mesh))
         starts, ends = mesh.points, mesh.points[mesh.after]
         self.first: Indices = first
@@ -35,14 +41,18 @@ class ElementPairs:
         self.b: Array = (ends - starts)[second].T
         self.offset: Array = (starts[first] - starts[second]).T
         self.h: Array = np.maximum(mesh.lengths[first], mesh.lengths[second])
-        corners = np.stack([np.hypot(*(p[first] - q[second]).T) for p in (starts, ends) for q in (starts, ends)])
+        corners = np.stack(
+            [np.hypot(*(p[first] - q[second]).T) for p in (starts, ends) for q in (starts, ends)]
+        )
         self.r_max: Array = corners.max(axis=0)
         self.same = first == second
         self.shares_end = mesh.after[first] == second
         self.corner = self.shares_end | (mesh.after[second] == first)
         to_second = [distances(p[first], starts[second], ends[second]) for p in (starts, ends)]
         to_first = [distances(p[second], starts[first], ends[first]) for p in (starts, ends)]
-        self.r_min: Array = np.where(self.same | self.corner, 0.0, np.min(to_second + to_first, axis=0))
+        self.r_min: Array = np.where(
+            self.same | self.corner, 0.0, np.min(to_second + to_first, axis=0)
+        )
         free = [np.where(self.shares_end, ends[0], ends[1]) for ends in (to_second, to_first[::-1])]
         width = np.where(self.corner, np.minimum(*free), self.r_min) / self.h
         self.width: Array = np.where(self.same, np.inf, width)
@@ -56,14 +66,29 @@ class ElementPairs:
             return
         facing = thin & ~self.corner
         pair = int(np.where(facing if facing.any() else thin, self.width, np.inf).argmin())
-        first, second, h, apart = self.first[pair], self.second[pair], self.h[pair], self.width[pair] * self.h[pair]
-        near, remedy = "comes near itself", (f"take elements of at most {apart / LEAST:.3g} m there, or widen the "
-                                             "angle if two sides meet near by")
+        first, second, h, apart = (
+            self.first[pair],
+            self.second[pair],
+            self.h[pair],
+            self.width[pair] * self.h[pair],
+        )
+        near, remedy = (
+            "comes near itself",
+            (
+                f"take elements of at most {apart / LEAST:.3g} m there, or widen the "
+                "angle if two sides meet near by"
+            ),
+        )
         if self.corner[pair]:
-            near, remedy = "has a sharp or uneven corner", "widen its angle or make its two elements more equal"
-        raise InputError(f"boundary elements: the boundary {near} at {at(mesh.points[second])}, where elements "
-                         f"{first} and {second} are {apart:.3g} m apart, less than 1/20 of the {h:.3g} m of the longer "
-                         f"one; {remedy}")
+            near, remedy = (
+                "has a sharp or uneven corner",
+                "widen its angle or make its two elements more equal",
+            )
+        raise InputError(
+            f"boundary elements: the boundary {near} at {at(mesh.points[second])}, where elements "
+            f"{first} and {second} are {apart:.3g} m apart, less than 1/20 of the {h:.3g} m of the longer "
+            f"one; {remedy}"
+        )
 
     def where(self, chosen: Mask) -> "ElementPairs":
         """Return the chosen pairs (p,)."""
@@ -73,4 +98,3 @@ class ElementPairs:
 
     def __len__(self) -> int:
         return len(self.first)
-

@@ -60,14 +60,26 @@ def check_time_step(mesh: BoundaryMesh, c_p: float, dt: float) -> None:
     number("boundary elements", "the time step dt", dt, positive=True, unit="s")
     ratio = c_p * dt / float(mesh.lengths.max())
     if not SMALLEST_RATIO <= ratio <= GREATEST_RATIO:
-        what = "enlarge the time step or refine" if ratio < SMALLEST_RATIO else "reduce the time step or coarsen"
-        raise InputError(f"boundary elements: c_P dt / h is {ratio:.3g} (h = {mesh.lengths.max():.3g} m, "
-                         f"dt = {dt:.3g} s), beyond {SMALLEST_RATIO:g} to {GREATEST_RATIO:g}; {what} the mesh")
+        what = (
+            "enlarge the time step or refine"
+            if ratio < SMALLEST_RATIO
+            else "reduce the time step or coarsen"
+        )
+        raise InputError(
+            f"boundary elements: c_P dt / h is {ratio:.3g} (h = {mesh.lengths.max():.3g} m, "
+            f"dt = {dt:.3g} s), beyond {SMALLEST_RATIO:g} to {GREATEST_RATIO:g}; {what} the mesh"
+        )
 
 
 def energetic_blocks(
-    mesh: BoundaryMesh, material: LinearElastic, *, dt: float, steps: int, orders: Orders = Orders(),
-    compressed: bool | None = None, threads: int = 1,
+    mesh: BoundaryMesh,
+    material: LinearElastic,
+    *,
+    dt: float,
+    steps: int,
+    orders: Orders = Orders(),
+    compressed: bool | None = None,
+    threads: int = 1,
 ) -> EnergeticBlocks | CompressedBlocks:
     """Assemble the blocks of `steps` time steps of dt [s]; dense ones take 224 steps n² bytes.
 
@@ -80,11 +92,23 @@ def energetic_blocks(
     whole(owner, "the number of threads", threads, least=1)
     numbers = 28 * steps * len(mesh) ** 2
     small = numbers <= DENSE if compressed is None else not flag(owner, "compressed", compressed)
-    counted(owner, f"{steps} steps of {len(mesh)} elements", numbers, "numbers", most=NUMBERS * (1 if small else 10))
+    counted(
+        owner,
+        f"{steps} steps of {len(mesh)} elements",
+        numbers,
+        "numbers",
+        most=NUMBERS * (1 if small else 10),
+    )
     check_time_step(mesh, material.c_p, dt)
-    galerkin, n, speeds = Galerkin(mesh, material.c_s, orders), len(mesh), (material.c_p, material.c_s)
+    galerkin, n, speeds = (
+        Galerkin(mesh, material.c_s, orders),
+        len(mesh),
+        (material.c_p, material.c_s),
+    )
 
-    def assembled(among: Callable[[int], Mask] | None = None) -> Iterator[tuple[Array, Array, Array] | None]:
+    def assembled(
+        among: Callable[[int], Mask] | None = None,
+    ) -> Iterator[tuple[Array, Array, Array] | None]:
         """Return V^j, K^j, D^j, right where pairs are ``among`` those of the times j - 1, j and j + 1, all if None;
         None instead of them where there is no pair at j + 1."""
 
@@ -99,7 +123,9 @@ def energetic_blocks(
         last = steps if small else AHEAD * steps
         with ThreadPoolExecutor(threads) as pool:
             for start in range(1, last + 1, threads):
-                for now in pool.map(at, range(start, min(start + threads, last + 1))):  # each at a time of its own
+                for now in pool.map(
+                    at, range(start, min(start + threads, last + 1))
+                ):  # each at a time of its own
                     if now is None:
                         yield None
                         continue
@@ -116,7 +142,11 @@ def energetic_blocks(
 
 
 def marched(
-    blocks: EnergeticBlocks, fixed: NDArray[np.bool_], forces: Array, prescribed: Array | None = None, *,
+    blocks: EnergeticBlocks,
+    fixed: NDArray[np.bool_],
+    forces: Array,
+    prescribed: Array | None = None,
+    *,
     symmetric: bool = True,
 ) -> tuple[Array, Array, Array]:
     """Return displacements (steps, 2n, R) at the ends of the steps, tractions (steps, 4n, R) and nodal forces
@@ -125,8 +155,10 @@ def marched(
     """
     steps, unknowns, count = forces.shape
     if steps > blocks.steps:
-        raise InputError(f"boundary elements: the forces have {steps} steps and the operator {blocks.steps}; "
-                         "assemble it with more steps")
+        raise InputError(
+            f"boundary elements: the forces have {steps} steps and the operator {blocks.steps}; "
+            "assemble it with more steps"
+        )
     mass, free = blocks.mesh.mass, ~fixed
     v0 = cho_factor(0.5 * (blocks.single[0] + blocks.single[0].T))
     right = blocks.double[0] + 0.5 * mass

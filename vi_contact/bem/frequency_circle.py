@@ -24,7 +24,12 @@ SHARE = 1e-6  # of displacements and of forces: what may wrap around, what the e
 
 
 def on_circle(
-    blocks: CompressedBlocks, fixed: Mask, forces: Array, prescribed: Array | None, units: Indices, symmetric: bool
+    blocks: CompressedBlocks,
+    fixed: Mask,
+    forces: Array,
+    prescribed: Array | None,
+    units: Indices,
+    symmetric: bool,
 ) -> tuple[Array, Array, Array, Array]:
     """Return W (steps, m, m), the displacements of m unknowns after unit nodal forces on them during step 0, and as
     ``marched`` does displacements (steps, 2n), tractions (steps, 4n), nodal forces (steps, 2n) of one right-hand side:
@@ -33,11 +38,16 @@ def on_circle(
     side or a unit force misses the equations of the march."""
     steps, m, mass, free = len(forces), len(units), blocks.mesh.mass, ~fixed
     if steps > blocks.steps:
-        raise InputError(f"boundary elements: blocks of {blocks.steps} steps for {steps}; assemble it with more steps")
+        raise InputError(
+            f"boundary elements: blocks of {blocks.steps} steps for {steps}; assemble it with more steps"
+        )
     if symmetric and not fixed.any():
         _check_drift(blocks, steps)
     count, radius = 2 * steps, BALANCE ** (1.0 / (3 * steps))
-    scale, circle = radius ** np.arange(steps), radius * np.exp(-2j * np.pi / count * np.arange(count // 2 + 1))
+    scale, circle = (
+        radius ** np.arange(steps),
+        radius * np.exp(-2j * np.pi / count * np.arange(count // 2 + 1)),
+    )
     columns, W = np.zeros((len(free), m + 1), complex), np.empty((len(circle), m, m), complex)
     columns[units, np.arange(m)] = 1.0
     kept = np.array([m, m // 2][: 1 + (m > 0)])  # the right-hand side; one unit force, to check
@@ -46,8 +56,10 @@ def on_circle(
     given = np.zeros_like(pulls)
     if prescribed is not None:
         given[:, fixed, 0] = prescribed[:, fixed]
-    loads, u = (np.fft.rfft(values * scale[:, None, None], count, axis=0)
-                for values in (pulls, np.diff(given, axis=0, prepend=0.0)))
+    loads, u = (
+        np.fft.rfft(values * scale[:, None, None], count, axis=0)
+        for values in (pulls, np.diff(given, axis=0, prepend=0.0))
+    )
     p = np.empty((len(u), 2 * len(free), len(kept)), complex)
     for start in range(0, len(circle), BATCH):
         powers = circle[start : start + BATCH, None] ** np.arange(blocks.reach)
@@ -59,14 +71,18 @@ def on_circle(
             columns[:, -1] = loads[i, :, 0] - stiffness[:, fixed] @ u[i, fixed, 0]
             moved = np.zeros_like(columns)
             if free.any():
-                moved[free] = solve(stiffness[np.ix_(free, free)], columns[free], check_finite=False)
+                moved[free] = solve(
+                    stiffness[np.ix_(free, free)], columns[free], check_finite=False
+                )
             u[i, free] = moved[np.ix_(free, kept)]
             p[i], loads[i] = traction @ u[i], stiffness @ u[i]
             u[i], W[i] = u[i] / (1.0 - z), moved[units, :-1] / (1.0 - z)
     found = [np.fft.irfft(values, count, axis=0) for values in (W, u, p, loads)]
     lost = max(_around(values, radius) for values in found[:2])
     if not lost <= SHARE:
-        raise StepFailure(_refusal(f"adds {lost:.1e} of the motion, which grows behind step {steps}", symmetric))
+        raise StepFailure(
+            _refusal(f"adds {lost:.1e} of the motion, which grows behind step {steps}", symmetric)
+        )
     compliance, *motion = ((values[:steps].T / scale).T for values in found)
     motion[0][:, fixed], motion[2][:, free] = given[:, fixed], pulls[:, free]
     for column in reversed(range(len(kept))):
@@ -82,8 +98,11 @@ def _check(blocks: CompressedBlocks, u: Array, p: Array, forces: Array, symmetri
     for k in sorted({steps // 2, steps - 1}):
         v, double, adjoint, hyper = blocks.applied(p[k::-1], changes[k::-1], jumps[k::-1])
         found = mass.T @ p[k] + adjoint - hyper if symmetric else 2.0 * mass.T @ p[k]
-        lost = [np.abs(v - double - mass @ u[k]).max() / max(np.abs(u @ mass.T).max(), np.finfo(float).tiny),
-                np.abs(found - forces[k]).max() / max(np.abs(forces).max(), np.finfo(float).tiny)]
+        lost = [
+            np.abs(v - double - mass @ u[k]).max()
+            / max(np.abs(u @ mass.T).max(), np.finfo(float).tiny),
+            np.abs(found - forces[k]).max() / max(np.abs(forces).max(), np.finfo(float).tiny),
+        ]
         if not max(lost) <= SHARE:
             what = f"misses the equations of step {k + 1} of {steps} by a share of {max(lost):.1e}"
             raise StepFailure(_refusal(what, symmetric))
@@ -91,15 +110,19 @@ def _check(blocks: CompressedBlocks, u: Array, p: Array, forces: Array, symmetri
 
 def _around(values: Array, radius: float) -> float:
     """Return what wraps around onto the last of N steps, as a share, if growth from N to 2 N goes on to 3 N."""
-    size = np.abs(values.reshape(len(values), -1)).max(1, initial=0.0) / radius ** np.arange(len(values))
+    size = np.abs(values.reshape(len(values), -1)).max(1, initial=0.0) / radius ** np.arange(
+        len(values)
+    )
     near, far = size[: len(values) // 2].max(), size[-1 - len(values) // 16 :].max()
     return float(radius ** len(values) * (far / near) ** 2) if near else 0.0
 
 
 def _refusal(what: str, symmetric: bool) -> str:
     """Return the sentence that names the fault and the remedies."""
-    return (f"boundary elements: the compressed operator {what}, and {SHARE:.0e} is the limit; assemble with "
-            "compressed=False, take fewer steps" + ("" if symmetric else " or the symmetric form"))
+    return (
+        f"boundary elements: the compressed operator {what}, and {SHARE:.0e} is the limit; assemble with "
+        "compressed=False, take fewer steps" + ("" if symmetric else " or the symmetric form")
+    )
 
 
 def _check_drift(blocks: CompressedBlocks, steps: int) -> None:
@@ -112,7 +135,11 @@ def _check_drift(blocks: CompressedBlocks, steps: int) -> None:
         return
     ones = np.zeros((steps, 2 * n))
     ones[steps // 2 :, :n] = 1.0
-    force = np.abs(blocks.applied(np.zeros((steps, 4 * n)), ones, np.zeros((steps, 4 * n)))[3]).max()
+    force = np.abs(
+        blocks.applied(np.zeros((steps, 4 * n)), ones, np.zeros((steps, 4 * n)))[3]
+    ).max()
     if force * steps * blocks.dt**2 > DRIFT * abs(blocks.mesh.area):
-        raise InputError(f"boundary elements: in {steps} steps rounding errors move a free body; take fewer steps, "
-                         "hold the body, or take the unsymmetric form")
+        raise InputError(
+            f"boundary elements: in {steps} steps rounding errors move a free body; take fewer steps, "
+            "hold the body, or take the unsymmetric form"
+        )

@@ -41,8 +41,10 @@ def check_speeds(kernels: Any) -> None:
     """Raise InputError unless c_p and c_s of kernels are positive and c_p is the larger."""
     attributes(kernels, positive=("c_p", "c_s"))
     if kernels.c_p <= kernels.c_s:
-        raise InputError(f"{type(kernels).__name__}: c_p is {kernels.c_p:g} and c_s is {kernels.c_s:g} m/s; give "
-                         "c_p above c_s: pressure waves are faster than shear waves")
+        raise InputError(
+            f"{type(kernels).__name__}: c_p is {kernels.c_p:g} and c_s is {kernels.c_s:g} m/s; give "
+            "c_p above c_s: pressure waves are faster than shear waves"
+        )
 
 
 @dataclass(frozen=True)
@@ -65,19 +67,42 @@ class TimeKernels:
         root_s, f1_s = front_functions(r, t, self.c_s)
         root_p, f1_p = front_functions(r, t, self.c_p)
         inverse = 1.0 / r**2
-        dq2 = np.where(root_s > 0.0, (slow - fast) / np.maximum(root_s + root_p, 1e-300), root_p * inverse)
+        dq2 = np.where(
+            root_s > 0.0, (slow - fast) / np.maximum(root_s + root_p, 1e-300), root_p * inverse
+        )
         dq3 = 0.5 * (f1_s * slow - f1_p * fast + t * dq2)
         single = tensor(f1_s * slow, f1_p * fast, dq3)
         f2_s, f2_p = t * f1_s - root_s, t * f1_p - root_p
         # (n-1)² dQ_n = (2n-3) t dQ_(n-1) - t² dQ_(n-2) + [(r F'_(n-2) + 2 F_(n-2))/c²] S minus P, where
         # r F_n' = (n-1) F_n - t F_(n-1) and Q_n = F_n'/r, dQ_n = Q_n^S - Q_n^P
-        dq4 = (5.0 * t * dq3 - t**2 * dq2 + slow * (3.0 * f2_s - t * f1_s) - fast * (3.0 * f2_p - t * f1_p)) / 9.0
-        double = f2_s / TWO_PI, -root_s * inverse / TWO_PI, -dq2 / TWO_PI, *tensor(f2_s * slow, f2_p * fast, dq4)
+        dq4 = (
+            5.0 * t * dq3
+            - t**2 * dq2
+            + slow * (3.0 * f2_s - t * f1_s)
+            - fast * (3.0 * f2_p - t * f1_p)
+        ) / 9.0
+        double = (
+            f2_s / TWO_PI,
+            -root_s * inverse / TWO_PI,
+            -dq2 / TWO_PI,
+            *tensor(f2_s * slow, f2_p * fast, dq4),
+        )
         f3_s = 0.25 * (3.0 * t * f2_s - root_s**2 * f1_s)
         f3_p = 0.25 * (3.0 * t * f2_p - root_p**2 * f1_p)
-        dq5 = (7.0 * t * dq4 - t**2 * dq3 + slow * (4.0 * f3_s - t * f2_s) - fast * (4.0 * f3_p - t * f2_p)) / 16.0
-        hyper = (f3_s / TWO_PI, (2.0 * f3_s - t * f2_s) * inverse / TWO_PI, -dq3 / TWO_PI,
-                 *tensor(f3_s * slow, f3_p * fast, dq5), f1_p / TWO_PI, f1_s / TWO_PI)
+        dq5 = (
+            7.0 * t * dq4
+            - t**2 * dq3
+            + slow * (4.0 * f3_s - t * f2_s)
+            - fast * (4.0 * f3_p - t * f2_p)
+        ) / 16.0
+        hyper = (
+            f3_s / TWO_PI,
+            (2.0 * f3_s - t * f2_s) * inverse / TWO_PI,
+            -dq3 / TWO_PI,
+            *tensor(f3_s * slow, f3_p * fast, dq5),
+            f1_p / TWO_PI,
+            f1_s / TWO_PI,
+        )
         return KernelSet(single, double, hyper)
 
 

@@ -55,12 +55,19 @@ class TwoBodies:
 
     def __post_init__(self) -> None:
         for name in ("one", "two"):
-            provides("TwoBodies", name, getattr(self, name), ("operator", "contact", "condensed", "solve"),
-                     "give a BoundaryProblem")
+            provides(
+                "TwoBodies",
+                name,
+                getattr(self, name),
+                ("operator", "contact", "condensed", "solve"),
+                "give a BoundaryProblem",
+            )
         optional(mask, "TwoBodies", "welded", self.welded, (len(self.one.operator.mesh),))
         steps = [len(body.forces) for body in (self.one, self.two)]
         if steps[0] != steps[1]:
-            raise InputError(f"TwoBodies: one has forces of {steps[0]} steps and two of {steps[1]}; give both as many")
+            raise InputError(
+                f"TwoBodies: one has forces of {steps[0]} steps and two of {steps[1]}; give both as many"
+            )
         for name in ("jump", "traction"):
             if not callable(getattr(self, name)):
                 shape = (len(self.one.forces), 2, len(self.one.contact_nodes))
@@ -73,7 +80,13 @@ class TwoBodies:
             return np.zeros((2, len(nodes)))
         if callable(self.jump):
             points = self.one.operator.mesh.points[nodes]
-            return array("TwoBodies", f"the jump at t = {t:.6g} s", self.jump(points, t), points.shape, unit="m").T
+            return array(
+                "TwoBodies",
+                f"the jump at t = {t:.6g} s",
+                self.jump(points, t),
+                points.shape,
+                unit="m",
+            ).T
         ends = np.concatenate([np.zeros((1, 2, len(nodes))), self.jump])
         place = min(max(t / self.one.operator.dt, 0.0), len(ends) - 1.0)
         k = min(int(place), len(ends) - 2)
@@ -94,11 +107,18 @@ class TwoBodies:
         loads = self.traction
         if callable(loads):
             law: OfPlace = loads
-            loads = traction_forces(mesh, lambda points, _, t: law(points, t), dt=self.one.operator.dt,
-                                    steps=len(self.one.forces), elements=self.one.contact)[:, :, nodes]
+            loads = traction_forces(
+                mesh,
+                lambda points, _, t: law(points, t),
+                dt=self.one.operator.dt,
+                steps=len(self.one.forces),
+                elements=self.one.contact,
+            )[:, :, nodes]
         forces = np.array(self.two.forces, float)
         pieces = (1,) * (forces.ndim - 3)  # of a step, where the operator has such
-        forces[..., self.two.contact_nodes[self._partner]] += np.reshape(loads, (len(loads), *pieces, 2, len(nodes)))
+        forces[..., self.two.contact_nodes[self._partner]] += np.reshape(
+            loads, (len(loads), *pieces, 2, len(nodes))
+        )
         return replace(self.two, forces=forces)
 
     @cached_property
@@ -106,22 +126,35 @@ class TwoBodies:
         """Return W_1 + W_2 on all interface nodes, in the order and with the normals of body 1."""
         one, two = self.one.condensed(), self._two.condensed()
         if one.W.shape != two.W.shape or abs(one.dt - two.dt) > 1e-12 * one.dt:
-            raise InputError(f"TwoBodies: {len(one.W)} steps of {one.dt:.6g} s and {len(one.nodes)} nodes face "
-                             f"{len(two.W)} of {two.dt:.6g} s and {len(two.nodes)}; give both the same")
+            raise InputError(
+                f"TwoBodies: {len(one.W)} steps of {one.dt:.6g} s and {len(one.nodes)} nodes face "
+                f"{len(two.W)} of {two.dt:.6g} s and {len(two.nodes)}; give both the same"
+            )
         partner = self._partner
         unknowns = np.concatenate([partner, partner + len(partner)])
-        return replace(one, W=one.W + two.W[:, unknowns][:, :, unknowns], u_free=one.u_free - two.u_free[:, unknowns])
+        return replace(
+            one,
+            W=one.W + two.W[:, unknowns][:, :, unknowns],
+            u_free=one.u_free - two.u_free[:, unknowns],
+        )
 
     @cached_property
     def _weld(self) -> "Weld":
         relative, interface = self.relative, np.asarray(self.one.contact, bool)
-        elements = np.zeros(len(interface), bool) if self.welded is None else np.asarray(self.welded, bool)
+        elements = (
+            np.zeros(len(interface), bool) if self.welded is None else np.asarray(self.welded, bool)
+        )
         if (elements & ~interface).any():
-            raise InputError("TwoBodies: `welded` has elements of body 1 that are not in its `contact`; add them there")
+            raise InputError(
+                "TwoBodies: `welded` has elements of body 1 that are not in its `contact`; add them there"
+            )
         mesh = self.one.operator.mesh
         contact = interface & ~elements
-        relative = replace(relative, lengths=mesh.node_lengths(contact)[relative.nodes],
-                           normals=mesh.node_normals(contact)[relative.nodes])
+        relative = replace(
+            relative,
+            lengths=mesh.node_lengths(contact)[relative.nodes],
+            normals=mesh.node_normals(contact)[relative.nodes],
+        )
         dt, steps = relative.dt, len(relative.W)
         jumps = np.array([self.jumps((k + 1) * dt).ravel() for k in range(steps)])
         return Weld(relative, mesh.nodes_of(elements)[relative.nodes], jumps)
@@ -131,7 +164,11 @@ class TwoBodies:
         return self._weld.contact
 
     def contact(
-        self, friction: FrictionLaw | None = None, *, conditions: Conditions | None = None, bilateral: bool = False
+        self,
+        friction: FrictionLaw | None = None,
+        *,
+        conditions: Conditions | None = None,
+        bilateral: bool = False,
     ) -> BoundaryContact:
         """Set up contact of the nodes that are not welded, with the given jump: its normal part is how far body 2
         has moved towards body 1 beforehand, its tangential part how far it has slid."""
@@ -144,7 +181,10 @@ class TwoBodies:
             return np.asarray(np.sum(self.jumps(t)[:, places].T * frames[:, :, column], axis=1))
 
         return BoundaryContact(
-            compliance, friction=friction or Frictionless(), conditions=conditions, bilateral=bilateral,
+            compliance,
+            friction=friction or Frictionless(),
+            conditions=conditions,
+            bilateral=bilateral,
             towards=None if self.jump is None else lambda t: -part(t, 0),
             along=None if self.jump is None else lambda t: part(t, 1)[:, None],
         )
@@ -153,11 +193,17 @@ class TwoBodies:
         """Return the motions of both bodies under loads, contact forces (steps, 2m_c) on body 1, and the welds."""
         relative = self.relative
         shape = (len(relative.W), self.condensed().W.shape[1])
-        forces = np.zeros(shape) if forces is None else array("TwoBodies.solve", "forces", forces, shape, unit="N/m")
+        forces = (
+            np.zeros(shape)
+            if forces is None
+            else array("TwoBodies.solve", "forces", forces, shape, unit="N/m")
+        )
         on_one = self._weld.forces(forces)
         two_nodes = self.two.operator.mesh.points[self.two.contact_nodes]
         back = matching(two_nodes, relative.points)
-        return self.one.solve(on_one), self._two.solve(-on_one[:, np.concatenate([back, back + len(back)])])
+        return self.one.solve(on_one), self._two.solve(
+            -on_one[:, np.concatenate([back, back + len(back)])]
+        )
 
 
 def matching(points: Array, others: Array) -> Indices:
@@ -167,8 +213,10 @@ def matching(points: Array, others: Array) -> Indices:
     away = distance.min(axis=1)
     worst = int(away.argmax())
     if len(points) != len(others) or away[worst] > MATCH * np.ptp(points, axis=0).max():
-        raise InputError(f"TwoBodies: the node at {at(points[worst])} has no partner on the other body; give both "
-                         "interfaces the same nodes")
+        raise InputError(
+            f"TwoBodies: the node at {at(points[worst])} has no partner on the other body; give both "
+            "interfaces the same nodes"
+        )
     return nearest
 
 
@@ -188,18 +236,27 @@ class Weld:
         flexibility = W[0].diagonal()
         self._welded = welded = np.tile(nodes, 2) & (flexibility > SUPPORTED * flexibility.max())
         self._touching = touching = np.tile(~nodes, 2)
-        inner, cross, across = W[:, welded][:, :, welded], W[:, welded][:, :, touching], W[:, touching][:, :, welded]
+        inner, cross, across = (
+            W[:, welded][:, :, welded],
+            W[:, welded][:, :, touching],
+            W[:, touching][:, :, welded],
+        )
         known = np.concatenate([cross, (compliance.u_free - jumps)[:, welded, None]], axis=2)
         # (steps, |I|, 2m_c + 1) weld forces after unit contact forces in step 0, in the last column without any
         self._responses = responses = np.zeros_like(known)
-        left = np.concatenate([W[:, touching][:, :, touching], compliance.u_free[:, touching, None]], axis=2)
+        left = np.concatenate(
+            [W[:, touching][:, :, touching], compliance.u_free[:, touching, None]], axis=2
+        )
         if welded.any():
             solve = inverse(inner[0])
             for k in range(steps):
                 early = summed(inner[k:0:-1], responses[:k]) if k else 0.0
                 responses[k] = -solve(known[k] + early)
             left += np.array([summed(across[k::-1], responses[: k + 1]) for k in range(steps)])
-        kept = {name: getattr(compliance, name)[~nodes] for name in ("nodes", "points", "normals", "lengths")}
+        kept = {
+            name: getattr(compliance, name)[~nodes]
+            for name in ("nodes", "points", "normals", "lengths")
+        }
         W, u_free = np.ascontiguousarray(left[:, :, :-1]), np.ascontiguousarray(left[:, :, -1])
         self.contact = replace(compliance, W=W, u_free=u_free, **kept)
 
@@ -209,6 +266,8 @@ class Weld:
         everything[:, self._touching] = contact_forces
         if self._welded.any():
             for k in range(len(contact_forces)):
-                follow = summed(self._responses[k::-1, :, :-1], contact_forces[: k + 1, :, None])[:, 0]
+                follow = summed(self._responses[k::-1, :, :-1], contact_forces[: k + 1, :, None])[
+                    :, 0
+                ]
                 everything[k, self._welded] = self._responses[k, :, -1] + follow
         return everything

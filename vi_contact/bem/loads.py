@@ -13,8 +13,13 @@ from .rules import gauss
 
 
 def traction_forces(
-    mesh: BoundaryMesh, traction: Callable[[Array, Array, float], ArrayLike], *, dt: float, steps: int,
-    elements: ArrayLike | None = None, order: int = 4,
+    mesh: BoundaryMesh,
+    traction: Callable[[Array, Array, float], ArrayLike],
+    *,
+    dt: float,
+    steps: int,
+    elements: ArrayLike | None = None,
+    order: int = 4,
 ) -> Array:
     """Return (steps, 2, n) nodal forces [N/m], mean over each step, of traction(points, normals, t) -> (m, 2) [Pa].
 
@@ -23,10 +28,15 @@ def traction_forces(
     owner = "traction_forces"
     instance(owner, "mesh", mesh, BoundaryMesh, "give a BoundaryMesh, for example polygon(...)")
     function(owner, "traction", traction, "give a function (points, normals, t) -> (m, 2) in Pa")
-    dt, steps = number(owner, "dt", dt, positive=True, unit="s"), whole(owner, "steps", steps, least=1)
+    dt, steps = (
+        number(owner, "dt", dt, positive=True, unit="s"),
+        whole(owner, "steps", steps, least=1),
+    )
     counted(owner, "steps", 2 * steps * len(mesh), "numbers")
     everywhere = np.ones(len(mesh), bool)
-    chosen = np.flatnonzero(everywhere if elements is None else mask(owner, "elements", elements, (len(mesh),)))
+    chosen = np.flatnonzero(
+        everywhere if elements is None else mask(owner, "elements", elements, (len(mesh),))
+    )
     x, w = gauss(whole(owner, "order", order, least=1, most=MOST_POINTS))
     start, end = mesh.points[chosen, None], mesh.points[mesh.after[chosen], None]
     places = (start + x[:, None] * (end - start)).reshape(-1, 2)
@@ -35,10 +45,19 @@ def traction_forces(
     forces = np.zeros((steps, 2, len(mesh)))
     for k in range(steps):
         at_times = [
-            array(owner, f"the traction at t = {t:.6g} s", traction(places, normals, t), places.shape, unit="Pa")
+            array(
+                owner,
+                f"the traction at t = {t:.6g} s",
+                traction(places, normals, t),
+                places.shape,
+                unit="Pa",
+            )
             for t in (k + x) * dt
         ]
-        loads = np.tensordot(w, np.stack(at_times), 1).reshape(len(chosen), order, 2) * weight[:, :, None]
+        loads = (
+            np.tensordot(w, np.stack(at_times), 1).reshape(len(chosen), order, 2)
+            * weight[:, :, None]
+        )
         for nodes, shape in ((chosen, 1.0 - x), (mesh.after[chosen], x)):
             forces[k][:, nodes] += np.einsum("eqc,q->ce", loads, shape)
     return forces

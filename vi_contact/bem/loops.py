@@ -33,10 +33,14 @@ def should_run_forward(loops: list[Array], *, exterior: bool) -> list[bool]:
 def check_orientation(points: Array, sizes: tuple[int, ...], *, exterior: bool) -> None:
     """Raise InputError when a loop does not keep the body on its left."""
     loops = np.split(points, np.cumsum(sizes)[:-1])
-    for i, (loop, forward) in enumerate(zip(loops, should_run_forward(loops, exterior=exterior), strict=True)):
+    for i, (loop, forward) in enumerate(
+        zip(loops, should_run_forward(loops, exterior=exterior), strict=True)
+    ):
         if (signed_area(loop) > 0.0) != forward:
-            raise InputError(f"BoundaryMesh: loop {i} has the wrong orientation, normals would point into the body; "
-                             f"reverse its points or set exterior={not exterior}")
+            raise InputError(
+                f"BoundaryMesh: loop {i} has the wrong orientation, normals would point into the body; "
+                f"reverse its points or set exterior={not exterior}"
+            )
 
 
 def check_size(points: Array, sizes: tuple[int, ...]) -> None:
@@ -46,8 +50,10 @@ def check_size(points: Array, sizes: tuple[int, ...]) -> None:
             extent = np.ptp(loop, axis=0)
             smallest, largest = extent.min() ** 2, extent @ extent
         if not (smallest > 0.0 and np.isfinite(largest)):
-            raise InputError(f"BoundaryMesh: loop {i} is {extent[0]:.3g} m wide and {extent[1]:.3g} m high, which "
-                             "leaves no area to compute with; give points of a plane body, in units of its size")
+            raise InputError(
+                f"BoundaryMesh: loop {i} is {extent[0]:.3g} m wide and {extent[1]:.3g} m high, which "
+                "leaves no area to compute with; give points of a plane body, in units of its size"
+            )
 
 
 def check_simple(points: Array, after: Indices) -> None:
@@ -57,20 +63,28 @@ def check_simple(points: Array, after: Indices) -> None:
     distance[index, index] = distance[after, index] = np.inf
     node, element = np.unravel_index(int(distance.argmin()), distance.shape)
     if distance[node, element] <= TOUCHING * np.hypot(*np.ptp(points, axis=0)):
-        raise InputError(f"BoundaryMesh: the boundary crosses or touches itself at {at(points[node])}, where "
-                         f"node {node} lies on element {element}; give a boundary that does not meet itself")
+        raise InputError(
+            f"BoundaryMesh: the boundary crosses or touches itself at {at(points[node])}, where "
+            f"node {node} lies on element {element}; give a boundary that does not meet itself"
+        )
 
     def side(p: Array, q: Array, x: Array) -> Array:
         along, away = (q - p)[:, None], x - p[:, None]
         return np.asarray(along[..., 0] * away[..., 1] - along[..., 1] * away[..., 0])
 
     splits = side(a, b, a) * side(a, b, b) < 0.0
-    neighbours = (after[:, None] == index) | (after[None, :] == index[:, None]) | np.eye(len(points), dtype=bool)
+    neighbours = (
+        (after[:, None] == index)
+        | (after[None, :] == index[:, None])
+        | np.eye(len(points), dtype=bool)
+    )
     crossing = splits & splits.T & ~neighbours
     if crossing.any():
         i, j = np.argwhere(crossing)[0]
-        raise InputError(f"BoundaryMesh: the boundary crosses itself near {at(a[i])}, where elements {i} and "
-                         f"{j} cross; give a boundary that does not meet itself")
+        raise InputError(
+            f"BoundaryMesh: the boundary crosses itself near {at(a[i])}, where elements {i} and "
+            f"{j} cross; give a boundary that does not meet itself"
+        )
 
 
 def distances(x: Array, start: Array, end: Array) -> Array:

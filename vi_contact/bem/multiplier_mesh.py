@@ -53,29 +53,58 @@ class MultiplierMesh:
     def __post_init__(self) -> None:
         owner = "MultiplierMesh"
         instance(owner, "mesh", self.mesh, BoundaryMesh, "give the BoundaryMesh of the body")
-        instance(owner, "compliance", self.compliance, CondensedCompliance, "give what condensed() returns")
-        object.__setattr__(self, "elements", mask(owner, "elements", self.elements, (len(self.mesh),)))
+        instance(
+            owner,
+            "compliance",
+            self.compliance,
+            CondensedCompliance,
+            "give what condensed() returns",
+        )
+        object.__setattr__(
+            self, "elements", mask(owner, "elements", self.elements, (len(self.mesh),))
+        )
         attributes(self, counts=("patch", "interval"), not_negative=("sigma",))
         check_word("testing", self.testing, ("end", "mean"))
         whole(owner, "degree", self.degree, most=1)
         if self.sigma and self.testing == "end":
-            raise InputError(f"{owner}: sigma is for means and testing is 'end'; give testing='mean' or sigma=0")
-        if 2.0 * self.sigma * self.compliance.dt * EPS > 1.0:  # the weight at the end of a step, 1/(2 sigma dt)
-            raise InputError(f"{owner}: sigma = {self.sigma:g} 1/s gives ends of steps no weight; reduce sigma")
+            raise InputError(
+                f"{owner}: sigma is for means and testing is 'end'; give testing='mean' or sigma=0"
+            )
+        if (
+            2.0 * self.sigma * self.compliance.dt * EPS > 1.0
+        ):  # the weight at the end of a step, 1/(2 sigma dt)
+            raise InputError(
+                f"{owner}: sigma = {self.sigma:g} 1/s gives ends of steps no weight; reduce sigma"
+            )
         nodes, points = self.compliance.nodes, self.mesh.points
-        if max(nodes) >= len(points) or max_abs(points[nodes] - self.compliance.points) > 1e-9 * self.mesh.size:
-            raise InputError(f"{owner}: compliance has other nodes than mesh; give the mesh it was condensed on")
+        if (
+            max(nodes) >= len(points)
+            or max_abs(points[nodes] - self.compliance.points) > 1e-9 * self.mesh.size
+        ):
+            raise InputError(
+                f"{owner}: compliance has other nodes than mesh; give the mesh it was condensed on"
+            )
         if not np.isin(np.flatnonzero(self.mesh.nodes_of(self.elements)), nodes).all():
-            raise InputError(f"{owner}: elements must have all their nodes in the compliance; put them in `contact`")
+            raise InputError(
+                f"{owner}: elements must have all their nodes in the compliance; put them in `contact`"
+            )
         shortest = min(map(len, self._runs()), default=0)
         if shortest < self.patch:
-            raise InputError(f"{owner}: patch is {self.patch}, and a side has {shortest} elements; give fewer")
-        least = max(-1.0, min((n @ n.T).min() for n in (self.mesh.normals[patch] for patch in self.patches)))
+            raise InputError(
+                f"{owner}: patch is {self.patch}, and a side has {shortest} elements; give fewer"
+            )
+        least = max(
+            -1.0, min((n @ n.T).min() for n in (self.mesh.normals[patch] for patch in self.patches))
+        )
         if least < np.cos(FEATURE_ANGLE * (1.0 + 1e-9)):
-            raise InputError(f"{owner}: patch is {self.patch}, and one turns by {np.degrees(np.arccos(least)):.3g} "
-                             "degrees, more than 30, under one mean normal; give fewer elements, or a finer mesh")
+            raise InputError(
+                f"{owner}: patch is {self.patch}, and one turns by {np.degrees(np.arccos(least)):.3g} "
+                "degrees, more than 30, under one mean normal; give fewer elements, or a finer mesh"
+            )
         if (steps := len(self.compliance.W)) % self.interval:
-            raise InputError(f"{owner}: interval {self.interval} does not divide {steps} steps; give a divisor")
+            raise InputError(
+                f"{owner}: interval {self.interval} does not divide {steps} steps; give a divisor"
+            )
 
     def _runs(self) -> list[Indices]:
         """Return the elements of each part of the contact boundary without corners, in the order of the loop."""
@@ -90,7 +119,9 @@ class MultiplierMesh:
     @cached_property
     def patches(self) -> list[Indices]:
         """Return the elements of each patch, in the order of the loop."""
-        return [patch for run in self._runs() for patch in np.array_split(run, len(run) // self.patch)]
+        return [
+            patch for run in self._runs() for patch in np.array_split(run, len(run) // self.patch)
+        ]
 
     @cached_property
     def _functions(self) -> Array:
@@ -129,7 +160,9 @@ class MultiplierMesh:
         if self.testing == "end":
             return np.asarray(ends[-1])
         slid = np.cumsum(np.tensordot(rate, np.diff(ends, axis=0), 1), axis=0)
-        return np.asarray(slid + np.einsum("ij,kj...->ki...", normal, np.tensordot(mean, ends, 1) - slid))
+        return np.asarray(
+            slid + np.einsum("ij,kj...->ki...", normal, np.tensordot(mean, ends, 1) - slid)
+        )
 
     def condensed(self) -> CondensedCompliance:
         """Return the compliance that BoundaryContact takes: its nodes are the functions psi, its steps the intervals.
@@ -140,8 +173,10 @@ class MultiplierMesh:
         fine, B, q = self.compliance, self.pairing, self.interval
         growth, intervals = q / (self.weights[0] @ np.arange(q + 1.0)) - 1.0, len(fine.W) // q
         if growth > SWING ** (1.0 / intervals):
-            raise InputError(f"MultiplierMesh: with sigma = {self.sigma:g} 1/s the means swing {growth:.3g} times as "
-                             f"far in each of {intervals} intervals; reduce sigma, or take testing='end'")
+            raise InputError(
+                f"MultiplierMesh: with sigma = {self.sigma:g} 1/s the means swing {growth:.3g} times as "
+                f"far in each of {intervals} intervals; reduce sigma, or take testing='end'"
+            )
         both = np.kron(np.eye(2), B)
         held = np.cumsum(both.T @ fine.W @ both, axis=0)
         held[q:] = held[q:] - held[:-q]  # by a force during the first interval
@@ -149,8 +184,15 @@ class MultiplierMesh:
         n = sizes @ self.mesh.normals
         n /= np.hypot(*n.T)[:, None]
         onto = np.block([[np.diag(a * b) for b in n.T] for a in n.T])
-        return CondensedCompliance(self._tested(held, onto), self._tested(fine.u_free @ both, onto), np.arange(len(n)),
-                                   B.T @ fine.points, n, sizes.sum(axis=1), fine.dt * q)
+        return CondensedCompliance(
+            self._tested(held, onto),
+            self._tested(fine.u_free @ both, onto),
+            np.arange(len(n)),
+            B.T @ fine.points,
+            n,
+            sizes.sum(axis=1),
+            fine.dt * q,
+        )
 
     def forces(self, forces: Array) -> Array:
         """Return nodal forces (steps, 2m) [N/m] for BoundaryProblem.solve of those of a run (intervals, 2p)."""
@@ -161,5 +203,7 @@ class MultiplierMesh:
     def averaged(self, motion: Callable[[float], float | Array]) -> Callable[[float], Array]:
         """Return the mean over the interval that ends at t of an obstacle's ``motion``, for ``towards``."""
         function("MultiplierMesh.averaged", "motion", motion, "give a function of the time in m")
-        shares = list(zip(self.weights[0], self.compliance.dt * np.arange(-self.interval, 1), strict=True))
+        shares = list(
+            zip(self.weights[0], self.compliance.dt * np.arange(-self.interval, 1), strict=True)
+        )
         return lambda t: np.asarray(sum(w * np.asarray(motion(t + s)) for w, s in shares))

@@ -11,7 +11,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.algebra import Array, Indices, Mask, max_abs
-from ..core.checks import array, flag, instance, integers, mask, number, optional, provides, shape_of
+from ..core.checks import (
+    array,
+    flag,
+    instance,
+    integers,
+    mask,
+    number,
+    optional,
+    provides,
+    shape_of,
+)
 from ..core.errors import InputError, StepFailure
 from ..solvers.normal.lcp import EPS
 from .boundary_mesh import BoundaryMesh
@@ -35,11 +45,15 @@ class BodyOperator(Protocol):
     def load_shape(self, dimensions: int) -> tuple[int | None, ...]:
         """Return the shape of nodal forces given in so many dimensions."""
 
-    def motion(self, forces: Array, fixed: Mask, prescribed: Array | None) -> tuple[Array, Array, Array]:
+    def motion(
+        self, forces: Array, fixed: Mask, prescribed: Array | None
+    ) -> tuple[Array, Array, Array]:
         """Return displacements (steps, 2n), tractions (steps, 4n) and nodal forces (steps, 2n), reactions included,
         under forces (steps, pieces of a step, 2n) and prescribed displacements (steps, 2n) of fixed unknowns (2n,)."""
 
-    def condense(self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: Indices) -> tuple[Array, Array]:
+    def condense(
+        self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: Indices
+    ) -> tuple[Array, Array]:
         """Return W and u_free of CondensedCompliance for these unknowns."""
 
 
@@ -52,7 +66,13 @@ class PoincareSteklov:
     symmetric: bool = True
 
     def __post_init__(self) -> None:
-        instance("PoincareSteklov", "blocks", self.blocks, (EnergeticBlocks, CompressedBlocks), "use energetic_blocks")
+        instance(
+            "PoincareSteklov",
+            "blocks",
+            self.blocks,
+            (EnergeticBlocks, CompressedBlocks),
+            "use energetic_blocks",
+        )
         number("PoincareSteklov", "the mass density rho", self.rho, positive=True, unit="kg/m³")
         flag("PoincareSteklov", "symmetric", self.symmetric)
 
@@ -70,20 +90,36 @@ class PoincareSteklov:
         """Return the shape of the nodal forces of a problem."""
         return None, 2, len(self.mesh)
 
-    def motion(self, forces: Array, fixed: Mask, prescribed: Array | None) -> tuple[Array, Array, Array]:
+    def motion(
+        self, forces: Array, fixed: Mask, prescribed: Array | None
+    ) -> tuple[Array, Array, Array]:
         """Return the motion by one march, or on a circle of frequencies; forces: (steps, 1, 2n)."""
         if isinstance(self.blocks, CompressedBlocks):
             pulls, nothing = forces[:, 0] / self.rho, np.arange(0)
-            u, p, total = on_circle(self.blocks, fixed, pulls, prescribed, nothing, self.symmetric)[1:]
+            u, p, total = on_circle(self.blocks, fixed, pulls, prescribed, nothing, self.symmetric)[
+                1:
+            ]
         else:
             given = None if prescribed is None else prescribed[:, :, None]
-            found = marched(self.blocks, fixed, forces.swapaxes(1, 2) / self.rho, given, symmetric=self.symmetric)
+            found = marched(
+                self.blocks,
+                fixed,
+                forces.swapaxes(1, 2) / self.rho,
+                given,
+                symmetric=self.symmetric,
+            )
             u, p, total = (values[:, :, 0] for values in found)
-        missed = 0.0 if self.symmetric else max_abs(self._other_equation(u, p) - total[-1]) / (max_abs(total) or 1.0)
+        missed = (
+            0.0
+            if self.symmetric
+            else max_abs(self._other_equation(u, p) - total[-1]) / (max_abs(total) or 1.0)
+        )
         if not missed <= MISSED:
-            raise StepFailure(f"boundary elements: after {len(u)} steps the motion of the unsymmetric form misses the "
-                              f"other integral equation by {missed:.1e} of the largest force, and {MISSED:g} is the "
-                              "limit; take the symmetric form, fewer steps, another time step, or a finer mesh")
+            raise StepFailure(
+                f"boundary elements: after {len(u)} steps the motion of the unsymmetric form misses the "
+                f"other integral equation by {missed:.1e} of the largest force, and {MISSED:g} is the "
+                "limit; take the symmetric form, fewer steps, another time step, or a finer mesh"
+            )
         return u, self.rho * p, self.rho * total
 
     def _other_equation(self, u: Array, p: Array) -> Array:
@@ -93,19 +129,29 @@ class PoincareSteklov:
         if isinstance(self.blocks, CompressedBlocks):
             adjoint, hyper = self.blocks.applied(p[::-1], changes[::-1], jumps[::-1])[2:]
             return np.asarray(half @ p[-1] + adjoint - hyper)
-        double, hyper = (blocks[len(u) - 1 :: -1] for blocks in (self.blocks.double, self.blocks.hyper))
+        double, hyper = (
+            blocks[len(u) - 1 :: -1] for blocks in (self.blocks.double, self.blocks.hyper)
+        )
         past = summed(double.swapaxes(1, 2), jumps[..., None]) - summed(hyper, changes[..., None])
         return half @ p[-1] + past[:, 0]
 
-    def condense(self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: Indices) -> tuple[Array, Array]:
+    def condense(
+        self, forces: Array, fixed: Mask, prescribed: Array | None, unknowns: Indices
+    ) -> tuple[Array, Array]:
         """Return W and u_free of CondensedCompliance for these unknowns, in one march with 2m + 1 columns, or so."""
         if isinstance(self.blocks, CompressedBlocks):
-            W, moved, *_ = on_circle(self.blocks, fixed, forces[:, 0] / self.rho, prescribed, unknowns, self.symmetric)
+            W, moved, *_ = on_circle(
+                self.blocks, fixed, forces[:, 0] / self.rho, prescribed, unknowns, self.symmetric
+            )
             return W / self.rho, moved[:, unknowns]
         columns = np.zeros((len(forces), 2 * len(self.mesh), len(unknowns) + 1))
         columns[0, unknowns, np.arange(len(unknowns))] = 1.0 / self.rho
         columns[:, :, -1] = forces[:, 0] / self.rho
-        given = None if prescribed is None else np.concatenate([0.0 * columns[..., :-1], prescribed[..., None]], axis=2)
+        given = (
+            None
+            if prescribed is None
+            else np.concatenate([0.0 * columns[..., :-1], prescribed[..., None]], axis=2)
+        )
         u = marched(self.blocks, fixed, columns, given, symmetric=self.symmetric)[0][:, unknowns]
         _refuse_growth(u[..., : 0 if self.symmetric else -1])
         return np.ascontiguousarray(u[:, :, :-1]), np.ascontiguousarray(u[:, :, -1])
@@ -116,9 +162,11 @@ def _refuse_growth(moved: Array) -> None:
     size = np.abs(moved).max(axis=(1, 2), initial=0.0)
     if not size.max() * EPS <= GROWN * size[0]:
         share = size.max() * EPS / size[0]
-        raise StepFailure(f"boundary elements: in {len(size)} steps after unit forces the unsymmetric form lets "
-                          f"rounding errors grow to {share:.1e} of the motion, and {GROWN:.0e} is the limit; take the "
-                          "symmetric form, fewer steps, or another time step")
+        raise StepFailure(
+            f"boundary elements: in {len(size)} steps after unit forces the unsymmetric form lets "
+            f"rounding errors grow to {share:.1e} of the motion, and {GROWN:.0e} is the limit; take the "
+            "symmetric form, fewer steps, or another time step"
+        )
 
 
 @dataclass(frozen=True)
@@ -170,7 +218,12 @@ class CondensedCompliance:
         steps = len(array(owner, "W", self.W, (None, 2 * m, 2 * m), unit="m²/N"))
         if not steps:
             raise InputError(f"{owner}: W has no step; give one or more")
-        for name, shape in (("u_free", (steps, 2 * m)), ("points", (m, 2)), ("normals", (m, 2)), ("lengths", (m,))):
+        for name, shape in (
+            ("u_free", (steps, 2 * m)),
+            ("points", (m, 2)),
+            ("normals", (m, 2)),
+            ("lengths", (m,)),
+        ):
             array(owner, name, getattr(self, name), shape)
         number(owner, "dt", self.dt, positive=True, unit="s")
 
@@ -216,7 +269,9 @@ class BoundaryProblem:
     def contact_nodes(self) -> Indices:
         """Return (m,) numbers of the nodes of the contact boundary."""
         if self.contact is None or not np.any(self.contact):
-            raise InputError("BoundaryProblem: contact is empty; give the mask of the contact elements")
+            raise InputError(
+                "BoundaryProblem: contact is empty; give the mask of the contact elements"
+            )
         return np.flatnonzero(self.operator.mesh.nodes_of(self.contact))
 
     def _given(self, contact_forces: ArrayLike | None = None) -> tuple[Array, Mask, Array | None]:
@@ -225,23 +280,43 @@ class BoundaryProblem:
         forces = np.array(self.forces, float).reshape(steps, -1, 2, n)
         if contact_forces is not None:
             shape = (steps, 2 * len(self.contact_nodes))
-            given = array("BoundaryProblem.solve", "contact_forces", contact_forces, shape, unit="N/m")
+            given = array(
+                "BoundaryProblem.solve", "contact_forces", contact_forces, shape, unit="N/m"
+            )
             forces[..., self.contact_nodes] += given.reshape(steps, 1, 2, -1)
         fixed = np.zeros((2, n), bool) if self.fixed is None else np.asarray(self.fixed, bool)
-        prescribed = None if self.prescribed is None else np.asarray(self.prescribed, float).reshape(steps, -1)
+        prescribed = (
+            None
+            if self.prescribed is None
+            else np.asarray(self.prescribed, float).reshape(steps, -1)
+        )
         return forces.reshape(steps, -1, 2 * n), fixed.ravel(), prescribed
 
     def solve(self, contact_forces: ArrayLike | None = None) -> BoundaryMotion:
         """Return the motion under loads and nodal contact forces (steps, 2m), ordered as CondensedCompliance."""
         u, p, forces = self.operator.motion(*self._given(contact_forces))
         n = len(self.operator.mesh)
-        return BoundaryMotion(self.times, u.reshape(-1, 2, n), p.reshape(-1, 2, n, 2), forces.reshape(-1, 2, n))
+        return BoundaryMotion(
+            self.times, u.reshape(-1, 2, n), p.reshape(-1, 2, n, 2), forces.reshape(-1, 2, n)
+        )
 
     def condensed(self) -> CondensedCompliance:
         """Return the compliance of the contact unknowns and their motion without contact."""
-        mesh, nodes, elements = self.operator.mesh, self.contact_nodes, np.asarray(self.contact, bool)
-        W, u_free = self.operator.condense(*self._given(), np.concatenate([nodes, nodes + len(mesh)]))
+        mesh, nodes, elements = (
+            self.operator.mesh,
+            self.contact_nodes,
+            np.asarray(self.contact, bool),
+        )
+        W, u_free = self.operator.condense(
+            *self._given(), np.concatenate([nodes, nodes + len(mesh)])
+        )
         return CondensedCompliance(
-            W, u_free, nodes, mesh.points[nodes], mesh.node_normals(elements)[nodes],
-            mesh.node_lengths(elements)[nodes], self.operator.dt, mesh.node_turns(elements)[nodes],
+            W,
+            u_free,
+            nodes,
+            mesh.points[nodes],
+            mesh.node_normals(elements)[nodes],
+            mesh.node_lengths(elements)[nodes],
+            self.operator.dt,
+            mesh.node_turns(elements)[nodes],
         )

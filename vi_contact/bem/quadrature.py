@@ -79,7 +79,10 @@ class PointSet:
     def _weighted(self) -> Array:
         """Return (m, 4) weight times phi_a(xi) phi_b(eta), or one block of them."""
         xi, eta = self.xi, self.eta
-        return np.stack([(1 - xi) * (1 - eta), (1 - xi) * eta, xi * (1 - eta), xi * eta], 1) * self.weight[:, None]
+        return (
+            np.stack([(1 - xi) * (1 - eta), (1 - xi) * eta, xi * (1 - eta), xi * eta], 1)
+            * self.weight[:, None]
+        )
 
 
 def at_points(weighted: Array, owner: Indices, count: int) -> csc_matrix:
@@ -89,7 +92,9 @@ def at_points(weighted: Array, owner: Indices, count: int) -> csc_matrix:
     return csc_matrix((weighted.ravel(), rows.ravel(), columns), shape=(k * count, len(owner)))
 
 
-def point_sets(pairs: ElementPairs, fronts: Sequence[float], orders: Orders = Orders()) -> Iterator[PointSet]:
+def point_sets(
+    pairs: ElementPairs, fronts: Sequence[float], orders: Orders = Orders()
+) -> Iterator[PointSet]:
     """Return all points for kernels with kinks at r in `fronts` [m], zero beyond the greatest of them; () is smooth."""
     reach = max(fronts, default=np.inf)
     crossed = np.zeros(len(pairs), bool)
@@ -103,9 +108,22 @@ def point_sets(pairs: ElementPairs, fronts: Sequence[float], orders: Orders = Or
     fine = pairs.near | behind_soon
     yield from _products(pairs, np.flatnonzero(plain & ~fine), orders.far)
     yield from _products(pairs, np.flatnonzero(plain & fine), orders.near)
-    yield from _split(pairs, np.flatnonzero(apart & crossed), fronts, smoothed(orders.outer), smoothed(orders.inner))
+    yield from _split(
+        pairs,
+        np.flatnonzero(apart & crossed),
+        fronts,
+        smoothed(orders.outer),
+        smoothed(orders.inner),
+    )
     close = smoothed(orders.close)
-    yield from _split(pairs, np.flatnonzero(reached & pairs.close & ~pairs.corner), fronts, close, close, close=True)
+    yield from _split(
+        pairs,
+        np.flatnonzero(reached & pairs.close & ~pairs.corner),
+        fronts,
+        close,
+        close,
+        close=True,
+    )
     yield from _on_one_element(pairs, np.flatnonzero(pairs.same), fronts, orders.touching)
     for sharp in (False, True):
         corner = np.flatnonzero(pairs.corner & (pairs.close == sharp))
@@ -119,18 +137,28 @@ def _products(pairs: ElementPairs, chosen: Indices, order: int) -> Iterator[Poin
     size = max(1, CHUNK // order**2)
     for start in range(0, len(chosen), size):
         part = chosen[start : start + size]
-        d = (pairs.offset[:, part, None] + pairs.a[:, part, None] * xi - pairs.b[:, part, None] * eta).reshape(2, -1)
+        d = (
+            pairs.offset[:, part, None] + pairs.a[:, part, None] * xi - pairs.b[:, part, None] * eta
+        ).reshape(2, -1)
         yield PointSet(part, None, d, np.hypot(*d), xi, eta, weight)
 
 
-def _flat(pairs: ElementPairs, chosen: Indices, owner: Indices, xi: Array, eta: Array, weight: Array) -> PointSet:
+def _flat(
+    pairs: ElementPairs, chosen: Indices, owner: Indices, xi: Array, eta: Array, weight: Array
+) -> PointSet:
     pair = chosen[owner]
     d = pairs.offset[:, pair] + pairs.a[:, pair] * xi - pairs.b[:, pair] * eta
     return PointSet(chosen, owner, d, np.hypot(*d), xi, eta, weight)
 
 
 def _split(
-    pairs: ElementPairs, chosen: Indices, fronts: Sequence[float], outer: Rule, inner: Rule, *, close: bool = False
+    pairs: ElementPairs,
+    chosen: Indices,
+    fronts: Sequence[float],
+    outer: Rule,
+    inner: Rule,
+    *,
+    close: bool = False,
 ) -> Iterator[PointSet]:
     """Split the outer integral where fronts reach the second element's ends or graze it, the inner one at the fronts;
     ``close``: both about the feet as well, and stretched there."""
@@ -148,7 +176,9 @@ def _outer(
     breaks = _outer_breaks(pairs, part, fronts)
     if close:
         feet, heights = _feet(pairs, part)
-        row, low, length = pieces(np.concatenate([breaks, feet, feet.mean(axis=1, keepdims=True)], axis=1))
+        row, low, length = pieces(
+            np.concatenate([breaks, feet, feet.mean(axis=1, keepdims=True)], axis=1)
+        )
         nearer = np.hypot(feet[row] - (low + 0.5 * length)[:, None], heights[row]).argmin(axis=1)
         xi, weight = placed(low, length, rule, about=(feet[row, nearer], heights[row, nearer]))
     else:
@@ -158,7 +188,13 @@ def _outer(
 
 
 def _inner(
-    pairs: ElementPairs, pair: Indices, xi: Array, scale: Array, fronts: Sequence[float], rule: Rule, close: bool
+    pairs: ElementPairs,
+    pair: Indices,
+    xi: Array,
+    scale: Array,
+    fronts: Sequence[float],
+    rule: Rule,
+    close: bool,
 ) -> tuple[Indices, Array, Array]:
     """Return (row of ``xi``, eta, weight) of the points on the second elements that the last front has reached."""
     d, b = pairs.offset[:, pair] + pairs.a[:, pair] * xi, pairs.b[:, pair]
@@ -199,7 +235,9 @@ def _outer_breaks(pairs: ElementPairs, part: Indices, fronts: Sequence[float]) -
     return np.concatenate(breaks, axis=1) if breaks else np.empty((len(part), 0))
 
 
-def _on_one_element(pairs: ElementPairs, chosen: Indices, fronts: Sequence[float], order: int) -> Iterator[PointSet]:
+def _on_one_element(
+    pairs: ElementPairs, chosen: Indices, fronts: Sequence[float], order: int
+) -> Iterator[PointSet]:
     """Integrate once in z = |xi - eta|, on which alone r depends, split at the fronts; two points across are exact."""
     row, low, length = _reached(np.hypot(*pairs.a[:, chosen]), fronts)
     x, w = graded(order)
@@ -209,8 +247,14 @@ def _on_one_element(pairs: ElementPairs, chosen: Indices, fronts: Sequence[float
     large = z + small
     weight = ((length[:, None] * w)[:, :, None] * (1.0 - z) * across_weight).ravel()
     owner = np.repeat(row, 2 * order)
-    yield _flat(pairs, chosen, np.tile(owner, 2), np.concatenate([large.ravel(), small.ravel()]),
-                np.concatenate([small.ravel(), large.ravel()]), np.tile(weight, 2))
+    yield _flat(
+        pairs,
+        chosen,
+        np.tile(owner, 2),
+        np.concatenate([large.ravel(), small.ravel()]),
+        np.concatenate([small.ravel(), large.ravel()]),
+        np.tile(weight, 2),
+    )
 
 
 def _reached(distance: Array, fronts: Sequence[float]) -> tuple[Indices, Array, Array]:
@@ -227,7 +271,9 @@ def _at_corners(
     sharp: R(w) falls to a small share of its greatest value at the foot of one end on the other element."""
     if not len(chosen):
         return
-    at_end = pairs.shares_end[chosen]  # the corner is the end of the first element and the start of the second
+    at_end = pairs.shares_end[
+        chosen
+    ]  # the corner is the end of the first element and the start of the second
     from_corner = np.where(at_end, -1.0, 1.0)
     a, b = pairs.a[:, chosen] * from_corner, -pairs.b[:, chosen] * from_corner
     aa, ab, bb = (a**2).sum(0), (a * b).sum(0), (b**2).sum(0)
@@ -237,7 +283,9 @@ def _at_corners(
         c0, c2 = (aa, bb) if first else (bb, aa)
         cuts = [roots(c2, -2.0 * ab, c0 - front**2) for front in fronts]
         foot = (ab / c2)[:, None]
-        row, low, length = pieces(np.concatenate([*cuts, foot] if sharp else [foot[:, :0], *cuts], axis=1))
+        row, low, length = pieces(
+            np.concatenate([*cuts, foot] if sharp else [foot[:, :0], *cuts], axis=1)
+        )
         about = (foot[row, 0], (height / c2)[row]) if sharp else None
         ratios, weights = placed(low, length, smoothed(order), about=about)
         owner, ratio, outer_weight = np.repeat(row, order), ratios.ravel(), weights.ravel()
@@ -246,7 +294,11 @@ def _at_corners(
         along, weight = placed(low, length, graded(order), outer_weight[row])
         weight, long = (weight * along).ravel(), along.ravel()
         short = (along * ratio[row, None]).ravel()
-        sets.append((np.repeat(owner[row], order), *((long, short) if first else (short, long)), weight))
+        sets.append(
+            (np.repeat(owner[row], order), *((long, short) if first else (short, long)), weight)
+        )
     owner, xi, eta, weight = (np.concatenate(parts) for parts in zip(*sets, strict=True))
     end = at_end[owner]
-    yield _flat(pairs, chosen, owner, np.where(end, 1.0 - xi, xi), np.where(end, eta, 1.0 - eta), weight)
+    yield _flat(
+        pairs, chosen, owner, np.where(end, 1.0 - xi, xi), np.where(end, eta, 1.0 - eta), weight
+    )

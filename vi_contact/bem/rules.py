@@ -48,7 +48,10 @@ def roots(a: Array, b: Array, c: Array) -> Array:
 
 
 def placed(
-    low: Array, length: Array, rule: tuple[Array, Array], scale: Array | float = 1.0,
+    low: Array,
+    length: Array,
+    rule: tuple[Array, Array],
+    scale: Array | float = 1.0,
     about: tuple[Array, Array] | None = None,
 ) -> tuple[Array, Array]:
     """Return points and weights (p, n) of a rule on pieces from ``low`` (p,); scale: of the weights.
@@ -63,4 +66,6 @@ def placed(
     start = np.arcsinh((low - centre) / height)
     span = np.arcsinh((low + length - centre) / height) - start
     v = start[:, None] + span[:, None] * x
-    return centre[:, None] + height[:, None] * np.sinh(v), (scale * height * span)[:, None] * np.cosh(v) * w
+    return centre[:, None] + height[:, None] * np.sinh(v), (scale * height * span)[
+        :, None
+    ] * np.cosh(v) * w

@@ -20,22 +20,33 @@ SAMPLES = 16  # distances at which functions are compared
 DEGREES = (0, 0, 1, 0, 0, 1, 1, 2, 1, 1, 2, 2, 0, 0)  # of homogeneity in (r, t), gradients times r
 
 
-def tail(start: int, steps: int, dt: float, speeds: tuple[float, float], h: float) -> tuple[Indices, Array, Array]:
+def tail(
+    start: int, steps: int, dt: float, speeds: tuple[float, float], h: float
+) -> tuple[Indices, Array, Array]:
     """Return the kept steps (q,) of the tail from `start` to `steps`, weights (length, q) that give all its steps, and
     bounds (3,) of the errors of entries of V, K and D; speeds: (c_P, c_S) [m/s], h: the longest element [m]."""
     if start >= steps:
         return np.empty(0, int), np.empty((0, 0)), np.zeros(3)
     reach = (start - 1) * dt * speeds[1] - h
-    places = (np.sin(0.5 * np.pi * (np.arange(count) + 0.5) / count) ** 2 for count in (SAMPLES, 3 * SAMPLES + 1))
+    places = (
+        np.sin(0.5 * np.pi * (np.arange(count) + 0.5) / count) ** 2
+        for count in (SAMPLES, 3 * SAMPLES + 1)
+    )
     table, check = (_table(reach * place, start, steps, dt, speeds) for place in places)
     flat = (table / np.abs(table).max((0, 2))[:, None]).reshape(len(table), -1)
     r, order = qr(flat.T, mode="r", pivoting=True, check_finite=False)
     rank = int(np.count_nonzero(np.abs(np.diag(r)) > SHARE * np.abs(r[0, 0])))
-    weights = np.concatenate([np.eye(rank), solve_triangular(r[:rank, :rank], r[:rank, rank:]).T])[np.argsort(order)]
+    weights = np.concatenate([np.eye(rank), solve_triangular(r[:rank, :rank], r[:rank, rank:]).T])[
+        np.argsort(order)
+    ]
     weights += (1.0 - weights.sum(1))[:, None] / rank
     lost = np.abs(check - np.tensordot(weights, check[order[:rank]], 1)).max((0, 2))
     mu = speeds[1] ** 2  # from here on: errors of entries, gradients being times r
-    phi, gradient, tensor = lost[[2, 7]], lost[[3, 8]] + lost[[4, 9]], lost[[0, 5, 10]] + lost[[1, 6, 11]]
+    phi, gradient, tensor = (
+        lost[[2, 7]],
+        lost[[3, 8]] + lost[[4, 9]],
+        lost[[0, 5, 10]] + lost[[1, 6, 11]],
+    )
     double = 0.25 * h**2 * gradient[0] + 0.5 * h * (phi[0] + 2.0 * mu * tensor[1])
     hyper = 0.25 * h**2 * (lost[12] + lost[13]) + 4.0 * mu * (phi[1] + mu * tensor[2])
     bounds = [0.25 * h**2 * tensor[0], 2.0 * double, 4.0 * (hyper + 2.0 * mu * h * gradient[1])]

@@ -52,8 +52,13 @@ class SpaceTimeUzawa:
         """Solve the problem; StepFailure when ``max_iterations`` do not reach the tolerance, or certificates are not
         within LOOSE times the tolerance."""
         instance("SpaceTimeUzawa", "contact", contact, BoundaryContact, "give a BoundaryContact")
-        if contact.frictional and contact.friction.at(np.ones(contact.surface.count)) is not contact.friction:
-            raise InputError(f"SpaceTimeUzawa: {contact.friction} depends on the slip rate; use march_contact")
+        if (
+            contact.frictional
+            and contact.friction.at(np.ones(contact.surface.count)) is not contact.friction
+        ):
+            raise InputError(
+                f"SpaceTimeUzawa: {contact.friction} depends on the slip rate; use march_contact"
+            )
         total = len(contact.v_free)
         length = min(int(self.window or total), total)
         problem = _SpaceTime(contact, length)
@@ -66,8 +71,10 @@ class SpaceTimeUzawa:
             counts.append(len(changes))
         run = problem.run(r, np.array(counts), tuple(history))
         if not run.worst <= LOOSE * self.tolerance:
-            raise StepFailure(f"{self}: the worst certificate is {run.worst:.1e}, of the run's largest numbers, and "
-                              f"{LOOSE * self.tolerance:.1e} is the limit; take a smaller tolerance, or march_contact")
+            raise StepFailure(
+                f"{self}: the worst certificate is {run.worst:.1e}, of the run's largest numbers, and "
+                f"{LOOSE * self.tolerance:.1e} is the limit; take a smaller tolerance, or march_contact"
+            )
         return run
 
     def _window(self, problem: "_SpaceTime", r: Array) -> tuple[Array, list[float]]:
@@ -85,8 +92,10 @@ class SpaceTimeUzawa:
             r = best if rho == problem.default_rho else problem.projected(r + rho * pushed)
             if not np.isfinite(change) or size > GROWN * unit * problem.default_rho:
                 break
-        raise StepFailure(f"{self} stopped after {len(changes)} iterations with a change of {changes[-1]:.1e} at "
-                          f"rho = {rho:.3g}: take a fifth of this rho, a window of fewer steps, or march_contact")
+        raise StepFailure(
+            f"{self} stopped after {len(changes)} iterations with a change of {changes[-1]:.1e} at "
+            f"rho = {rho:.3g}: take a fifth of this rho, a window of fewer steps, or march_contact"
+        )
 
 
 class _SpaceTime:
@@ -121,15 +130,21 @@ class _SpaceTime:
         self._window, self._free = window, self._v_free[window].copy()
         self._before = np.zeros(r.shape[2])
         if first:
-            self._free += np.array([summed(self._W[k : k - first : -1], lam[:first])[:, 0]
-                                    for k in range(first, window.stop)])
+            self._free += np.array(
+                [
+                    summed(self._W[k : k - first : -1], lam[:first])[:, 0]
+                    for k in range(first, window.stop)
+                ]
+            )
             v = self._v_free[first - 1] + summed(self._W[first - 1 :: -1], lam[:first])[:, 0]
             self._before = v.reshape(2, -1)[1]
 
     def violation(self, r: Array) -> Array:
         """Return (steps, 2, c): v_n - gap at the ends of the steps, slip in them."""
         loads = rfft(r.reshape(len(r), -1), self._length, axis=0)
-        moved = irfft(np.matmul(self._kernel, loads[:, :, None])[:, :, 0], self._length, axis=0)[: len(r)]
+        moved = irfft(np.matmul(self._kernel, loads[:, :, None])[:, :, 0], self._length, axis=0)[
+            : len(r)
+        ]
         v = (self._free - moved).reshape(r.shape)
         slip = np.diff(v[:, 1], axis=0, prepend=self._before[None]) - self._sliding[self._window]
         return np.stack([v[:, 0] - self._gap[self._window], slip * self._rubs], axis=1)
@@ -138,7 +153,9 @@ class _SpaceTime:
         """Project onto C."""
         normal = w[:, 0] if self.contact.bilateral else np.maximum(w[:, 0], 0.0)
         limit = (self._still + self._slope * np.maximum(normal, 0.0)) * self._rubs
-        return np.stack([normal, project(w[:, 1].reshape(-1, 1), limit.ravel()).reshape(normal.shape)], axis=1)
+        return np.stack(
+            [normal, project(w[:, 1].reshape(-1, 1), limit.ravel()).reshape(normal.shape)], axis=1
+        )
 
     def run(self, r: Array, counts: Array, history: tuple[float, ...]) -> ContactRun:
         """Return the steps of these multipliers with their certificates."""
@@ -147,7 +164,9 @@ class _SpaceTime:
         def solved(step: StepProblem) -> StepResult:
             r_n, r_t = r[step.k - 1, 0], r[step.k - 1, 1][:, None] if contact.frictional else None
             x = contact.matrix.factor.solve(step.b + contact.load(r_n, r_t))
-            return StepResult(x, r_n, (r_n > 0.0) | contact.bilateral, int(counts.sum()), "space-time Uzawa", r_t)
+            return StepResult(
+                x, r_n, (r_n > 0.0) | contact.bilateral, int(counts.sum()), "space-time Uzawa", r_t
+            )
 
         return self._certified(run_steps(contact, solved, iterations=counts, history=history))
 
@@ -155,10 +174,26 @@ class _SpaceTime:
         """Return the run with the certificates of its steps measured by its largest numbers."""
         limit = (self._still + self._slope * np.maximum(run.r_n, 0.0)) * self._rubs
         motion = max(max_abs(run.displacement), max_abs(self.contact.v_free)) or 1.0
-        gap, slip = run.gap / motion, run.slip / motion  # slips alone are no measure: where all stick, they are errors
-        limit, r_t = (one / (max(max_abs(limit), max_abs(run.r_t)) or 1.0) for one in (limit, run.r_t))
-        parts = (np.where(self.contact.bilateral, 0.0, -gap), np.where(run.active, np.abs(gap), 0.0),
-                 (np.abs(r_t) - limit) * self._rubs, (limit * np.abs(slip) - r_t * slip) * self._rubs)
-        rows = zip(run.certificates, *(part.max(axis=1).clip(0.0).tolist() for part in parts), strict=True)
-        return replace(run, certificates=tuple(
-            replace(one, penetration=a, complementarity=b, cone=c, dissipation=d) for one, a, b, c, d in rows))
+        gap, slip = (
+            run.gap / motion,
+            run.slip / motion,
+        )  # slips alone are no measure: where all stick, they are errors
+        limit, r_t = (
+            one / (max(max_abs(limit), max_abs(run.r_t)) or 1.0) for one in (limit, run.r_t)
+        )
+        parts = (
+            np.where(self.contact.bilateral, 0.0, -gap),
+            np.where(run.active, np.abs(gap), 0.0),
+            (np.abs(r_t) - limit) * self._rubs,
+            (limit * np.abs(slip) - r_t * slip) * self._rubs,
+        )
+        rows = zip(
+            run.certificates, *(part.max(axis=1).clip(0.0).tolist() for part in parts), strict=True
+        )
+        return replace(
+            run,
+            certificates=tuple(
+                replace(one, penetration=a, complementarity=b, cone=c, dissipation=d)
+                for one, a, b, c, d in rows
+            ),
+        )

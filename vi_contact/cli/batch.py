@@ -37,7 +37,10 @@ def results(asked: Mapping[str, Any], comm: Any, tell: Callable[[float], None]) 
         except ViContactError as error:
             yield number, error
         else:
-            runs[number] = case, {"out": Path(folder), "restart": restart, "wall_time": asked["wall_time"]}
+            runs[number] = (
+                case,
+                {"out": Path(folder), "restart": restart, "wall_time": asked["wall_time"]},
+            )
     if not runs:
         return
     case, _ = next(iter(runs.values()))
@@ -53,7 +56,9 @@ def results(asked: Mapping[str, Any], comm: Any, tell: Callable[[float], None]) 
         tell(done / len(runs))
 
 
-def _together(runs: Runs, parts: Parts, state: State | None, tell: Callable[[float], None]) -> Iterator[Ended]:
+def _together(
+    runs: Runs, parts: Parts, state: State | None, tell: Callable[[float], None]
+) -> Iterator[Ended]:
     """Make runs of one body, which begin at rest in the same state; None: that of the first one."""
     calls = []
     with ExitStack() as stack:
@@ -83,7 +88,9 @@ def main() -> None:
 
     for number, ended in results(json.loads(sys.argv[1]), world(), tell):
         error = isinstance(ended, ViContactError)
-        _print({"ended": number, "status": int(error), "said": f"vi-contact: {ended}" if error else ""})
+        _print(
+            {"ended": number, "status": int(error), "said": f"vi-contact: {ended}" if error else ""}
+        )
 
 
 if __name__ == "__main__":

@@ -26,11 +26,25 @@ OPTIONS = {"restart": "--restart", "changed": "--restart-changed", "wall_time": 
 def add_case_commands(commands: Any) -> None:
     """Add ``run``, ``cases``, ``schema`` and ``new`` to the commands of the top parser."""
     words = {"schemes": ", ".join(schemes.__all__), "starters": ", ".join(starters())}
-    run = add_command(commands, "run", _run, "run", "short", "output", "settings", "check", words=words)
+    run = add_command(
+        commands, "run", _run, "run", "short", "output", "settings", "check", words=words
+    )
     run.set_defaults(spelling={"units": "units (--set excitation.1.record.units=UNIT)"})
-    add_command(commands, "cases", lambda options: "\n".join([
-        *(f"{name:<10} {title}" for name, title in builtin_cases().items()), f"the files: {FOLDER}"]))
-    add_command(commands, "schema", lambda options: FOLDER.with_name("case.schema.json").read_text("utf-8").rstrip())
+    add_command(
+        commands,
+        "cases",
+        lambda options: "\n".join(
+            [
+                *(f"{name:<10} {title}" for name, title in builtin_cases().items()),
+                f"the files: {FOLDER}",
+            ]
+        ),
+    )
+    add_command(
+        commands,
+        "schema",
+        lambda options: FOLDER.with_name("case.schema.json").read_text("utf-8").rstrip(),
+    )
     add_command(commands, "new", _new, "new", words=words)
 
 
@@ -39,7 +53,9 @@ def _new(options: argparse.Namespace) -> str:
         return ""
     files = copy_starter(options.name, Path(options.folder or options.name))
     steps = f"run {files[0]} --check", f"run {files[0]}", f"report results/{options.name}"
-    return "\n".join([*(f"wrote {path}" for path in files), "next:", *(f"    vi-contact {one}" for one in steps)])
+    return "\n".join(
+        [*(f"wrote {path}" for path in files), "next:", *(f"    vi-contact {one}" for one in steps)]
+    )
 
 
 def _run(options: argparse.Namespace) -> str:
@@ -58,18 +74,30 @@ def _run(options: argparse.Namespace) -> str:
     with ExitStack() as after:
         after.callback(gc.enable if gc.isenabled() else gc.disable)
         gc.disable()  # modules are no garbage: looking for it takes a tenth of the way to the first step
-        case = read_case(path, short.settings(read_toml(path), options.settings), allow=options.allow)
+        case = read_case(
+            path, short.settings(read_toml(path), options.settings), allow=options.allow
+        )
     name = case.tables.get("title") or path.stem
     restart = options.restart or options.changed
     out = options.out or case.out or Path("results") / path.stem
     if options.check:
-        vain = next((name for name in ("restart", "changed", "wall_time") if getattr(options, name)), None)
+        vain = next(
+            (name for name in ("restart", "changed", "wall_time") if getattr(options, name)), None
+        )
         if vain is not None:
-            raise InputError(f"{OPTIONS[vain]} has no effect with --check, which computes no step: leave one of the "
-                             "two out")
+            raise InputError(
+                f"{OPTIONS[vain]} has no effect with --check, which computes no step: leave one of the "
+                "two out"
+            )
         return _checked(case, comm, Path(out))
-    found = case.run(comm, out=out, restart=restart, progress=not options.quiet, changed=options.changed,
-                     wall_time=options.wall_time)
+    found = case.run(
+        comm,
+        out=out,
+        restart=restart,
+        progress=not options.quiet,
+        changed=options.changed,
+        wall_time=options.wall_time,
+    )
     return f"{name}\n{found.summary()}\noutput: {out}" if comm.rank == 0 else ""
 
 

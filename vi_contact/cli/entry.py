@@ -48,7 +48,9 @@ def split_petsc(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and print its text; return 0, 1 (one sentence on stderr), 128 + n (signal n) or 75 (wall time)."""
-    if arguments is None:  # a process of our own: with DOLFINx 0.5 the compiler of forms tells the root its calls
+    if (
+        arguments is None
+    ):  # a process of our own: with DOLFINx 0.5 the compiler of forms tells the root its calls
         logging.getLogger().addFilter(lambda record: record.levelno > logging.INFO)
     own, petsc = split_petsc(sys.argv[1:] if arguments is None else arguments)
 
@@ -75,7 +77,9 @@ def status_of(call: Callable[[], object]) -> int:
         return _stopped(error, 1)
     except KeyboardInterrupt as error:
         stopped = error if isinstance(error, Interrupted) else Interrupted()
-        if isinstance(error, OutOfTime):  # on all ranks: a launcher kills what is left when the first one has failed
+        if isinstance(
+            error, OutOfTime
+        ):  # on all ranks: a launcher kills what is left when the first one has failed
             fail_together(str(error))
         return _stopped(stopped, stopped.status)
     except Exception:  # a defect: its traceback is shown, and the other ranks end too

@@ -16,8 +16,10 @@ from ..core.files import sentence
 
 PATIENCE = 30.0  # seconds between the first rank that has failed and the last
 LIBRARIES = ("dolfinx", "ufl", "basix", "petsc4py", "mpi4py", "h5py", "gmsh", "matplotlib", "tqdm")
-OUT_OF_MEMORY = ("out of memory: take a coarser mesh, fewer steps or samples, or more ranks on more machines; a run "
-                 "keeps what it has written, and --restart continues it")
+OUT_OF_MEMORY = (
+    "out of memory: take a coarser mesh, fewer steps or samples, or more ranks on more machines; a run "
+    "keeps what it has written, and --restart continues it"
+)
 
 
 def check_words(arguments: Sequence[str]) -> None:
@@ -28,15 +30,23 @@ def check_words(arguments: Sequence[str]) -> None:
         if word.startswith("--") and word.endswith("=--"):
             raise InputError(f"{shown(word)} has no value: give one")
     for option, value in zip(arguments, [*arguments[1:], None], strict=True):
-        if (option in ("--out", "--csv", "--png") and value == "") or option in ("--out=", "--csv=", "--png="):
-            raise InputError(f"{option.rstrip('=')} is empty: give the name of a file or folder, or leave it out")
+        if (option in ("--out", "--csv", "--png") and value == "") or option in (
+            "--out=",
+            "--csv=",
+            "--png=",
+        ):
+            raise InputError(
+                f"{option.rstrip('=')} is empty: give the name of a file or folder, or leave it out"
+            )
 
 
 class Parser(argparse.ArgumentParser):
     """Parse as argparse does, with sentences that stay short where a word is long."""
 
     def error(self, message: str) -> NoReturn:
-        super().error(shorten(" ".join(part[:SHOWN] for part in message.split()), 400, placeholder=" …"))
+        super().error(
+            shorten(" ".join(part[:SHOWN] for part in message.split()), 400, placeholder=" …")
+        )
 
 
 def told(run: Callable[[], Any], spelling: Mapping[str, str]) -> Any:
@@ -51,7 +61,9 @@ def told(run: Callable[[], Any], spelling: Mapping[str, str]) -> Any:
         if spelling and isinstance(error, InputError):
             said = str(error)
             for argument, option in spelling.items():
-                said = said.replace(f" {argument}= ", f" {option} ").replace(f" {argument}=", f" {option} ")
+                said = said.replace(f" {argument}= ", f" {option} ").replace(
+                    f" {argument}=", f" {option} "
+                )
             raise InputError(said.rstrip()) from error
         raise
     except Exception as error:  # those that have no sentence are raised again
@@ -74,7 +86,9 @@ def say(text: str) -> None:
     try:
         print(printable(text), flush=True)
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or Python complains at its end
+        os.dup2(
+            os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno()
+        )  # or Python complains at its end
 
 
 def keep_streams() -> None:
@@ -116,6 +130,10 @@ def fail_together(text: str) -> None:
     request, end = ranks.Ibarrier(), time.monotonic() + PATIENCE
     while not request.Test():
         if time.monotonic() > end:
-            print(f"vi-contact: rank {ranks.rank} of {ranks.size} stopped alone: {text}", file=sys.stderr, flush=True)
+            print(
+                f"vi-contact: rank {ranks.rank} of {ranks.size} stopped alone: {text}",
+                file=sys.stderr,
+                flush=True,
+            )
             ranks.Abort(1)
         time.sleep(0.02)

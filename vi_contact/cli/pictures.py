@@ -13,7 +13,11 @@ from .options import add_command, output_file
 
 def add_picture_commands(commands: Any) -> None:
     """Add ``report``, ``plot`` and ``film`` to the commands of the top parser."""
-    for name, run, more in (("report", _report, ()), ("plot", _plot, ("magnify",)), ("film", _film, ("magnify",))):
+    for name, run, more in (
+        ("report", _report, ()),
+        ("plot", _plot, ("magnify",)),
+        ("film", _film, ("magnify",)),
+    ):
         one = add_command(commands, name, run, name, "folder", *more)
         one.set_defaults(spelling={"magnified": "--magnify"})
 
@@ -33,9 +37,17 @@ def _report(options: argparse.Namespace) -> str:
     if comm.rank != 0:
         return ""
     columns = None if options.show is None else [one.split(",") for one in options.show]
-    told, written = report(options.folder, out=options.out, title=options.title, columns=columns, failed=failed)
-    lines = [*told.sentences, *(f"{row[0]:<48}" + "".join(f"{cell:>13}" for cell in row[1:]) for table in told.tables
-                                for row in (table.header, *table.rows))]
+    told, written = report(
+        options.folder, out=options.out, title=options.title, columns=columns, failed=failed
+    )
+    lines = [
+        *told.sentences,
+        *(
+            f"{row[0]:<48}" + "".join(f"{cell:>13}" for cell in row[1:])
+            for table in told.tables
+            for row in (table.header, *table.rows)
+        ),
+    ]
     missing = [] if options.out is not None or can_write() else [f"no report.html: {MISSING}"]
     return "\n".join([*(lines if options.refine else ()), *map(str, written), *missing])
 
@@ -45,7 +57,9 @@ def _plot(options: argparse.Namespace) -> str:
 
     run, frames, title, times = _opened(options)
     out = output_file(Path(options.out or options.folder) / "deformed.png").parent
-    return "\n".join(map(str, draw_run(run, out, title=title, times=times, magnified=options.magnified)))
+    return "\n".join(
+        map(str, draw_run(run, out, title=title, times=times, magnified=options.magnified))
+    )
 
 
 def _film(options: argparse.Namespace) -> str:
@@ -55,7 +69,9 @@ def _film(options: argparse.Namespace) -> str:
     out = output_file(options.out or Path(options.folder) / "film.gif")
     if times is not None:
         times = [t for t in frames.t.tolist() if times[0] <= t <= times[-1]]
-    return str(film(run, out, times=times, magnified=options.magnified, column=options.column, title=title))
+    return str(
+        film(run, out, times=times, magnified=options.magnified, column=options.column, title=title)
+    )
 
 
 def _opened(options: argparse.Namespace) -> tuple[Any, Any, str, list[float] | None]:
@@ -70,8 +86,12 @@ def _opened(options: argparse.Namespace) -> tuple[Any, Any, str, list[float] | N
         try:
             times = [float(one) for one in asked.split(",")]
         except ValueError:
-            raise InputError(f"{shown(asked)} is not a list of moments: give seconds, such as 3.2,5") from None
+            raise InputError(
+                f"{shown(asked)} is not a list of moments: give seconds, such as 3.2,5"
+            ) from None
         slack = 1e-9 * (last - first)
         if not all(first - slack <= one <= last + slack for one in times):
-            raise InputError(f"{shown(asked)} is outside the run: give seconds from {first:g} to {last:g}")
+            raise InputError(
+                f"{shown(asked)} is outside the run: give seconds from {first:g} to {last:g}"
+            )
     return run, frames, str(read_copy(run.folder).get("title", "Deformed bodies")), times

@@ -6,7 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 from ..core.errors import InputError
 from ..core.files import write_csv
-from ..engineering import floor_spectrum, hysteresis, peaks, recorded_motion, transfer_function, write_peaks
+from ..engineering import (
+    floor_spectrum,
+    hysteresis,
+    peaks,
+    recorded_motion,
+    transfer_function,
+    write_peaks,
+)
 from ..plots.records import plot_loop, plot_spectra, plot_transfer
 from ..run.files.folder import FILES
 from .options import PICTURES, add_actions, add_command, output_file, spaced
@@ -18,9 +25,16 @@ if TYPE_CHECKING:
 def add_post_commands(commands: Any) -> None:
     """Add ``post`` to the commands of the top parser."""
     actions = add_actions(commands, "post")
-    for name, run in {"peaks": _peaks, "spectrum": _spectrum, "transfer": _transfer, "checks": _checks,
-                      "loop": _loop}.items():
-        add_command(actions, f"post {name}", run, "folder", "table", f"post {name}", words={"action": name})
+    for name, run in {
+        "peaks": _peaks,
+        "spectrum": _spectrum,
+        "transfer": _transfer,
+        "checks": _checks,
+        "loop": _loop,
+    }.items():
+        add_command(
+            actions, f"post {name}", run, "folder", "table", f"post {name}", words={"action": name}
+        )
 
 
 def _run(options: argparse.Namespace) -> "RunFolder":
@@ -33,8 +47,10 @@ def _peaks(options: argparse.Namespace) -> str:
     run = _run(options)
     rows = peaks(run.history, run.columns, options.columns or None)
     table = write_peaks(_table_path(options), rows)
-    lines = [f"{row.name:<28}{row.unit:>6}{row.max:>13.4e}{row.t_max:>10.4g}{row.min:>13.4e}{row.t_min:>10.4g}"
-             for row in rows]
+    lines = [
+        f"{row.name:<28}{row.unit:>6}{row.max:>13.4e}{row.t_max:>10.4g}{row.min:>13.4e}{row.t_min:>10.4g}"
+        for row in rows
+    ]
     head = f"{'column':<28}{'unit':>6}{'max':>13}{'t [s]':>10}{'min':>13}{'t [s]':>10}"
     return "\n".join([head, *lines, f"table: {table}"])
 
@@ -43,9 +59,17 @@ def _spectrum(options: argparse.Namespace) -> str:
     run, periods, table = _run(options), spaced("--periods", options.periods), _table_path(options)
     more = {"damping": options.damping, "relative": options.relative}
     spectra = {name: floor_spectrum(run.history, name, periods, **more) for name in options.columns}
-    write_csv(table, ["column", "damping", "period_s", "sd_m", "sv_m/s", "sa_m/s2", "psa_m/s2"], (
-        [name, options.damping, *(f"{x:.8g}" for x in row)] for name, one in spectra.items()
-        for row in zip(one.periods, one.displacement, one.velocity, one.acceleration, one.psa, strict=True)))
+    write_csv(
+        table,
+        ["column", "damping", "period_s", "sd_m", "sv_m/s", "sa_m/s2", "psa_m/s2"],
+        (
+            [name, options.damping, *(f"{x:.8g}" for x in row)]
+            for name, one in spectra.items()
+            for row in zip(
+                one.periods, one.displacement, one.velocity, one.acceleration, one.psa, strict=True
+            )
+        ),
+    )
     dt = {name: recorded_motion(run.history, name).dt for name in spectra}
     kind = "relative" if options.relative else "absolute"
     title = f"Response spectra of {kind} motions, {100.0 * options.damping:g} %"
@@ -56,20 +80,32 @@ def _spectrum(options: argparse.Namespace) -> str:
 def _transfer(options: argparse.Namespace) -> str:
     run, table = _run(options), _table_path(options)
     given = None if options.frequencies is None else spaced("--frequencies", options.frequencies)
-    found = transfer_function(run.history, options.surface, options.base, bandwidth=options.bandwidth or None,
-                              frequencies=given)
+    found = transfer_function(
+        run.history,
+        options.surface,
+        options.base,
+        bandwidth=options.bandwidth or None,
+        frequencies=given,
+    )
     rows = zip(found.frequencies, found.amplitude, strict=True)
     write_csv(table, ["frequency_Hz", "amplitude"], ([f"{x:.8g}" for x in row] for row in rows))
-    picture = plot_transfer(found, table.with_suffix(".png"), title=f"|{options.surface}| / |{options.base}|")
+    picture = plot_transfer(
+        found, table.with_suffix(".png"), title=f"|{options.surface}| / |{options.base}|"
+    )
     frequency, amplitude = found.peak
     return f"largest: {amplitude:.4g} at {frequency:.4g} Hz\ntable: {table}\npicture: {picture}"
 
 
 def _loop(options: argparse.Namespace) -> str:
     run, table = _run(options), _table_path(options)
-    loop = hysteresis(run.history, options.deformation, options.force, sign=-1.0 if options.turn else 1.0)
-    write_csv(table, ["t_s", options.deformation, options.force, "work"],
-              zip(run.history["t"], loop.deformation, loop.force, loop.work, strict=True))
+    loop = hysteresis(
+        run.history, options.deformation, options.force, sign=-1.0 if options.turn else 1.0
+    )
+    write_csv(
+        table,
+        ["t_s", options.deformation, options.force, "work"],
+        zip(run.history["t"], loop.deformation, loop.force, loop.work, strict=True),
+    )
     x, y = ((name, run.columns[name][0]) for name in (options.deformation, options.force))
     picture = plot_loop(loop, table.with_suffix(".png"), x=x, y=y)
     return f"work: {loop.work[-1]:.6g} J, secant stiffness {loop.stiffness:.6g}\ntable: {table}\npicture: {picture}"
@@ -80,23 +116,68 @@ def _checks(options: argparse.Namespace) -> str:
 
     found, table = comparisons(options.folder), _table_path(options)
     if not found:
-        raise InputError(f"{options.folder}: its case has no [[check]]: add one, docs/guide/checks.md lists them")
-    inputs = ["; ".join(f"{key} = {value:.6g} {unit}" for key, (value, unit) in one.inputs.items()) for one in found]
-    head = "name", "formula", "source", "range", "inputs", "expected", "found", "unit", "ratio", "applies"
-    write_csv(table, head, (
-        [one.name, one.formula, one.source, one.range, given, one.expected, one.found, one.unit, one.ratio, one.applies]
-        for one, given in zip(found, inputs, strict=True)))
-    said = [f"{one.name}: " + (f"does not apply: {one.applies}" if one.applies else f"expected {one.expected:.5g}, "
-            f"found {one.found:.5g} {one.unit}, ratio {one.ratio:.4g}") + f"\n    {one.formula}   ({one.source})\n    "
-            f"for {one.range}\n    {given}" for one, given in zip(found, inputs, strict=True)]
+        raise InputError(
+            f"{options.folder}: its case has no [[check]]: add one, docs/guide/checks.md lists them"
+        )
+    inputs = [
+        "; ".join(f"{key} = {value:.6g} {unit}" for key, (value, unit) in one.inputs.items())
+        for one in found
+    ]
+    head = (
+        "name",
+        "formula",
+        "source",
+        "range",
+        "inputs",
+        "expected",
+        "found",
+        "unit",
+        "ratio",
+        "applies",
+    )
+    write_csv(
+        table,
+        head,
+        (
+            [
+                one.name,
+                one.formula,
+                one.source,
+                one.range,
+                given,
+                one.expected,
+                one.found,
+                one.unit,
+                one.ratio,
+                one.applies,
+            ]
+            for one, given in zip(found, inputs, strict=True)
+        ),
+    )
+    said = [
+        f"{one.name}: "
+        + (
+            f"does not apply: {one.applies}"
+            if one.applies
+            else f"expected {one.expected:.5g}, "
+            f"found {one.found:.5g} {one.unit}, ratio {one.ratio:.4g}"
+        )
+        + f"\n    {one.formula}   ({one.source})\n    "
+        f"for {one.range}\n    {given}"
+        for one, given in zip(found, inputs, strict=True)
+    ]
     return "\n".join([*said, f"table: {table}"])
 
 
 def _table_path(options: argparse.Namespace) -> Path:
     """Return the table that a command is about to write, a picture of the same name beside it; InputError."""
     folder = Path(options.folder)
-    out = output_file(options.out or folder / f"{options.action}.csv", reads=[folder / name for name in FILES])
+    out = output_file(
+        options.out or folder / f"{options.action}.csv", reads=[folder / name for name in FILES]
+    )
     if out.suffix.lower() in PICTURES:
-        raise InputError(f"{out}: the table would be overwritten by its picture; give a name such as {out.stem}.csv")
+        raise InputError(
+            f"{out}: the table would be overwritten by its picture; give a name such as {out.stem}.csv"
+        )
     output_file(out.with_suffix(PICTURES[0]))
     return out

@@ -31,4 +31,35 @@ from .system import SemiDiscreteSystem as SemiDiscreteSystem
 from .verify import energy_balance as energy_balance
 from .verify import kkt_residual as kkt_residual
 
-__all__: list[str] = ['AnalyticGap', 'Certificate', 'Companion', 'ContactProblem', 'ContactSurface', 'Excitation', 'FrictionLaw', 'Frictionless', 'HalfSpace', 'ImpactLaw', 'InputError', 'Interrupted', 'Load', 'MassLaw', 'Obstacle', 'OutOfTime', 'PreparedSolver', 'Recorder', 'Report', 'Scheme', 'SemiDiscreteSystem', 'Solver', 'State', 'StepFailure', 'StepProblem', 'StepResult', 'Touching', 'ViContactError', 'energy_balance', 'kkt_residual']
+__all__: list[str] = [
+    "AnalyticGap",
+    "Certificate",
+    "Companion",
+    "ContactProblem",
+    "ContactSurface",
+    "Excitation",
+    "FrictionLaw",
+    "Frictionless",
+    "HalfSpace",
+    "ImpactLaw",
+    "InputError",
+    "Interrupted",
+    "Load",
+    "MassLaw",
+    "Obstacle",
+    "OutOfTime",
+    "PreparedSolver",
+    "Recorder",
+    "Report",
+    "Scheme",
+    "SemiDiscreteSystem",
+    "Solver",
+    "State",
+    "StepFailure",
+    "StepProblem",
+    "StepResult",
+    "Touching",
+    "ViContactError",
+    "energy_balance",
+    "kkt_residual",
+]

@@ -85,7 +85,9 @@ class Factor(Protocol):
 
     def solve(self, b: Array) -> Array: ...
 
-    def solve_units(self, owned: Indices, slots: Indices, m: int, rows: Indices | None = None) -> Array:
+    def solve_units(
+        self, owned: Indices, slots: Indices, m: int, rows: Indices | None = None
+    ) -> Array:
         """Return the columns A^-1 e_j for m unit vectors: e_{slots[k]} has its one in row ``owned[k]`` of the owning
         rank. Returns the owned rows, shape (rows, m), or only those of them that are named: the whole may not fit."""
 
@@ -133,8 +135,15 @@ class EffectiveMatrix:
     ``space``: what its unknowns mean (core.system.Space); ``inertia``: (m, M) of A = m M + c C + k K. None: not known.
     ``image(x)``: A x, made of products with M, C and K that others need too, where that is told."""
 
-    def __init__(self, matrix: Matrix, algebra: Algebra, *, space: Any = None,
-                 inertia: tuple[float, Matrix] | None = None, image: Callable[[Array], Array] | None = None) -> None:
+    def __init__(
+        self,
+        matrix: Matrix,
+        algebra: Algebra,
+        *,
+        space: Any = None,
+        inertia: tuple[float, Matrix] | None = None,
+        image: Callable[[Array], Array] | None = None,
+    ) -> None:
         self.matrix = matrix
         self.algebra = algebra
         self.space, self.inertia = space, inertia
@@ -218,13 +227,17 @@ class SerialFactor:
     """Factorise by the sparse LU of scipy (SuperLU) with a symmetric ordering; rows are exchanged where they must."""
 
     def __init__(self, matrix: SerialMatrix) -> None:
-        self._lu = splu(matrix.csr.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        self._lu = splu(
+            matrix.csr.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
+        )
         self._rows = matrix.rows
 
     def solve(self, b: Array) -> Array:
         return np.asarray(self._lu.solve(b))
 
-    def solve_units(self, owned: Indices, slots: Indices, m: int, rows: Indices | None = None) -> Array:
+    def solve_units(
+        self, owned: Indices, slots: Indices, m: int, rows: Indices | None = None
+    ) -> Array:
         units = np.zeros((self._rows, m))
         units[owned, slots] = 1.0
         columns = np.asarray(self._lu.solve(units)) if m else units
@@ -283,7 +296,11 @@ def serial(matrix: Matrix) -> SerialMatrix:
 
 def upper_blocks(rows: sp.csr_matrix, width: int, first: int) -> tuple[Indices, Indices, Array]:
     """Return (ends, columns, blocks of ``width``) of the upper triangle of these rows, which begin at ``first``."""
-    counts, columns, values = [np.zeros(1, dtype=np.int64)], [rows.indices[:0]], [np.zeros((0, width, width))]
+    counts, columns, values = (
+        [np.zeros(1, dtype=np.int64)],
+        [rows.indices[:0]],
+        [np.zeros((0, width, width))],
+    )
     for start in range(0, rows.shape[0], AT_ONCE * width):
         blocks = rows[start : start + AT_ONCE * width].tobsr((width, width))
         blocks.sort_indices()  # they come as the rows of a node name them; PETSc counts on their order on several ranks

@@ -32,7 +32,10 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
         hints, bound = _hints(function), of.bind(*args, **kwargs)
         for argument, value in bound.arguments.items():
-            if of.parameters[argument].kind not in (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD):
+            if of.parameters[argument].kind not in (
+                Parameter.VAR_POSITIONAL,
+                Parameter.VAR_KEYWORD,
+            ):
                 check(name, argument, value, hints.get(argument, Any))
         return function(*args, **kwargs)
 
@@ -66,7 +69,9 @@ def fits(value: Any, kind: Any) -> bool:
         return True
     if origin in (typing.Union, types.UnionType):
         is_path = any(_is_path(one) for one in inside)
-        return any(_fits_path(value) if is_path and one is str else fits(value, one) for one in inside)
+        return any(
+            _fits_path(value) if is_path and one is str else fits(value, one) for one in inside
+        )
     if kind is None or kind is type(None):
         return value is None
     if _is_path(kind):
@@ -74,7 +79,9 @@ def fits(value: Any, kind: Any) -> bool:
     if kind is float:
         return _is_number(value)
     if kind is int:
-        return _is_number(value) and (isinstance(value, Integral) or real(value) == np.rint(real(value)))
+        return _is_number(value) and (
+            isinstance(value, Integral) or real(value) == np.rint(real(value))
+        )
     if kind is bool:
         return isinstance(value, bool | np.bool_)
     if origin is np.ndarray or kind is np.ndarray:
@@ -84,7 +91,9 @@ def fits(value: Any, kind: Any) -> bool:
     if origin in (Sequence, Iterable, list):
         return _is_sequence(value) and all(fits(one, inside[0]) for one in value)
     if origin in (Mapping, dict):
-        return isinstance(value, Mapping) and all(fits(key, inside[0]) and fits(value[key], inside[1]) for key in value)
+        return isinstance(value, Mapping) and all(
+            fits(key, inside[0]) and fits(value[key], inside[1]) for key in value
+        )
     if kind is Callable or origin is Callable:
         return callable(value) and not isclass(value)
     if getattr(kind, "_is_protocol", False):
@@ -138,7 +147,11 @@ def _is_number(value: Any) -> bool:
 
 
 def _are_numbers(value: Any) -> bool:
-    return not isinstance(value, str | bytes) and shape_of(value) != (-1,) and np.asarray(value).dtype.kind in "iufb"
+    return (
+        not isinstance(value, str | bytes)
+        and shape_of(value) != (-1,)
+        and np.asarray(value).dtype.kind in "iufb"
+    )
 
 
 def _is_sequence(value: Any) -> bool:
@@ -151,11 +164,17 @@ def _fits_tuple(value: Any, inside: tuple[Any, ...]) -> bool:
     if not _is_sequence(value):
         return False
     kinds = [inside[0]] * len(value) if inside[-1] is Ellipsis else list(inside)
-    return len(kinds) == len(value) and all(fits(one, kind) for one, kind in zip(value, kinds, strict=True))
+    return len(kinds) == len(value) and all(
+        fits(one, kind) for one, kind in zip(value, kinds, strict=True)
+    )
 
 
 def _asked(protocol: Any) -> list[str]:
     """The attributes and methods that a protocol asks for."""
-    names = {name for one in protocol.__mro__ if getattr(one, "_is_protocol", False)
-             for name in (*vars(one), *getattr(one, "__annotations__", {}))}
+    names = {
+        name
+        for one in protocol.__mro__
+        if getattr(one, "_is_protocol", False)
+        for name in (*vars(one), *getattr(one, "__annotations__", {}))
+    }
     return sorted(name for name in names if not name.startswith("_"))

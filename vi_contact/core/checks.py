@@ -23,13 +23,28 @@ LARGEST = 50_000_000  # numbers in one array that an input may ask for: 400 MB
 MOST_CELLS = 20_000_000  # of a mesh made here: Gmsh takes some kilobytes for each
 
 
-def number(owner: str, meaning: str, value: Any, *, positive: bool = False, not_negative: bool = False,
-           unit: str = "") -> float:
+def number(
+    owner: str,
+    meaning: str,
+    value: Any,
+    *,
+    positive: bool = False,
+    not_negative: bool = False,
+    unit: str = "",
+) -> float:
     """Return a finite real number as a float; InputError for texts, NaN, infinity, truth values and wrong signs."""
     kind = "a finite number above zero" if positive else "zero or a positive finite number"
-    wanted = (kind if positive or not_negative else "a finite number") + (f" in {unit}" if unit else "")
+    wanted = (kind if positive or not_negative else "a finite number") + (
+        f" in {unit}" if unit else ""
+    )
     found = real(value)
-    if not math.isfinite(found) or found < 0.0 and (positive or not_negative) or found == 0.0 and positive:
+    if (
+        not math.isfinite(found)
+        or found < 0.0
+        and (positive or not_negative)
+        or found == 0.0
+        and positive
+    ):
         raise InputError(f"{owner}: {meaning} is {shown(value)}; give {wanted}")
     return found
 
@@ -37,9 +52,16 @@ def number(owner: str, meaning: str, value: Any, *, positive: bool = False, not_
 def whole(owner: str, meaning: str, value: Any, *, least: int = 0, most: int | None = None) -> int:
     """Return a whole number between ``least`` and ``most`` as an int; 3.0 counts as one, True does not."""
     found = real(value)
-    if not math.isfinite(found) or found != int(found) or found < least or (most is not None and found > most):
+    if (
+        not math.isfinite(found)
+        or found != int(found)
+        or found < least
+        or (most is not None and found > most)
+    ):
         upper = "" if most is None else f" and at most {most}"
-        raise InputError(f"{owner}: {meaning} is {shown(value)}; give a whole number of at least {least}{upper}")
+        raise InputError(
+            f"{owner}: {meaning} is {shown(value)}; give a whole number of at least {least}{upper}"
+        )
     return int(value)
 
 
@@ -55,21 +77,38 @@ def check_word(name: str, given: object, known: Sequence[str]) -> None:
         raise InputError(f"unknown {name} {shown(str(given))}: choose one of {', '.join(known)}")
 
 
-def counted(owner: str, asked: str, value: Any, things: str = "samples", *, most: int = LARGEST) -> int:
+def counted(
+    owner: str, asked: str, value: Any, things: str = "samples", *, most: int = LARGEST
+) -> int:
     """Return how many things an input asks for, before memory is taken for them; InputError above ``most``, and NaN."""
     found = real(value)
     if not found <= most:
-        raise InputError(f"{owner}: {asked} asks for {found:.3g} {things}, and {most:.3g} are the most; ask for fewer")
+        raise InputError(
+            f"{owner}: {asked} asks for {found:.3g} {things}, and {most:.3g} are the most; ask for fewer"
+        )
     return int(value)
 
 
-def attributes(owner: object, *, finite: tuple[str, ...] = (), positive: tuple[str, ...] = (),
-               not_negative: tuple[str, ...] = (), counts: tuple[str, ...] = (), flags: tuple[str, ...] = ()) -> None:
+def attributes(
+    owner: object,
+    *,
+    finite: tuple[str, ...] = (),
+    positive: tuple[str, ...] = (),
+    not_negative: tuple[str, ...] = (),
+    counts: tuple[str, ...] = (),
+    flags: tuple[str, ...] = (),
+) -> None:
     """Raise InputError naming the first attribute of ``owner`` that is not a finite number, or not > 0, or not >= 0, or
     no whole number of at least 1 (``counts``), or neither True nor False (``flags``)."""
     what = type(owner).__name__
     for name in finite + positive + not_negative:
-        number(what, name, getattr(owner, name), positive=name in positive, not_negative=name in not_negative)
+        number(
+            what,
+            name,
+            getattr(owner, name),
+            positive=name in positive,
+            not_negative=name in not_negative,
+        )
     for name in counts:
         whole(what, name, getattr(owner, name), least=1)
     for name in flags:
@@ -94,7 +133,9 @@ def column_name(kind: str, name: Any) -> str:
     """Return a name that columns may carry; InputError unless it is made of letters, digits and underscores."""
     if isinstance(name, str | int) and re.fullmatch(r"\w+", str(name), re.ASCII):
         return str(name)
-    raise InputError(f"{kind} {shown(name)}: use letters, digits and underscores for names of columns")
+    raise InputError(
+        f"{kind} {shown(name)}: use letters, digits and underscores for names of columns"
+    )
 
 
 def several(owner: str, meaning: str, value: Any, remedy: str) -> tuple[Any, ...]:
@@ -104,42 +145,68 @@ def several(owner: str, meaning: str, value: Any, remedy: str) -> tuple[Any, ...
     raise InputError(f"{owner}: {meaning} is {shown(value)}; {_called(value)}{remedy}")
 
 
-def instance(owner: str, meaning: str, value: Any, kinds: type | tuple[type, ...], remedy: str) -> Any:
+def instance(
+    owner: str, meaning: str, value: Any, kinds: type | tuple[type, ...], remedy: str
+) -> Any:
     """Return an object of one of these types; InputError for a class instead of an object, and for anything else."""
     if isinstance(value, kinds):
         return value
     raise InputError(f"{owner}: {meaning} is {shown(value)}; {_called(value)}{remedy}")
 
 
-def provides(owner: str, meaning: str, value: Any, names: tuple[str, ...], remedy: str, *,
-             lacks: tuple[str, ...] = ()) -> Any:
+def provides(
+    owner: str,
+    meaning: str,
+    value: Any,
+    names: tuple[str, ...],
+    remedy: str,
+    *,
+    lacks: tuple[str, ...] = (),
+) -> Any:
     """Return an object with these attributes (a protocol's) and without those of other kinds; else InputError."""
-    fits = all(hasattr(value, name) for name in names) and not any(hasattr(value, name) for name in lacks)
+    fits = all(hasattr(value, name) for name in names) and not any(
+        hasattr(value, name) for name in lacks
+    )
     if fits and not isinstance(value, type):
         return value
     raise InputError(f"{owner}: {meaning} is {shown(value)}; {_called(value)}{remedy}")
 
 
-def array(owner: str, meaning: str, value: Any, shape: tuple[int | None, ...], *, unit: str = "") -> Array:
+def array(
+    owner: str, meaning: str, value: Any, shape: tuple[int | None, ...], *, unit: str = ""
+) -> Array:
     """Return finite real values as a float array of this shape; None stands for any length along an axis."""
     unit = f" in {unit}" if unit else ""
-    wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
+    wanted = (
+        "("
+        + ", ".join("any" if n is None else str(n) for n in shape)
+        + ("," if len(shape) == 1 else "")
+        + ")"
+    )
     try:
         raw = np.asarray(value)
         if raw.dtype.kind not in "iuf":
             raise ValueError
         found = raw.astype(float)
     except (TypeError, ValueError):
-        raise InputError(f"{owner}: {meaning} is {shown(value)}; give real numbers of shape {wanted}{unit}") from None
-    if found.ndim != len(shape) or any(n is not None and n != m for n, m in zip(shape, found.shape, strict=True)):
-        raise InputError(f"{owner}: {meaning} has shape {found.shape}; give numbers of shape {wanted}")
+        raise InputError(
+            f"{owner}: {meaning} is {shown(value)}; give real numbers of shape {wanted}{unit}"
+        ) from None
+    if found.ndim != len(shape) or any(
+        n is not None and n != m for n, m in zip(shape, found.shape, strict=True)
+    ):
+        raise InputError(
+            f"{owner}: {meaning} has shape {found.shape}; give numbers of shape {wanted}"
+        )
     if not np.all(np.isfinite(found)):
         place = tuple(int(i) for i in np.argwhere(~np.isfinite(found))[0])
         raise InputError(f"{owner}: {meaning} is {found[place]} at {place}; give finite numbers")
     return found
 
 
-def optional(check: Callable[..., Any], owner: str, meaning: str, value: Any, *more: Any, **options: Any) -> None:
+def optional(
+    check: Callable[..., Any], owner: str, meaning: str, value: Any, *more: Any, **options: Any
+) -> None:
     """Check a value that may be left out: ``check(owner, meaning, value, …)`` unless it is None."""
     if value is not None:
         check(owner, meaning, value, *more, **options)
@@ -191,7 +258,9 @@ def shown(value: Any) -> str:
         return f"the class {value.__name__}"
     try:
         text = " ".join(repr(value).split())
-    except Exception:  # of a foreign repr, which may raise anything; and numbers of more digits than Python prints
+    except (
+        Exception
+    ):  # of a foreign repr, which may raise anything; and numbers of more digits than Python prints
         text = f"an object of type {type(value).__name__}"
     return text if len(text) <= SHOWN else text[: SHOWN - 1] + "…"
 
@@ -226,7 +295,11 @@ def ended(name: str, error: Exception) -> str:
     said = f"{type(error).__name__}: {error} ({Path(place.filename).name}, line {place.lineno})"
     if of_machine(error):
         return f"{name} ended in {said}: the machine refused it"
-    return str(error) if isinstance(error, ViContactError) else f"{name} ended in {said}: correct its function"
+    return (
+        str(error)
+        if isinstance(error, ViContactError)
+        else f"{name} ended in {said}: correct its function"
+    )
 
 
 def on_all(comm: Comm, name: str, call: Callable[[], T]) -> T:

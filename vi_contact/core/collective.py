@@ -25,11 +25,16 @@ from .errors import InputError, StepFailure, ViContactError
 
 T = TypeVar("T")
 
-KINDS: tuple[type[ViContactError], ...] = (InputError, StepFailure)  # what other ranks may raise as it is
+KINDS: tuple[type[ViContactError], ...] = (
+    InputError,
+    StepFailure,
+)  # what other ranks may raise as it is
 DEPTH = 6  # how deep arguments are compared: laws within laws within lists
 LONG = 64  # members of a list, from which on it is seen as an array
 LOCAL = ("indices", "mesh")  # of groups of cells and facets: each rank has its own
-_OPEN: list[list[ViContactError]] = []  # what ``users`` kept in each of the frames that this process is in
+_OPEN: list[
+    list[ViContactError]
+] = []  # what ``users`` kept in each of the frames that this process is in
 
 
 @contextmanager
@@ -66,9 +71,15 @@ def _told(comm: Comm, kept: ViContactError | None, broken: Exception | None) -> 
     kind = next((number for number, kind in enumerate(KINDS) if isinstance(own, kind)), None)
     every = from_each(comm, None if own is None else (kept is not None, kind, str(own), repr(own)))
     if own is None or (kept is None and any(one is not None and one[0] for one in every)):
-        rank, found = min(((rank, one) for rank, one in enumerate(every) if one is not None),
-                          key=lambda pair: (not pair[1][0], pair[0]))
-        told = ViContactError(f"rank {rank}: {found[3]}") if found[1] is None else KINDS[found[1]](found[2])
+        rank, found = min(
+            ((rank, one) for rank, one in enumerate(every) if one is not None),
+            key=lambda pair: (not pair[1][0], pair[0]),
+        )
+        told = (
+            ViContactError(f"rank {rank}: {found[3]}")
+            if found[1] is None
+            else KINDS[found[1]](found[2])
+        )
         told.__cause__, own = own, told
     own = getattr(own, "as_it_is", own)
     own.on_all_ranks = True  # all of them raise: what follows may be collective
@@ -108,13 +119,20 @@ def kept_error(name: str, error: Exception, instead: T) -> T:
 
 def limit_of(law: Any, r_n: Any, weights: Any, scale: float) -> Any:
     """Return the friction limit of a law (m,), ``users`` for laws of the user's own."""
-    return users(f"the friction law {type(law).__name__}", lambda: law.limit(r_n, weights, scale),
-                 np.zeros(np.shape(weights)))
+    return users(
+        f"the friction law {type(law).__name__}",
+        lambda: law.limit(r_n, weights, scale),
+        np.zeros(np.shape(weights)),
+    )
 
 
 def slope_of(law: Any, weights: Any) -> Any:
     """Return the slope of the friction limit of a law (m,), as ``limit_of``."""
-    return users(f"the friction law {type(law).__name__}", lambda: law.slope(weights), np.zeros(np.shape(weights)))
+    return users(
+        f"the friction law {type(law).__name__}",
+        lambda: law.slope(weights),
+        np.zeros(np.shape(weights)),
+    )
 
 
 def agree(comm: Comm, owner: str, given: Mapping[str, Any]) -> None:
@@ -124,9 +142,14 @@ def agree(comm: Comm, owner: str, given: Mapping[str, Any]) -> None:
     alone. ``Parts`` says of which argument each rank may hold its part: there lists and arrays are not compared."""
     if comm.size == 1:
         return
-    own = {name: sha256(_described(value, DEPTH).encode()).digest()[:8] for name, value in given.items()}
+    own = {
+        name: sha256(_described(value, DEPTH).encode()).digest()[:8]
+        for name, value in given.items()
+    }
     # One reduction of two numbers tells whether all are alike: the largest digest is the smallest one, too.
-    whole = sha256(repr(tuple(own.items())).encode()).digest()[:6]  # 48 bits: a whole number that a float holds
+    whole = sha256(repr(tuple(own.items())).encode()).digest()[
+        :6
+    ]  # 48 bits: a whole number that a float holds
     digest_of_all = float(int.from_bytes(whole, "big"))
     highest, lowest = comm.max(np.array([digest_of_all, -digest_of_all]))
     if highest == -lowest:
@@ -137,8 +160,14 @@ def agree(comm: Comm, owner: str, given: Mapping[str, Any]) -> None:
         if others:
             texts = from_each(comm, shown(given[name]))
             theirs = texts[others[0]]
-            apart = f"is {texts[0]} on rank 0 and {theirs}" if theirs != texts[0] else "is not the same on rank 0 and"
-            ranks = f"rank {others[0]}" if len(others) == 1 else "ranks " + ", ".join(map(str, others))
+            apart = (
+                f"is {texts[0]} on rank 0 and {theirs}"
+                if theirs != texts[0]
+                else "is not the same on rank 0 and"
+            )
+            ranks = (
+                f"rank {others[0]}" if len(others) == 1 else "ranks " + ", ".join(map(str, others))
+            )
             raise InputError(f"{owner}: {name} {apart} on {ranks}; give the same on all ranks")
 
 
@@ -167,25 +196,39 @@ def _described(value: Any, depth: int, parts: bool = False) -> str:
     if depth == 0:
         return kind
     if isinstance(value, Mapping):
-        return kind + str([(str(key), _described(one, depth - 1, parts)) for key, one in value.items()])
+        return kind + str(
+            [(str(key), _described(one, depth - 1, parts)) for key, one in value.items()]
+        )
     if isinstance(value, Set):
         return kind + str(sorted(_described(one, depth - 1, parts) for one in value))
     if isinstance(value, list | tuple | np.ndarray):
         return "several" if parts else _of_many(value, depth)
     if is_dataclass(value) and not isinstance(value, type):
-        return kind + str([(one.name, _described(getattr(value, one.name, None), depth - 1, parts))
-                           for one in fields(value) if one.compare and one.name not in LOCAL])
+        return kind + str(
+            [
+                (one.name, _described(getattr(value, one.name, None), depth - 1, parts))
+                for one in fields(value)
+                if one.compare and one.name not in LOCAL
+            ]
+        )
     return kind if not isinstance(value, type) else f"{value.__module__}.{value.__qualname__}"
 
 
 def _of_many(value: Any, depth: int) -> str:
     """A text of the members of a list or array, short where they are many numbers."""
-    if isinstance(value, np.ndarray) or len(value) > LONG and isinstance(value[0], int | float | np.number):
+    if (
+        isinstance(value, np.ndarray)
+        or len(value) > LONG
+        and isinstance(value[0], int | float | np.number)
+    ):
         try:
             numbers = np.asarray(value, dtype=float) + 0.0
         except (TypeError, ValueError):  # no real numbers, or lists of different lengths
             numbers = None
         if numbers is not None:
             return f"{numbers.shape} {sha256(numbers.tobytes()).hexdigest()}"
-    return str([_described(one, depth - 1) for one in np.ravel(value)] if isinstance(value, np.ndarray)
-               else [_described(one, depth - 1) for one in value])
+    return str(
+        [_described(one, depth - 1) for one in np.ravel(value)]
+        if isinstance(value, np.ndarray)
+        else [_described(one, depth - 1) for one in value]
+    )

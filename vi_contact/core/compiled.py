@@ -59,8 +59,15 @@ def _loops() -> Any:
     """The functions; None, and once a line in the log, where there is no compiler or cache."""
     try:
         found = ctypes.CDLL(str(compiled(LOOPS, [])))
-    except (OSError, RuntimeError, subprocess.SubprocessError) as problem:  # RuntimeError: nobody's home is known
-        log.info("numpy does what compiled loops would do faster, because they need a C compiler: %s", _said(problem))
+    except (
+        OSError,
+        RuntimeError,
+        subprocess.SubprocessError,
+    ) as problem:  # RuntimeError: nobody's home is known
+        log.info(
+            "numpy does what compiled loops would do faster, because they need a C compiler: %s",
+            _said(problem),
+        )
         return None
     found.relax.restype = ctypes.c_double
     return found
@@ -94,7 +101,10 @@ def _with_cholmod(file: Path) -> Any:
 @lru_cache(maxsize=1)
 def _without_cholmod(reason: str) -> None:
     """Say once in the log why."""
-    log.info("PETSc factorises, because the quicker way needs a C compiler and PETSc's CHOLMOD: %s", reason)
+    log.info(
+        "PETSc factorises, because the quicker way needs a C compiler and PETSc's CHOLMOD: %s",
+        reason,
+    )
 
 
 def cholmod_of_petsc() -> Path:
@@ -145,4 +155,6 @@ def compiled(source: Path, options: Sequence[str], *libraries: Path) -> Path:
 
 def _said(problem: Exception) -> str:
     """The first line of what a compiler or the system said."""
-    return ((getattr(problem, "stderr", None) or str(problem)).strip().splitlines() or [repr(problem)])[0]
+    return (
+        (getattr(problem, "stderr", None) or str(problem)).strip().splitlines() or [repr(problem)]
+    )[0]

@@ -18,7 +18,9 @@ from .contact_last import ContactLast
 from .surfaces import ContactSurface
 
 
-def condense(A: EffectiveMatrix, surface: ContactSurface, *, frictional: bool = False) -> "Last | _Twice":
+def condense(
+    A: EffectiveMatrix, surface: ContactSurface, *, frictional: bool = False
+) -> "Last | _Twice":
     """Factorise A and condense it onto the normal and, with friction, tangential contact unknowns. Collective."""
     mine, first = surface.owned[:, None], A.algebra.first(A.matrix.rows)
     if frictional:
@@ -73,9 +75,20 @@ class _Twice:
     """Hold the same with any factor of A; ``owned`` contact unknowns of this rank and their ``places`` among all."""
 
     def __init__(
-        self, A: EffectiveMatrix, surface: ContactSurface, owned: Indices, places: Indices, there: Mask
+        self,
+        A: EffectiveMatrix,
+        surface: ContactSurface,
+        owned: Indices,
+        places: Indices,
+        there: Mask,
     ) -> None:
-        self._A, self._comm, self._owned, self._places, self.there = A, surface.comm, owned, places, there
+        self._A, self._comm, self._owned, self._places, self.there = (
+            A,
+            surface.comm,
+            owned,
+            places,
+            there,
+        )
         G = self._everywhere(A.factor.solve_units(owned, places, len(there), owned))
         self.flexibility: Array = 0.5 * (G + G.T) if A.algebra.symmetric else G
 

@@ -32,8 +32,15 @@ class ContactLast:
     Every rank may hold a copy of it: ``whole`` gathers a vector of owned entries, ``mine`` are the owned rows. Vectors
     of c are in the order of ``last``. ``corner``: L_cc, lower triangular."""
 
-    def __init__(self, library: Any, A: sp.csr_matrix, last: Indices, *, whole: Callable[[Array], Array] | None = None,
-                 mine: slice = slice(None)) -> None:
+    def __init__(
+        self,
+        library: Any,
+        A: sp.csr_matrix,
+        last: Indices,
+        *,
+        whole: Callable[[Array], Array] | None = None,
+        mine: slice = slice(None),
+    ) -> None:
         """Factorise; ArithmeticError when A is not positive definite, or too large for 32 bits."""
         self._library, self._whole, self._mine = library, whole, mine
         self.rows, A = A.shape[0], _readable(A)
@@ -46,7 +53,11 @@ class ContactLast:
         entries = library.columns(factor, inner, None, None, None, None)
         self._columns: tuple[NDArray[Any], ...] = ()
         if entries <= SHORT_COLUMNS * max(inner, 1):
-            starts, rows, values = np.empty(inner + 1, np.int64), np.empty(entries, np.int32), np.empty(entries)
+            starts, rows, values = (
+                np.empty(inner + 1, np.int64),
+                np.empty(entries, np.int32),
+                np.empty(entries),
+            )
             library.columns(factor, inner, at(starts), at(rows), at(values), at(self.corner))
             library.release(factor)
             self._columns = starts, rows, values
@@ -137,7 +148,11 @@ class ContactLast:
 
 def _by_corner(routine: Any, corner: Array, rows: Array, trans: int = 0) -> Array:
     """What a routine of BLAS makes of the triangle and of every row."""
-    return np.asarray(routine(1.0, corner, rows.T, lower=1, trans_a=trans).T) if rows.size else rows.copy()
+    return (
+        np.asarray(routine(1.0, corner, rows.T, lower=1, trans_a=trans).T)
+        if rows.size
+        else rows.copy()
+    )
 
 
 def _order(library: Any, A: sp.csr_matrix, last: Indices) -> NDArray[np.int32]:

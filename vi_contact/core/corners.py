@@ -13,13 +13,17 @@ from .checks import at
 from .errors import InputError
 from .surfaces import ContactSurface, nodal_blocks, nodal_frames, same_node, tangential_columns
 
-FEATURE_ANGLE = np.pi / 6  # CHOSEN: 30°, a usual feature angle; the coarsest circles of the models turn by less
+FEATURE_ANGLE = (
+    np.pi / 6
+)  # CHOSEN: 30°, a usual feature angle; the coarsest circles of the models turn by less
 PARALLEL = 1e-9  # 1 - cosine of the angle between directions that count as one, cosine between those at right angles
 
 
 def at_right_angles(directions: Array) -> bool:
     """Say whether unit vectors (k, d) are orthogonal to one another, to round-off."""
-    return bool(np.all(np.abs(directions @ directions.T)[np.triu_indices(len(directions), 1)] <= PARALLEL))
+    return bool(
+        np.all(np.abs(directions @ directions.T)[np.triu_indices(len(directions), 1)] <= PARALLEL)
+    )
 
 
 def corner_of(directions: Array) -> tuple[list[int], Array]:
@@ -29,9 +33,14 @@ def corner_of(directions: Array) -> tuple[list[int], Array]:
     for direction in directions:
         order = np.argsort(-np.abs(direction), kind="stable")
         columns.append(next(int(c) for c in order if c not in columns))
-    if not square:  # columns in which no direction vanishes: components that are prescribed keep theirs
+    if (
+        not square
+    ):  # columns in which no direction vanishes: components that are prescribed keep theirs
         choices = list(permutations(range(d), len(directions)))
-        sizes = [np.prod([abs(direction[c]) for direction, c in zip(directions, own, strict=True)]) for own in choices]
+        sizes = [
+            np.prod([abs(direction[c]) for direction, c in zip(directions, own, strict=True)])
+            for own in choices
+        ]
         columns = list(choices[int(np.argmax(sizes))])
     block = np.zeros((d, d))
     block[:, columns] = directions.T
@@ -49,7 +58,9 @@ def tangent_vectors(normals: Array, nodes: Indices | None) -> Array:
     for rows in () if nodes is None else same_node(nodes):
         if np.linalg.matrix_rank(normals[rows]) == len(rows):  # else two nodes at one place
             column[rows], blocks[rows] = corner_of(normals[rows])
-    return np.take_along_axis(blocks, tangential_columns(column, normals.shape[1])[:, None, :], axis=2)
+    return np.take_along_axis(
+        blocks, tangential_columns(column, normals.shape[1])[:, None, :], axis=2
+    )
 
 
 def oblique_corners(surface: ContactSurface) -> list[Indices]:
@@ -67,9 +78,11 @@ def refuse_rubbing(surface: ContactSurface) -> None:
     every = [one for part in from_each(surface.comm, first) for one in part]
     if every:
         where = at(min(every, key=lambda one: one[0])[1])
-        raise InputError(f"{len(every)} contact nodes, the first at {where}, have several contact directions, and "
-                         "friction on two faces at once is not modelled: let them slide freely (surface."
-                         "with_frictionless_corners()), or treat the corner as smooth (a larger feature_angle=)")
+        raise InputError(
+            f"{len(every)} contact nodes, the first at {where}, have several contact directions, and "
+            "friction on two faces at once is not modelled: let them slide freely (surface."
+            "with_frictionless_corners()), or treat the corner as smooth (a larger feature_angle=)"
+        )
 
 
 def with_open_faces(surface: ContactSurface, v: Array, target: Array) -> Array:

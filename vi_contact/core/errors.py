@@ -5,9 +5,23 @@ import signal
 from collections.abc import Iterator
 
 PETSC_ERR_MEM = 55  # of petscsystypes.h
-_MEMORY = ("out of memory", "cannot allocate memory", "unable to allocate", "memory allocation failed", "bad_alloc")
-_MACHINE = (errno.ENOMEM, errno.EMFILE, errno.ENFILE, errno.EACCES, errno.EPERM, errno.ESTALE, errno.ENOSPC,
-            errno.EDQUOT)
+_MEMORY = (
+    "out of memory",
+    "cannot allocate memory",
+    "unable to allocate",
+    "memory allocation failed",
+    "bad_alloc",
+)
+_MACHINE = (
+    errno.ENOMEM,
+    errno.EMFILE,
+    errno.ENFILE,
+    errno.EACCES,
+    errno.EPERM,
+    errno.ESTALE,
+    errno.ENOSPC,
+    errno.EDQUOT,
+)
 
 
 class ViContactError(Exception):
@@ -47,10 +61,16 @@ class OutOfTime(Interrupted):
 
 def of_memory(error: BaseException) -> bool:
     """Say whether an error, or one it came from, says that there is no memory: Python's, numpy's, HDF5's, PETSc's."""
-    return any(isinstance(one, MemoryError) or getattr(one, "errno", None) == errno.ENOMEM
-               or getattr(one, "ierr", None) == PETSC_ERR_MEM
-               or (not isinstance(one, ViContactError) and any(word in str(one).lower() for word in _MEMORY))
-               for one in _chain(error))
+    return any(
+        isinstance(one, MemoryError)
+        or getattr(one, "errno", None) == errno.ENOMEM
+        or getattr(one, "ierr", None) == PETSC_ERR_MEM
+        or (
+            not isinstance(one, ViContactError)
+            and any(word in str(one).lower() for word in _MEMORY)
+        )
+        for one in _chain(error)
+    )
 
 
 def of_machine(error: BaseException) -> bool:

@@ -41,7 +41,9 @@ def frames_of(folder: Path) -> dict[int, tuple[Path, str]]:
     InputError where the folder of fields, or a file of frames, is a link."""
     fields = inner_folder(folder, FIELDS)
     names = sorted(os.listdir(fields)) if fields.is_dir() else []
-    found = {int(match[1]): (fields / name, "/") for name in names if (match := FRAME.fullmatch(name))}
+    found = {
+        int(match[1]): (fields / name, "/") for name in names if (match := FRAME.fullmatch(name))
+    }
     for name in filter(FRAMES.fullmatch, names):
         with open_hdf5(fields / name) as file:
             found |= {int(step): (fields / name, f"/{step}") for step in file if step.isdecimal()}
@@ -62,7 +64,11 @@ def on_root(comm: Comm, action: Callable[[], T]) -> T | None:
             failure.__cause__ = error
         except Exception as error:  # the other ranks must not wait for this one
             failure = error
-    told = failure if isinstance(failure, ViContactError) or failure is None else ViContactError(f"rank 0: {failure!r}")
+    told = (
+        failure
+        if isinstance(failure, ViContactError) or failure is None
+        else ViContactError(f"rank 0: {failure!r}")
+    )
     kind, text = comm.bcast((type(told), str(told)) if told is not None else (None, ""))
     if failure is not None:
         raise failure
@@ -75,12 +81,16 @@ def sentence(error: OSError) -> str:
     """Return one sentence: what happened to which file, and the remedy."""
     path = "a file" if error.filename is None else f"'{os.fsdecode(error.filename)}'"
     if error.errno in _FULL:
-        return (f"the disk is full: {path} could not be written; what was written before is kept, free some space "
-                "and restart from the last checkpoint")
+        return (
+            f"the disk is full: {path} could not be written; what was written before is kept, free some space "
+            "and restart from the last checkpoint"
+        )
     if error.errno in _REFUSED:
         return f"{path} cannot be opened ({error.strerror}): change its permissions, or choose another folder"
     if error.errno in _MANY:
-        return f"{path} cannot be opened ({error.strerror}): raise the limit of open files (ulimit -n)"
+        return (
+            f"{path} cannot be opened ({error.strerror}): raise the limit of open files (ulimit -n)"
+        )
     if isinstance(error, BrokenPipeError):
         return f"what reads {path} has ended before all was written: let it read to the end"
     return f"{path} cannot be read or written ({error.strerror or error}): check it, or choose another output folder"

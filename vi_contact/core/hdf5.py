@@ -53,8 +53,10 @@ class StoredGroup:
         return item
 
     def _wrong(self, name: str, what: str) -> InputError:
-        return InputError(f"'{self._path}' is damaged: {self._group.name.rstrip('/')}/{name} {what}; restore it, or "
-                          "run again")
+        return InputError(
+            f"'{self._path}' is damaged: {self._group.name.rstrip('/')}/{name} {what}; restore it, or "
+            "run again"
+        )
 
     def __contains__(self, name: str) -> bool:
         return name in self._group
@@ -91,6 +93,10 @@ class StoredFile(StoredGroup):
     def __enter__(self) -> "StoredFile":
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self.close()

@@ -12,19 +12,27 @@ from typing import Any
 from .renamed import NAMES
 
 
-def lazy(package: str, file: str) -> tuple[list[str], Callable[[str], Any], Callable[[], list[str]]]:
+def lazy(
+    package: str, file: str
+) -> tuple[list[str], Callable[[str], Any], Callable[[], list[str]]]:
     """Return ``__all__``, ``__getattr__``, ``__dir__`` of a package (PEP 562) by the stub beside its ``__init__.py``.
 
     A line ``from .module import Name as Name`` of ``__init__.pyi`` is a public name and its module, here and for
     checkers of types (Scientific Python, SPEC 1); ``from .room import *`` imports a room and hands on all its names."""
     home: dict[str, str] = {}
-    with open(splitext(file)[0] + ".pyi", encoding="utf-8") as stub:  # importing pathlib takes longer than all stubs
+    with open(
+        splitext(file)[0] + ".pyi", encoding="utf-8"
+    ) as stub:  # importing pathlib takes longer than all stubs
         listed = ast.parse(stub.read()).body
     for node in listed:
         if isinstance(node, ast.ImportFrom):
             module = f"{package}.{node.module}"
             for one in node.names:
-                home.update(dict.fromkeys(import_module(module).__all__ if one.name == "*" else [one.name], module))
+                home.update(
+                    dict.fromkeys(
+                        import_module(module).__all__ if one.name == "*" else [one.name], module
+                    )
+                )
     public = sorted(home)
 
     def get(name: str) -> Any:
@@ -51,6 +59,8 @@ def _renamed(package: str, name: str) -> Any:
     path = NAMES.get(package, {}).get(name)
     if path is None:
         return None
-    warnings.warn(f"'{package}.{name}' is now {path}: use that name", DeprecationWarning, stacklevel=3)
+    warnings.warn(
+        f"'{package}.{name}' is now {path}: use that name", DeprecationWarning, stacklevel=3
+    )
     module, _, now = path.rpartition(".")
     return getattr(import_module(module), now)

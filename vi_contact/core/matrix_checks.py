@@ -27,7 +27,9 @@ def asymmetry(A: Matrix, comm: Comm, numbers: Indices) -> float:
     w = probe(numbers, 0) / size
     with np.errstate(all="ignore"):  # infinite entries
         forth, back = (A @ w) / size, A.transpose_apply(w) / size
-        error, scale = (largest(comm, max_abs(np.nan_to_num(x, nan=np.inf))) for x in (forth - back, forth))
+        error, scale = (
+            largest(comm, max_abs(np.nan_to_num(x, nan=np.inf))) for x in (forth - back, forth)
+        )
         return float(np.float64(error) / scale) if scale else error
 
 

@@ -12,8 +12,10 @@ from .errors import InputError
 
 ROUND_OFF = 1e-9  # cosine of a right angle
 BESIDE = 0.01  # cosine of the angle (89.4°) from which on a direction is along a boundary
-REMEDY = ("give unit vectors from the body to the obstacle (the normal of a HalfSpace points towards the body: turn "
-          "its sign)")
+REMEDY = (
+    "give unit vectors from the body to the obstacle (the normal of a HalfSpace points towards the body: turn "
+    "its sign)"
+)
 
 
 class Obstacle(Protocol):
@@ -52,10 +54,14 @@ class HalfSpace:
     normal: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        point, normal = (array("HalfSpace", name, getattr(self, name), (None,)) for name in ("point", "normal"))
+        point, normal = (
+            array("HalfSpace", name, getattr(self, name), (None,)) for name in ("point", "normal")
+        )
         if not normal.any() or not np.isfinite(np.linalg.norm(normal)) or len(point) != len(normal):
-            raise InputError(f"HalfSpace(point={self.point}, normal={self.normal}): give a point and a nonzero normal "
-                             "with the same number of components")
+            raise InputError(
+                f"HalfSpace(point={self.point}, normal={self.normal}): give a point and a nonzero normal "
+                "with the same number of components"
+            )
 
     @property
     def unit_normal(self) -> Array:
@@ -78,7 +84,12 @@ class AnalyticGap:
     function: Callable[[Array], Array]
 
     def __post_init__(self) -> None:
-        function("AnalyticGap", "function", self.function, "give a function of points (k, d) that returns gaps (k,)")
+        function(
+            "AnalyticGap",
+            "function",
+            self.function,
+            "give a function of points (k, d) that returns gaps (k,)",
+        )
 
     def directions(self, points: Array, normals: Array) -> Array:
         return normals
@@ -93,7 +104,13 @@ def alike(points: Array) -> Indices:
 
 
 def facing(
-    obstacle: Obstacle, points: Array, normals: Array, *, name: str = "", angle: float = 0.0, alone: bool = True
+    obstacle: Obstacle,
+    points: Array,
+    normals: Array,
+    *,
+    name: str = "",
+    angle: float = 0.0,
+    alone: bool = True,
 ) -> tuple[Array, Array]:
     """Return the contact directions (m, d) and gaps (m,) [m] of an obstacle, checked.
 
@@ -110,25 +127,35 @@ def facing(
         InputError: other shapes, what are no real numbers, directions of no length, along the boundary or into the
             body."""
     owner, m = type(obstacle).__name__, len(points)
-    directions = array(owner, "what directions returns", obstacle.directions(points, normals), points.shape)
+    directions = array(
+        owner, "what directions returns", obstacle.directions(points, normals), points.shape
+    )
     length = np.linalg.norm(directions, axis=1)
     if not length.all():
-        raise InputError(f"{owner}: the contact direction at {at(points[np.argmin(length)])} has no length; {REMEDY}")
+        raise InputError(
+            f"{owner}: the contact direction at {at(points[np.argmin(length)])} has no length; {REMEDY}"
+        )
     _refuse_beside(owner, name, directions / length[:, None], normals)
     gap = np.asarray(obstacle.gap(points, normals))
     if gap.shape != (m,) or gap.dtype.kind not in "iuf":
-        raise InputError(f"{owner}: gap returned {gap.dtype} of shape {gap.shape} for {m} points; return one real gap "
-                         "per point")
+        raise InputError(
+            f"{owner}: gap returned {gap.dtype} of shape {gap.shape} for {m} points; return one real gap "
+            "per point"
+        )
     cosines, places = np.sum(directions * normals, axis=1) / length, alike(points)
     towards = cosines >= -ROUND_OFF
-    beyond = gap > np.max(gap[cosines > BESIDE], initial=-np.inf) if alone else np.zeros(m, dtype=bool)
+    beyond = (
+        gap > np.max(gap[cosines > BESIDE], initial=-np.inf) if alone else np.zeros(m, dtype=bool)
+    )
     away = ~np.isin(places, places[towards])
     wrong = np.flatnonzero(away & ~(beyond & _turned_smoothly(cosines, angle)))
     if len(wrong):
         turn = np.degrees(np.arccos(np.clip(cosines[wrong], -1.0, 1.0)).mean())
-        raise InputError(f"{owner}: the contact direction at {at(points[wrong[0]])}{_of(name)} points into the body at "
-                         f"{turn:.4g} degrees to the outward normal, in the mean of {len(wrong)} points; leave the "
-                         f"face there out of the boundary, or {REMEDY}")
+        raise InputError(
+            f"{owner}: the contact direction at {at(points[wrong[0]])}{_of(name)} points into the body at "
+            f"{turn:.4g} degrees to the outward normal, in the mean of {len(wrong)} points; leave the "
+            f"face there out of the boundary, or {REMEDY}"
+        )
     return directions, gap.astype(float)
 
 
@@ -137,13 +164,19 @@ def _refuse_beside(owner: str, name: str, directions: Array, normals: Array) -> 
     cosines = np.sum(directions * normals, axis=1)
     if not len(cosines) or cosines.max() > BESIDE:
         return
-    reached = cosines >= -ROUND_OFF if np.any(cosines >= -ROUND_OFF) else np.ones(len(cosines), dtype=bool)
+    reached = (
+        cosines >= -ROUND_OFF
+        if np.any(cosines >= -ROUND_OFF)
+        else np.ones(len(cosines), dtype=bool)
+    )
     way, normal = (_unit(one[reached].mean(axis=0)) for one in (directions, normals))
     angle = np.degrees(np.arccos(np.clip(way @ normal, -1.0, 1.0)))
     what = "points into the body" if cosines.max() < -BESIDE else "is along the boundary"
-    raise InputError(f"{owner}: the contact direction {at(way.round(6))}{_of(name)} {what} at {angle:.4g} degrees to "
-                     f"its mean outward normal {at(normal.round(6))}; choose the boundary that looks towards the "
-                     f"obstacle, or {REMEDY}")
+    raise InputError(
+        f"{owner}: the contact direction {at(way.round(6))}{_of(name)} {what} at {angle:.4g} degrees to "
+        f"its mean outward normal {at(normal.round(6))}; choose the boundary that looks towards the "
+        f"obstacle, or {REMEDY}"
+    )
 
 
 def _of(name: str) -> str:
@@ -168,9 +201,13 @@ def _unit(vector: Array) -> Array:
 def admissible_gap(gap: Array, points: Array, size: float) -> Array:
     """Return the initial gap without round-off (1e-12 of the body's size); InputError where the body penetrates."""
     if not np.all(np.isfinite(gap)):
-        raise InputError("the initial gap contains NaN or infinite values: check the obstacle's gap function")
+        raise InputError(
+            "the initial gap contains NaN or infinite values: check the obstacle's gap function"
+        )
     if len(gap) and gap.min() < -1e-12 * size:
         worst = int(np.argmin(gap))
-        raise InputError(f"the body penetrates its obstacle by {-gap[worst]:.3g} m at {at(points[worst])} before the "
-                         "first step: move the obstacle or the mesh so that every initial gap is >= 0")
+        raise InputError(
+            f"the body penetrates its obstacle by {-gap[worst]:.3g} m at {at(points[worst])} before the "
+            "first step: move the obstacle or the mesh so that every initial gap is >= 0"
+        )
     return np.maximum(gap, 0.0)

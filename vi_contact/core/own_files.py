@@ -18,12 +18,22 @@ from typing import Any
 from .errors import InputError
 
 _KINDS = (
-    (stat.S_ISLNK, "a link"), (stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a pipe"), (stat.S_ISSOCK, "a socket"),
-    (stat.S_ISCHR, "a device"), (stat.S_ISBLK, "a device"),
+    (stat.S_ISLNK, "a link"),
+    (stat.S_ISDIR, "a folder"),
+    (stat.S_ISFIFO, "a pipe"),
+    (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
 )
-_SAFE = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC  # nonblocking: to open a pipe would wait for its other end
+_SAFE = (
+    os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+)  # nonblocking: to open a pipe would wait for its other end
 TRIES = 10  # to make a file anew, while somebody else makes one of that name
-DEVICES = (Path("/dev"), Path("/dev/fd"), Path("/proc/self/fd"))  # where users name a stream as an output
+DEVICES = (
+    Path("/dev"),
+    Path("/dev/fd"),
+    Path("/proc/self/fd"),
+)  # where users name a stream as an output
 
 
 def is_own(path: Path) -> bool:
@@ -85,7 +95,9 @@ def open_new(path: Path) -> Any:
     """Make a file anew, unbuffered, in the place of whatever has its name, but for a folder. OSError names the file."""
     for _ in range(TRIES):
         try:
-            return _unbuffered(os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | _SAFE, 0o666), path, "wb+")
+            return _unbuffered(
+                os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | _SAFE, 0o666), path, "wb+"
+            )
         except FileExistsError:
             remove(path)
     raise OSError(f"another program makes '{path}' again and again")
@@ -131,7 +143,9 @@ def _mode(path: Path) -> int | None:
 
 def _opened(path: Path, flags: int) -> int:
     """The descriptor of a regular file."""
-    is_own(path)  # the sentence says what it is; a link that is made after this is not followed either
+    is_own(
+        path
+    )  # the sentence says what it is; a link that is made after this is not followed either
     descriptor = os.open(path, flags | _SAFE, 0o666)
     mode = os.fstat(descriptor).st_mode
     if not stat.S_ISREG(mode):
@@ -159,6 +173,10 @@ def _unbuffered(descriptor: int, path: Path, mode: str) -> Any:
 
 
 def _foreign(path: Path, mode: int, wanted: str) -> InputError:
-    kind = next((name for test, name in _KINDS if test(mode)), "a file" if wanted == "folder" else "no file")
-    return InputError(f"'{path}' is {kind}, and a run reads and writes only files of its own folder: put a {wanted} in "
-                      "its place, remove it, or choose another folder")
+    kind = next(
+        (name for test, name in _KINDS if test(mode)), "a file" if wanted == "folder" else "no file"
+    )
+    return InputError(
+        f"'{path}' is {kind}, and a run reads and writes only files of its own folder: put a {wanted} in "
+        "its place, remove it, or choose another folder"
+    )

@@ -41,20 +41,36 @@ class ContactProblem:
             agree(self.surface.comm, "ContactProblem", laws | {"excitation": self.excitation})
         check_parts(self)
         total, slots = self.surface.total, self.surface.slots
-        own = with_values(self.friction, self.surface, lambda v: tuple(v[i] for i in slots) if len(v) == total else v)
+        own = with_values(
+            self.friction,
+            self.surface,
+            lambda v: tuple(v[i] for i in slots) if len(v) == total else v,
+        )
         object.__setattr__(self, "friction", own)
 
     def __repr__(self) -> str:
         """Return unknowns, conditions and laws in a few lines, those of all ranks: not the arrays."""
-        laws = {"friction": self.friction, "impact": self.impact, "mass": self.mass or "that of the time scheme"}
-        parts = [self.system, self.surface, *(f"{name}: {shown(one)}" for name, one in laws.items())]
+        laws = {
+            "friction": self.friction,
+            "impact": self.impact,
+            "mass": self.mass or "that of the time scheme",
+        }
+        parts = [
+            self.system,
+            self.surface,
+            *(f"{name}: {shown(one)}" for name, one in laws.items()),
+        ]
         parts += [f"excitation: {shown(one)}" for one in self.excitations]
-        return "\n  ".join([f"ContactProblem with {self.surface.total} contact conditions", *map(str, parts)])
+        return "\n  ".join(
+            [f"ContactProblem with {self.surface.total} contact conditions", *map(str, parts)]
+        )
 
     @cached_property
     def excitations(self) -> tuple[Excitation, ...]:
         """Return the excitations as a tuple."""
-        return tuple(self.excitation) if isinstance(self.excitation, Sequence) else (self.excitation,)
+        return (
+            tuple(self.excitation) if isinstance(self.excitation, Sequence) else (self.excitation,)
+        )
 
     @cached_property
     @stage("mass")
@@ -69,8 +85,12 @@ class ContactProblem:
     def equations(self) -> SemiDiscreteSystem:
         """Return the system that schemes see: in the rotated basis, with the inertia loads -M r a_g(t)."""
         system = self.unshaken
-        ways = ((np.asarray(one.direction, dtype=float), one.acceleration) for one in self.excitations)
-        shaken = system.with_load(*((-system.inertia(direction), history) for direction, history in ways))
+        ways = (
+            (np.asarray(one.direction, dtype=float), one.acceleration) for one in self.excitations
+        )
+        shaken = system.with_load(
+            *((-system.inertia(direction), history) for direction, history in ways)
+        )
         return system.loaded(shaken.load)
 
     def beside(self, other: "ContactProblem") -> "ContactProblem | None":
@@ -105,10 +125,14 @@ class ContactProblem:
         load, turned = known[basis, dual]
         if load is system.load:
             return turned
-        return turned.loaded(system.load.in_basis(basis))  # the matrices are shared with systems of other loads
+        return turned.loaded(
+            system.load.in_basis(basis)
+        )  # the matrices are shared with systems of other loads
 
     def _relative(self, system: SemiDiscreteSystem) -> SemiDiscreteSystem:
-        return system if self.surface.coupling is None else system.in_relative(self.surface.coupling)
+        return (
+            system if self.surface.coupling is None else system.in_relative(self.surface.coupling)
+        )
 
     @property
     def frictional(self) -> bool:
@@ -133,7 +157,9 @@ class ContactProblem:
         return np.array(found)
 
 
-def with_values(law: Any, surface: ContactSurface, change: Callable[[tuple[Any, ...]], tuple[Any, ...]]) -> Any:
+def with_values(
+    law: Any, surface: ContactSurface, change: Callable[[tuple[Any, ...]], tuple[Any, ...]]
+) -> Any:
     """Return the law with its tuples changed on several ranks, also in the laws that it is made of."""
     if surface.comm.size == 1 or not is_dataclass(law) or isinstance(law, type):
         return law
@@ -149,25 +175,57 @@ def check_parts(problem: Any) -> None:
 
     Identity counts: a surface that ``fem`` made carries the space it was made on, and only systems of that space take
     it. Sizes are compared on all ranks together, so that all of them raise the same sentence."""
-    owner, system, surface, excitations = "ContactProblem", problem.system, problem.surface, problem.excitations
-    instance(owner, "system", system, SemiDiscreteSystem, "give a system, such as fem.assemble returns")
-    instance(owner, "surface", surface, ContactSurface, "give a contact surface, such as fem.contact_surface returns")
-    provides(owner, "friction", problem.friction, ("limit", "slope", "at"), "give Coulomb(mu) or another friction law")
-    optional(provides, owner, "impact", problem.impact, ("target", "apply"), "give Inelastic() or another law, or None")
+    owner, system, surface, excitations = (
+        "ContactProblem",
+        problem.system,
+        problem.surface,
+        problem.excitations,
+    )
+    instance(
+        owner, "system", system, SemiDiscreteSystem, "give a system, such as fem.assemble returns"
+    )
+    instance(
+        owner,
+        "surface",
+        surface,
+        ContactSurface,
+        "give a contact surface, such as fem.contact_surface returns",
+    )
+    provides(
+        owner,
+        "friction",
+        problem.friction,
+        ("limit", "slope", "at"),
+        "give Coulomb(mu) or another friction law",
+    )
+    optional(
+        provides,
+        owner,
+        "impact",
+        problem.impact,
+        ("target", "apply"),
+        "give Inelastic() or another law, or None",
+    )
     if problem.mass is not None:
         remedy = "give Redistributed() or ConsistentMass(), or None"
         provides(owner, "mass", problem.mass, ("apply",), remedy, lacks=("target",))
     for excitation in excitations:
         _check_excitation(excitation, system)
     if system.absolute and excitations:
-        raise InputError("a compliant base is shaken by its own upgoing motion: leave out the excitation of the "
-                         "problem, whose inertia load belongs to a rigid base")
+        raise InputError(
+            "a compliant base is shaken by its own upgoing motion: leave out the excitation of the "
+            "problem, whose inertia load belongs to a rigid base"
+        )
     if surface.space is not None and surface.space is not system.space:
-        raise InputError("ContactProblem: the contact surface was made for another system with other unknowns: make "
-                         "it for this one by fem.contact_surface(system, …)")
+        raise InputError(
+            "ContactProblem: the contact surface was made for another system with other unknowns: make "
+            "it for this one by fem.contact_surface(system, …)"
+        )
     if surface.comm.size != system.algebra.comm.size:
-        raise InputError(f"ContactProblem: the surface is shared by {surface.comm.size} ranks and the system by "
-                         f"{system.algebra.comm.size}: make both on the same ranks")
+        raise InputError(
+            f"ContactProblem: the surface is shared by {surface.comm.size} ranks and the system by "
+            f"{system.algebra.comm.size}: make both on the same ranks"
+        )
     refuse((*_of_system(system), *_of_surface(surface, system, surface.total)), surface.comm)
     if problem.frictional:
         refuse_rubbing(surface)
@@ -178,8 +236,10 @@ def _refuse_repeated(excitations: Sequence[Any]) -> None:
     """Raise InputError for an excitation that is named twice: it would shake twice."""
     for one, other in combinations(excitations, 2):
         if one is other:
-            raise InputError(f"ContactProblem: excitation names {shown(one)} twice, which would shake twice: leave it "
-                             "out once, or scale it")
+            raise InputError(
+                f"ContactProblem: excitation names {shown(one)} twice, which would shake twice: leave it "
+                "out once, or scale it"
+            )
 
 
 def _check_excitation(excitation: Any, system: SemiDiscreteSystem) -> None:
@@ -187,8 +247,10 @@ def _check_excitation(excitation: Any, system: SemiDiscreteSystem) -> None:
     provides("ContactProblem", "excitation", excitation, EXCITATION, remedy)
     array("ContactProblem", "the direction of an excitation", excitation.direction, (None,))
     if len(excitation.direction) != system.influence.shape[1]:
-        raise InputError(f"excitation direction {excitation.direction} has {len(excitation.direction)} components but "
-                         f"the body has {system.influence.shape[1]}: give one component per dimension")
+        raise InputError(
+            f"excitation direction {excitation.direction} has {len(excitation.direction)} components but "
+            f"the body has {system.influence.shape[1]}: give one component per dimension"
+        )
 
 
 def _of_system(system: SemiDiscreteSystem) -> Iterator[str]:
@@ -200,7 +262,9 @@ def _of_system(system: SemiDiscreteSystem) -> Iterator[str]:
         if matrix is not None and matrix.rows != n:
             yield f"the system has {n} unknowns in u0 but {matrix.rows} rows in {name}: give matrices of one system"
     shapes = {"v0": (n,), "influence": (n, d), "base_mass": (n, d), "massless": (n,), "tied": (n,)}
-    values = {name: getattr(system, name) for name in shapes} | {"load.constant": system.load.constant}
+    values = {name: getattr(system, name) for name in shapes} | {
+        "load.constant": system.load.constant
+    }
     yield from _sizes("the system", values, shapes | {"load.constant": (n,)})
     for name in ("u0", "v0"):
         if not np.isfinite(np.sum(getattr(system, name))):
@@ -216,14 +280,22 @@ def _sizes(owner: str, values: dict[str, Any], shapes: dict[str, tuple[int, ...]
 def _of_surface(surface: ContactSurface, system: SemiDiscreteSystem, total: int) -> Iterator[str]:
     """What is wrong with a surface on this rank, and with its places in the unknowns of the system."""
     m, d, n = surface.count, system.influence.shape[1], system.rows
-    shapes: dict[str, tuple[int, ...]] = {"points": (m, d), "normals": (m, d), "tangents": (m, d - 1)}
+    shapes: dict[str, tuple[int, ...]] = {
+        "points": (m, d),
+        "normals": (m, d),
+        "tangents": (m, d - 1),
+    }
     shapes |= dict.fromkeys(("gap0", "weights", "bilateral", "compliance", "owned", "slots"), (m,))
-    yield from _sizes("the contact surface", {name: getattr(surface, name) for name in shapes}, shapes)
+    yield from _sizes(
+        "the contact surface", {name: getattr(surface, name) for name in shapes}, shapes
+    )
     for name, least, most in (("owned", 0, n), ("tangents", -1, n), ("slots", 0, total)):
         values = getattr(surface, name)
         if np.size(values) and not (least <= np.min(values) and np.max(values) < most):
-            yield (f"the contact surface has {name} from {np.min(values)} to {np.max(values)}, outside {least} to "
-                   f"{most - 1}: make the surface for this system, which has another size")
+            yield (
+                f"the contact surface has {name} from {np.min(values)} to {np.max(values)}, outside {least} to "
+                f"{most - 1}: make the surface for this system, which has another size"
+            )
     if np.any(np.diff(surface.slots) <= 0):
         yield "the contact surface has slots that do not ascend: number its conditions in the order of their rows"
     if np.isnan(np.sum(surface.gap0)):

@@ -40,13 +40,17 @@ def vector(self: Excitation, t: float) -> Array:
     return self.acceleration(t) * np.array(self.direction)
 
 
-def check_excitation(excitation: Excitation, *, finite: tuple[str, ...] = (), positive: tuple[str, ...] = ()) -> None:
+def check_excitation(
+    excitation: Excitation, *, finite: tuple[str, ...] = (), positive: tuple[str, ...] = ()
+) -> None:
     """Raise InputError for a bad number or direction; turn the direction into a tuple of floats."""
     attributes(excitation, finite=finite, positive=positive)
     owner = type(excitation).__name__
     direction = finite_tuple(owner, "direction", excitation.direction)
     if not 1 <= len(direction) <= 3 or not any(direction):
-        raise InputError(f"{owner}: direction is {direction!r}; give one to three components, not all zero")
+        raise InputError(
+            f"{owner}: direction is {direction!r}; give one to three components, not all zero"
+        )
     object.__setattr__(excitation, "direction", direction)
 
 
@@ -122,7 +126,9 @@ class ImpactLaw(Protocol):
 
         > 0 is towards the obstacle, so a rebound is negative. Called only when some condition is active."""
 
-    def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
+    def apply(
+        self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
+    ) -> Array:
         """Return the velocity vector (n,) [m/s] that has the normal velocities ``target`` (m,), where they are not NaN.
 
         Args:
@@ -134,7 +140,9 @@ class ImpactLaw(Protocol):
 class MassLaw(Protocol):
     """Choose the mass matrix that contact is marched with."""
 
-    def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool) -> SemiDiscreteSystem:
+    def apply(
+        self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool
+    ) -> SemiDiscreteSystem:
         """Return ``system`` with the wanted mass matrix, as ``system.changed(M=…, massless=…)``, or as it is.
 
         Args:

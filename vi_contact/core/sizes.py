@@ -11,8 +11,10 @@ OWN_CONDITIONS = 1_000  # as many back-substitutions, and a dense matrix
 def refuse_dense(owner: str, rows: int, *, instead: str = "Iterative(), which stores none") -> None:
     """Raise InputError for more contact unknowns than a dense matrix on every rank suits."""
     if rows > DENSE_ROWS:
-        raise InputError(f"{owner} stores a dense matrix of its {rows} contact unknowns on every rank, "
-                         f"{8e-9 * rows**2:.2g} GB: take {instead}, or at most {DENSE_ROWS}")
+        raise InputError(
+            f"{owner} stores a dense matrix of its {rows} contact unknowns on every rank, "
+            f"{8e-9 * rows**2:.2g} GB: take {instead}, or at most {DENSE_ROWS}"
+        )
 
 
 def small(comm: Comm, unknowns: int, conditions: int, *, worth: int = 1) -> bool:
@@ -20,4 +22,6 @@ def small(comm: Comm, unknowns: int, conditions: int, *, worth: int = 1) -> bool
 
     Such problems are condensed with a factor of their own, whatever solves the steps; larger ones are solved by
     conjugate gradients. ``worth``: for problems that come again and again, so many times larger. Collective."""
-    return total(comm, unknowns) <= worth * OWN_UNKNOWNS and total(comm, conditions) <= OWN_CONDITIONS
+    return (
+        total(comm, unknowns) <= worth * OWN_UNKNOWNS and total(comm, conditions) <= OWN_CONDITIONS
+    )

@@ -55,7 +55,9 @@ class State:
 
     def __repr__(self) -> str:
         """Return time, step and sizes on this rank: not the arrays."""
-        closed = f"{np.count_nonzero(self.active)} of {np.size(self.active)} contact conditions closed"
+        closed = (
+            f"{np.count_nonzero(self.active)} of {np.size(self.active)} contact conditions closed"
+        )
         return f"State(t={self.t} s, k={self.k}, {np.size(self.u)} unknowns, {closed})"
 
     def with_velocity(self, v: Array) -> "State":
@@ -87,9 +89,15 @@ class StepProblem:
 
     def __post_init__(self) -> None:
         rows, conditions = self.guess.shape[-1], self.surface.count
-        if (self.b.shape[-1], len(self.bound), self.active.shape[-1]) != (rows, conditions, conditions):
-            raise InputError(f"StepProblem has {len(self.b)} loads for {rows} unknowns, {len(self.bound)} bounds and a "
-                             f"contact set of {len(self.active)} for {conditions} conditions: give one of each")
+        if (self.b.shape[-1], len(self.bound), self.active.shape[-1]) != (
+            rows,
+            conditions,
+            conditions,
+        ):
+            raise InputError(
+                f"StepProblem has {len(self.b)} loads for {rows} unknowns, {len(self.bound)} bounds and a "
+                f"contact set of {len(self.active)} for {conditions} conditions: give one of each"
+            )
 
     def friction_at(self, slip: Array) -> FrictionLaw:
         """Return the friction law at the rates [m/s] of this slip, B_t x - slip0 (m, d - 1). Collective: what a law of
@@ -110,16 +118,23 @@ def refuse_limits(law: FrictionLaw, surface: ContactSurface, scale: float, t: fl
     if getattr(law, "never_negative", False):
         return
     weights = surface.weights
-    parts = {"slope": law.slope(weights), "limit(0)": law.limit(np.zeros(surface.count), weights, scale)}
+    parts = {
+        "slope": law.slope(weights),
+        "limit(0)": law.limit(np.zeros(surface.count), weights, scale),
+    }
     for name, values in parts.items():
         found = np.asarray(values)
         if found.dtype.kind not in "iuf" or found.shape != (surface.count,):
-            raise InputError(f"{type(law).__name__}: {name} is {shown(values)} at t = {t:g} s; return {surface.count} "
-                             "real numbers, one for each contact condition")
+            raise InputError(
+                f"{type(law).__name__}: {name} is {shown(values)} at t = {t:g} s; return {surface.count} "
+                "real numbers, one for each contact condition"
+            )
         wrong = np.flatnonzero(~((found >= 0.0) & (found < np.inf)))
         if len(wrong):
-            raise InputError(f"{type(law).__name__}: {name} is {found[wrong[0]]:g} at {at(surface.points[wrong[0]])} "
-                             f"and t = {t:g} s; a friction limit is zero or a positive finite number")
+            raise InputError(
+                f"{type(law).__name__}: {name} is {found[wrong[0]]:g} at {at(surface.points[wrong[0]])} "
+                f"and t = {t:g} s; a friction limit is zero or a positive finite number"
+            )
 
 
 @dataclass(frozen=True)
@@ -154,7 +169,9 @@ class Answers:
         """Return the answer of one run."""
         rows, history = self.rows, self.histories[row] if self.histories else ()
         r_t, count = None if rows.r_t is None else rows.r_t[row], self.iterations[row]
-        return StepResult(rows.x[row], rows.r_n[row], rows.active[row], count, rows.method, r_t, history)
+        return StepResult(
+            rows.x[row], rows.r_n[row], rows.active[row], count, rows.method, r_t, history
+        )
 
 
 @dataclass(frozen=True)
@@ -205,13 +222,22 @@ class Scheme(Protocol):
 
         A is symmetric positive definite; nothing in it depends on time or state. It is made once for every dt."""
 
-    def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
+    def step(
+        self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
+    ) -> StepProblem:
         """Return the problem of the step of ``problem`` from ``state`` to state.t + dt, whose matrix ``A`` is.
 
         ``dt`` [s] is that of A. The meaning of x is the scheme's own (u1 or v1, say); ``bound`` and ``scale`` fit it,
         and ``scale`` is the same in all steps of one dt."""
 
-    def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
+    def finish(
+        self,
+        problem: ContactProblem,
+        state: State,
+        step: StepProblem,
+        result: StepResult,
+        dt: float,
+    ) -> State:
         """Return the state of ``problem`` at the end of a step of ``dt`` [s], before the impact law.
 
         ``state`` is the one the step began with, ``step`` what ``step()`` returned for it and ``result`` its certified
@@ -277,8 +303,9 @@ class Recorder(Protocol):
 
         Names are made of letters, digits and underscores; no two recorders of a run have one in common."""
 
-    def start(self, problem: ContactProblem, state: State,
-              resumed: Mapping[str, float] | None = None) -> Mapping[str, Any]:
+    def start(
+        self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
+    ) -> Mapping[str, Any]:
         """Return the row of the initial ``state`` of ``problem``; forget whatever an earlier run has left.
 
         ``resumed``: the last row of the run that a restart continues, from which sums over time go on; else None."""

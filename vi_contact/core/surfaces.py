@@ -99,7 +99,17 @@ class ContactSurface:
 
     def __post_init__(self) -> None:
         """Keep copies that nobody can write to: what is made of them once stays true."""
-        for name in ("points", "normals", "weights", "gap0", "bilateral", "compliance", "owned", "slots", "tangents"):
+        for name in (
+            "points",
+            "normals",
+            "weights",
+            "gap0",
+            "bilateral",
+            "compliance",
+            "owned",
+            "slots",
+            "tangents",
+        ):
             value = getattr(self, name)
             if isinstance(value, np.ndarray) and value.flags.writeable:
                 object.__setattr__(self, name, frozen(value.copy()))
@@ -137,8 +147,11 @@ class ContactSurface:
     @cached_property
     def readable(self) -> tuple[tuple[int, ...], list[Any], tuple[Any, ...]]:
         """Return (m, d - 1), where compiled functions find these arrays, None where all is plain, and the arrays."""
-        kept = (np.ascontiguousarray(self.owned, np.int64), np.ascontiguousarray(self.tangents, np.int64),
-                *((None, None) if self.plain else (self.compliance + 0.0, self.bilateral.copy())))
+        kept = (
+            np.ascontiguousarray(self.owned, np.int64),
+            np.ascontiguousarray(self.tangents, np.int64),
+            *((None, None) if self.plain else (self.compliance + 0.0, self.bilateral.copy())),
+        )
         return self.tangents.shape, [None if one is None else at(one) for one in kept], kept
 
     def everywhere(self, values: NDArray[Any]) -> Any:
@@ -224,7 +237,9 @@ class ContactSurface:
         """Return what the obstacle moves along the tangents between two times, (m, d-1) [m]; None for one at rest."""
         return None if self.slide is None else self.slide(end) - self.slide(start)
 
-    def moving(self, towards: Motion | None = None, along: Motion | None = None) -> "ContactSurface":
+    def moving(
+        self, towards: Motion | None = None, along: Motion | None = None
+    ) -> "ContactSurface":
         """Return the surface on an obstacle that moves: ``towards`` the body and ``along`` the tangents, t [s] -> [m],
         one value for all points or arrays of shape (m,) and (m, d-1), in the order of ``points``. A moving obstacle is
         not turned; its points face the same nodes."""
@@ -234,15 +249,22 @@ class ContactSurface:
             place = f"a moving obstacle: {name}"
 
             def moved(t: float) -> Array:
-                return users(f"{place}({t:g} s)", lambda: _spread(name, way(t), shape, t), np.zeros(shape))
+                return users(
+                    f"{place}({t:g} s)", lambda: _spread(name, way(t), shape, t), np.zeros(shape)
+                )
 
             moved.given = way  # type: ignore[attr-defined]  # what is asked for its frequency
             return moved
 
         watched = tuple(one.before_moving(towards) for one in self.watched)
-        return replace(self, watched=watched,
-                       motion=None if towards is None else spread("towards", towards, (self.count,)),
-                       slide=None if along is None else spread("along", along, (self.count, self.tangents.shape[1])))
+        return replace(
+            self,
+            watched=watched,
+            motion=None if towards is None else spread("towards", towards, (self.count,)),
+            slide=None
+            if along is None
+            else spread("along", along, (self.count, self.tangents.shape[1])),
+        )
 
     def bilateral_everywhere(self) -> "ContactSurface":
         """Return the bilateral comparison case: every point stays on the obstacle."""
@@ -256,24 +278,32 @@ class ContactSurface:
         one group: that of the face with the lowest node numbers). Collective."""
         corners = total(self.comm, len(self.corners))
         if corners and self.comm.rank == 0:
-            log.info("%d contact nodes with several contact directions slide without friction", corners)
+            log.info(
+                "%d contact nodes with several contact directions slide without friction", corners
+            )
         return replace(self, frictionless_corners=True)
 
     def on_springs(self, stiffness: float) -> "ContactSurface":
         """Return the surface on a linearly deformable support of foundation modulus ``stiffness`` [Pa/m].
 
         Each point presses a fictitious spring k = stiffness * weight, whose far end obeys the unilateral law."""
-        stiffness = number("on_springs", "the foundation modulus", stiffness, positive=True, unit="Pa/m")
+        stiffness = number(
+            "on_springs", "the foundation modulus", stiffness, positive=True, unit="Pa/m"
+        )
         return replace(self, compliance=1.0 / (stiffness * self.weights))
 
 
 def _spread(name: str, value: Any, shape: tuple[int, ...], t: float) -> Array:
     """A value for all points, or one for each; InputError for what are no finite metres."""
     found = np.asarray(value)
-    alike = all(n in (1, m) for n, m in zip(found.shape[::-1], shape[::-1], strict=False)) and found.ndim <= len(shape)
+    alike = all(
+        n in (1, m) for n, m in zip(found.shape[::-1], shape[::-1], strict=False)
+    ) and found.ndim <= len(shape)
     if found.dtype.kind not in "iuf" or not alike or not np.all(np.isfinite(found)):
-        raise InputError(f"a moving obstacle: {name}({t:g} s) is {shown(value)}; return finite metres, one number or "
-                         f"an array of shape {shape}")
+        raise InputError(
+            f"a moving obstacle: {name}({t:g} s) is {shown(value)}; return finite metres, one number or "
+            f"an array of shape {shape}"
+        )
     return np.broadcast_to(found.astype(float), shape)
 
 
@@ -282,7 +312,10 @@ def same_node(nodes: Indices) -> tuple[Indices, ...]:
     order = np.argsort(nodes, kind="stable")
     _, first, counts = np.unique(nodes[order], return_index=True, return_counts=True)
     several = counts > 1
-    return tuple(order[at : at + k] for at, k in zip(first[several].tolist(), counts[several].tolist(), strict=True))
+    return tuple(
+        order[at : at + k]
+        for at, k in zip(first[several].tolist(), counts[several].tolist(), strict=True)
+    )
 
 
 def nodal_frames(directions: Array) -> Array:
@@ -313,7 +346,9 @@ def nodal_blocks(frames: Array) -> tuple[Indices, Array]:
     size = np.abs(directions)
     normal = np.argmax(size, axis=1)
     size[every, normal] = np.inf
-    others = np.argsort(size, axis=1, kind="stable")[:, :-1]  # the first tangent is made of the axis least aligned
+    others = np.argsort(size, axis=1, kind="stable")[
+        :, :-1
+    ]  # the first tangent is made of the axis least aligned
     blocks = np.tile(np.eye(d), (k, 1, 1))
     turned = np.count_nonzero(directions, axis=1) > 1
     blocks[every[turned, None], :, others[turned]] = frames[turned, :, 1:].swapaxes(1, 2)
@@ -330,7 +365,15 @@ def tangential_columns(column: Indices, d: int) -> Indices:
 def empty_surface(comm: Comm, dimension: int) -> ContactSurface:
     """Return a surface without any contact: the linear comparison case."""
     none = np.zeros(0, dtype=np.int64)
-    return ContactSurface(comm=comm, points=np.zeros((0, dimension)), normals=np.zeros((0, dimension)),
-                          weights=np.zeros(0), gap0=np.zeros(0), bilateral=np.zeros(0, dtype=bool),
-                          compliance=np.zeros(0), owned=none, slots=none,
-                          tangents=np.zeros((0, max(dimension - 1, 0)), dtype=np.int64))
+    return ContactSurface(
+        comm=comm,
+        points=np.zeros((0, dimension)),
+        normals=np.zeros((0, dimension)),
+        weights=np.zeros(0),
+        gap0=np.zeros(0),
+        bilateral=np.zeros(0, dtype=bool),
+        compliance=np.zeros(0),
+        owned=none,
+        slots=none,
+        tangents=np.zeros((0, max(dimension - 1, 0)), dtype=np.int64),
+    )

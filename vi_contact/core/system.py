@@ -50,7 +50,12 @@ class Space(Protocol):
 
 
 OTHERS = 4  # surfaces and the like of which factors are kept
-KEPT = {"M": 6, "C": 4, "K": 2, "load": 2}  # products with each: what a step and the next one may ask for again
+KEPT = {
+    "M": 6,
+    "C": 4,
+    "K": 2,
+    "load": 2,
+}  # products with each: what a step and the next one may ask for again
 PAIR = "give pairs of a vector [N] and a function of the time"
 
 
@@ -71,7 +76,9 @@ class Load:
     def __post_init__(self) -> None:
         array("Load", "constant", self.constant, (None,), unit="N")
         for name in ("separable", "general", "viscous", "inertial"):
-            for part in several("Load", name, getattr(self, name), "give a tuple of functions of the time"):
+            for part in several(
+                "Load", name, getattr(self, name), "give a tuple of functions of the time"
+            ):
                 if name != "separable":
                     function("Load", f"a part of {name}", part, "give a function of the time [s]")
                 elif len(several("Load", "a part of separable", part, PAIR)) != 2:
@@ -95,8 +102,12 @@ class Load:
 
     def in_basis(self, T: Matrix) -> "Load":
         """Return the same load on the unknowns û of u = T û: Tᵀ f."""
-        separable = tuple((T.transpose_apply(vector), history) for vector, history in self.separable)
-        moving = (_turned(T, functions) for functions in (self.general, self.viscous, self.inertial))
+        separable = tuple(
+            (T.transpose_apply(vector), history) for vector, history in self.separable
+        )
+        moving = (
+            _turned(T, functions) for functions in (self.general, self.viscous, self.inertial)
+        )
         return Load(T.transpose_apply(self.constant), separable, *moving)
 
     def handed_over(self, P: Matrix) -> "Load":
@@ -118,7 +129,9 @@ def history_value(history: Callable[[float], float], t: float) -> float:
     return value
 
 
-def _turned(T: Matrix, functions: Sequence[Callable[[float], Array]]) -> tuple[Callable[[float], Array], ...]:
+def _turned(
+    T: Matrix, functions: Sequence[Callable[[float], Array]]
+) -> tuple[Callable[[float], Array], ...]:
     def turned(function: Callable[[float], Array]) -> Callable[[float], Array]:
         return lambda t: T.transpose_apply(function(t))
 
@@ -164,25 +177,49 @@ class SemiDiscreteSystem:
     absolute: bool = False
     companions: tuple[Companion, ...] = ()
     _cache: dict[str, Any] = field(init=False, default_factory=dict, compare=False, repr=False)
-    _products: dict[str, Remembered] = field(init=False, default_factory=dict, compare=False, repr=False)
+    _products: dict[str, Remembered] = field(
+        init=False, default_factory=dict, compare=False, repr=False
+    )
 
     def __post_init__(self) -> None:
         for name in ("M", "K") if self.C is None else ("M", "K", "C"):
             remedy = "give a SerialMatrix(…) or a PetscMatrix(…)"
-            provides("SemiDiscreteSystem", name, getattr(self, name), ("rows", "transpose_apply"), remedy)
+            provides(
+                "SemiDiscreteSystem", name, getattr(self, name), ("rows", "transpose_apply"), remedy
+            )
         names = ("combine", "factor", "dot", "comm")
-        provides("SemiDiscreteSystem", "algebra", self.algebra, names, "give SerialAlgebra() or PetscAlgebra(comm)")
+        provides(
+            "SemiDiscreteSystem",
+            "algebra",
+            self.algebra,
+            names,
+            "give SerialAlgebra() or PetscAlgebra(comm)",
+        )
         instance("SemiDiscreteSystem", "load", self.load, Load, "give Load(constant, …)")
-        provides("SemiDiscreteSystem", "space", self.space, ("dimension", "ids"), "give a space, what unknowns mean")
+        provides(
+            "SemiDiscreteSystem",
+            "space",
+            self.space,
+            ("dimension", "ids"),
+            "give a space, what unknowns mean",
+        )
         for name, axes in (("u0", 1), ("v0", 1), ("influence", 2)):
             value = getattr(self, name)
-            if not isinstance(value, np.ndarray) or value.ndim != axes or value.dtype.kind not in "iuf":
-                raise InputError(f"SemiDiscreteSystem: {name} is {shown(value)}; give real numbers along {axes} axes")
+            if (
+                not isinstance(value, np.ndarray)
+                or value.ndim != axes
+                or value.dtype.kind not in "iuf"
+            ):
+                raise InputError(
+                    f"SemiDiscreteSystem: {name} is {shown(value)}; give real numbers along {axes} axes"
+                )
 
     def __repr__(self) -> str:
         """Return what it is, in words: not the arrays."""
         kind = f"{'un' if self.C is None else ''}damped, {'floating' if self.floating else 'supported'}"
-        return f"SemiDiscreteSystem({self.space.unknowns} unknowns in {self.space.dimension}D, {kind})"
+        return (
+            f"SemiDiscreteSystem({self.space.unknowns} unknowns in {self.space.dimension}D, {kind})"
+        )
 
     @property
     def rows(self) -> int:
@@ -272,7 +309,9 @@ class SemiDiscreteSystem:
             return total
 
         A, inertia = self.algebra.combine(terms), (m, self.M)
-        return EffectiveMatrix(A, self.algebra, space=self.space, inertia=inertia, image=image if shares else None)
+        return EffectiveMatrix(
+            A, self.algebra, space=self.space, inertia=inertia, image=image if shares else None
+        )
 
     def with_load(self, *terms: tuple[Array, Callable[[float], float]]) -> "SemiDiscreteSystem":
         """Return the same system with separable loads vector * history(t) added."""
@@ -303,10 +342,16 @@ class SemiDiscreteSystem:
 
     def _in_unknowns(self, T: Matrix, inverse: Callable[[Array], Array]) -> "SemiDiscreteSystem":
         turn = self.algebra.congruence
-        return self.changed(M=turn(T, self.M), C=None if self.C is None else turn(T, self.C), K=turn(T, self.K),
-                            load=self.load.in_basis(T), influence=_columns(self.influence, inverse),
-                            base_mass=_columns(self.base_mass, T.transpose_apply), u0=inverse(self.u0),
-                            v0=inverse(self.v0))
+        return self.changed(
+            M=turn(T, self.M),
+            C=None if self.C is None else turn(T, self.C),
+            K=turn(T, self.K),
+            load=self.load.in_basis(T),
+            influence=_columns(self.influence, inverse),
+            base_mass=_columns(self.base_mass, T.transpose_apply),
+            u0=inverse(self.u0),
+            v0=inverse(self.v0),
+        )
 
 
 def _columns(values: Array | None, apply: Callable[[Array], Array]) -> Array | None:

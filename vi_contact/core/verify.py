@@ -26,8 +26,9 @@ def kkt_residual(step: StepProblem, result: StepResult) -> Certificate:
     return _judged(step, result, _sizes(step, result)[0])
 
 
-def kkt_residuals(many: StepProblem, result: StepResult,
-                  own: Callable[[int], tuple[StepProblem, StepResult]]) -> list[Certificate]:
+def kkt_residuals(
+    many: StepProblem, result: StepResult, own: Callable[[int], tuple[StepProblem, StepResult]]
+) -> list[Certificate]:
     """Return the certificate of each of several steps on one rank, whose rows these hold; ``own`` makes one of each."""
     rubs, rows = many.slip0 is not None, enumerate(_sizes(many, result))
     return [_judged(*(own(row) if rubs else (many, result)), sizes) for row, sizes in rows]
@@ -37,7 +38,11 @@ def _sizes(step: StepProblem, result: StepResult) -> list[list[float]]:
     """The largest sizes in the definitions, over all ranks, of each step in rows; infinite for NaN, which would go."""
     comm, functions = step.surface.comm, already()
     Ax = step.A.image(result.x)
-    found = _sizes_in_numpy(step, result, Ax) if functions is None else _sizes_compiled(step, result, Ax, functions)
+    found = (
+        _sizes_in_numpy(step, result, Ax)
+        if functions is None
+        else _sizes_compiled(step, result, Ax, functions)
+    )
     return (found if comm.size == 1 else comm.max(found)).tolist()
 
 
@@ -45,12 +50,15 @@ def _sizes_compiled(step: StepProblem, result: StepResult, Ax: Array, functions:
     counts, fixed, _ = step.surface.readable
     arrays = Ax, step.b, result.x, step.guess, step.bound, result.r_n, result.r_t, result.active
     (*places, room, found), kept = _places(step.A.desk, counts, arrays)
-    functions.largest(len(kept[-1]), Ax.shape[-1], *counts, *places, c_double(step.scale), *fixed, room, found)
+    functions.largest(
+        len(kept[-1]), Ax.shape[-1], *counts, *places, c_double(step.scale), *fixed, room, found
+    )
     return np.asarray(kept[-1])
 
 
-def _places(desk: dict[Any, tuple[list[Any], list[Any]]], counts: tuple[int, ...],
-            arrays: tuple[Any, ...]) -> tuple[list[Any], list[Any]]:
+def _places(
+    desk: dict[Any, tuple[list[Any], list[Any]]], counts: tuple[int, ...], arrays: tuple[Any, ...]
+) -> tuple[list[Any], list[Any]]:
     """Where compiled functions find the arrays, room and sizes, and what lies there, of their types and sizes whatever
     a solver gave: copies on the desk where they are small, which takes less than to ask numpy where an array lies."""
     shapes = tuple([None if one is None else one.shape for one in arrays])
@@ -62,8 +70,12 @@ def _places(desk: dict[Any, tuple[list[Any], list[Any]]], counts: tuple[int, ...
     *rows, n = arrays[0].shape
     small = arrays[0].size <= COPIED
     forms = *[(*rows, n)] * 4, counts[:1], (*rows, counts[0]), (*rows, *counts), (*rows, counts[0])
-    kept = [None if one is None else (np.array if small else np.asarray)(np.broadcast_to(one, form), kind, order="C")
-            for one, form, kind in zip(arrays, forms, [float] * 7 + [bool], strict=True)]
+    kept = [
+        None
+        if one is None
+        else (np.array if small else np.asarray)(np.broadcast_to(one, form), kind, order="C")
+        for one, form, kind in zip(arrays, forms, [float] * 7 + [bool], strict=True)
+    ]
     kept += [np.empty(n), np.empty((math.prod(rows), 10))]
     made = [None if one is None else at(one) for one in kept], kept
     if small:
@@ -77,10 +89,24 @@ def _sizes_in_numpy(step: StepProblem, result: StepResult, Ax: Array) -> Array:
         residual.T[surface.owned] += r_n.T
     else:
         residual += surface.reaction_load(r_n, x.shape[-1], result.r_t)
-    gap, held, closed = step.bound - surface.normal_values(x), surface.bilateral, result.active | surface.bilateral
+    gap, held, closed = (
+        step.bound - surface.normal_values(x),
+        surface.bilateral,
+        result.active | surface.bilateral,
+    )
     gap += surface.compliance * r_n / step.scale
     signed = [np.where(held, 0.0, np.minimum(one, 0.0)) for one in (gap, r_n)]
-    arrays = (residual, step.b, Ax, x, step.guess, r_n, np.where(closed, gap, 0.0), np.where(closed, 0.0, r_n), *signed)
+    arrays = (
+        residual,
+        step.b,
+        Ax,
+        x,
+        step.guess,
+        r_n,
+        np.where(closed, gap, 0.0),
+        np.where(closed, 0.0, r_n),
+        *signed,
+    )
     sizes = [np.maximum(one.max(-1, initial=0.0), -one.min(-1, initial=0.0)) for one in arrays]
     return np.nan_to_num(np.atleast_2d(np.array(sizes).T), nan=np.inf, posinf=np.inf)
 
@@ -91,10 +117,14 @@ def _judged(step: StepProblem, result: StepResult, maxima: list[float]) -> Certi
     x_ref, r_ref = max(x_max, guess_max), max(b_max, r_max)
     cone, dissipation = _friction_residuals(step, result, x_ref, r_ref)
     away, loose = _over(apart, x_ref), _over(open_force, r_ref)
-    return Certificate(equilibrium=_over(residual_max, max(b_max, Ax_max, ROUNDED * step.A.largest * x_max)),
-                       penetration=_over(behind, x_ref), tension=_over(pull, r_ref),
-                       complementarity=away if away >= loose or np.isnan(away) else loose,  # keeps NaN
-                       cone=cone, dissipation=dissipation)
+    return Certificate(
+        equilibrium=_over(residual_max, max(b_max, Ax_max, ROUNDED * step.A.largest * x_max)),
+        penetration=_over(behind, x_ref),
+        tension=_over(pull, r_ref),
+        complementarity=away if away >= loose or np.isnan(away) else loose,  # keeps NaN
+        cone=cone,
+        dissipation=dissipation,
+    )
 
 
 def _maxima(step: StepProblem, *arrays: Array) -> list[float]:
@@ -104,7 +134,9 @@ def _maxima(step: StepProblem, *arrays: Array) -> list[float]:
     return sizes if comm.size == 1 else comm.max(np.array(sizes)).tolist()
 
 
-def _friction_residuals(step: StepProblem, result: StepResult, x_ref: float, r_ref: float) -> tuple[float, float]:
+def _friction_residuals(
+    step: StepProblem, result: StepResult, x_ref: float, r_ref: float
+) -> tuple[float, float]:
     """(cone, dissipation) of ``Certificate``; zero without friction."""
     if step.slip0 is None:
         return 0.0, 0.0
@@ -141,7 +173,9 @@ class StepEnergy:
     @property
     def defect(self) -> float:
         """Return what the ledger cannot explain; rounding and the tolerance of the solver when it was solved."""
-        return self.change - (self.input - self.damping - self.contact - self.friction - self.algorithmic)
+        return self.change - (
+            self.input - self.damping - self.contact - self.friction - self.algorithmic
+        )
 
 
 @dataclass(frozen=True)
@@ -166,14 +200,23 @@ def energies(system: SemiDiscreteSystem, u: Array, v: Array) -> Energies:
     return Energies(momentum, elastic, 0.5 * kinetic, 0.5 * strain)
 
 
-def _dots(system: SemiDiscreteSystem, *pairs: tuple[Array, Array], sums: tuple[float, ...] = ()) -> list[float]:
+def _dots(
+    system: SemiDiscreteSystem, *pairs: tuple[Array, Array], sums: tuple[float, ...] = ()
+) -> list[float]:
     """Inner products, and sums over the ranks, with one reduction for all."""
     comm, found = system.algebra.comm, [*[float(x.dot(y)) for x, y in pairs], *sums]
     return found if comm.size == 1 else comm.sum(np.array(found)).tolist()
 
 
-def energy_balance(problem: ContactProblem, old: State, new: State, balance: Balance, *, before: Energies | None = None,
-                   after: Energies | None = None) -> StepEnergy:
+def energy_balance(
+    problem: ContactProblem,
+    old: State,
+    new: State,
+    balance: Balance,
+    *,
+    before: Energies | None = None,
+    after: Energies | None = None,
+) -> StepEnergy:
     """Return the ledger of a step before the impact law, for any scheme.
 
     The step satisfied M a + C v + K u = f - B_nᵀ r_n - B_tᵀ r_t with the averages of ``balance``. Times the increment
@@ -188,20 +231,41 @@ def energy_balance(problem: ContactProblem, old: State, new: State, balance: Bal
     after = after or energies(system, new.u, new.v)
     du = new.u - old.u
     pushed, dragged = _obstacle_work(problem, old.t, new.t, balance)
-    rubbing = 0.0 if balance.r_t is None else float(np.sum(balance.r_t * surface.tangential_values(du)))
+    rubbing = (
+        0.0 if balance.r_t is None else float(np.sum(balance.r_t * surface.tangential_values(du)))
+    )
     work, inertia, kinetic, stiffness, lost, *local = _dots(
-        system, (du, balance.f), (du, system.product("M", balance.a)),
+        system,
+        (du, balance.f),
+        (du, system.product("M", balance.a)),
         (0.5 * (old.v + new.v), after.momentum - before.momentum),
-        (balance.u - 0.5 * (old.u + new.u), after.elastic - before.elastic), (balance.r_n, surface.normal_values(du)),
-        sums=(rubbing, pushed, dragged, 0.0 if system.C is None else float(du.dot(system.product("C", balance.v)))))
+        (balance.u - 0.5 * (old.u + new.u), after.elastic - before.elastic),
+        (balance.r_n, surface.normal_values(du)),
+        sums=(
+            rubbing,
+            pushed,
+            dragged,
+            0.0 if system.C is None else float(du.dot(system.product("C", balance.v))),
+        ),
+    )
     rubbing, pushed, dragged, damping = local
-    return StepEnergy(change=after.total - before.total, input=work + pushed + dragged, damping=damping,
-                      contact=lost + pushed, friction=rubbing + dragged, algorithmic=inertia - kinetic + stiffness)
+    return StepEnergy(
+        change=after.total - before.total,
+        input=work + pushed + dragged,
+        damping=damping,
+        contact=lost + pushed,
+        friction=rubbing + dragged,
+        algorithmic=inertia - kinetic + stiffness,
+    )
 
 
-def _obstacle_work(problem: ContactProblem, start: float, end: float, balance: Balance) -> tuple[float, float]:
+def _obstacle_work(
+    problem: ContactProblem, start: float, end: float, balance: Balance
+) -> tuple[float, float]:
     """Work that a moving obstacle does on the body on this rank, (normal, tangential): r_n·advance and -r_t·sliding."""
     advance, sliding = problem.surface.advance(start, end), problem.surface.sliding(start, end)
     pushed = 0.0 if advance is None else float(balance.r_n @ advance)
-    dragged = 0.0 if sliding is None or balance.r_t is None else -float(np.sum(balance.r_t * sliding))
+    dragged = (
+        0.0 if sliding is None or balance.r_t is None else -float(np.sum(balance.r_t * sliding))
+    )
     return pushed, dragged

@@ -18,4 +18,22 @@ from .racking import Racking as Racking
 from .resultants import Resultants as Resultants
 from .resultants import contact_summary as contact_summary
 
-__all__: list[str] = ['Check', 'Comparison', 'FirstModes', 'Loop', 'Peak', 'Racking', 'Resultants', 'TransferFunction', 'contact_summary', 'first_modes', 'floor_spectrum', 'hysteresis', 'lowest_frequency', 'peaks', 'recorded_motion', 'transfer_function', 'write_peaks']
+__all__: list[str] = [
+    "Check",
+    "Comparison",
+    "FirstModes",
+    "Loop",
+    "Peak",
+    "Racking",
+    "Resultants",
+    "TransferFunction",
+    "contact_summary",
+    "first_modes",
+    "floor_spectrum",
+    "hysteresis",
+    "lowest_frequency",
+    "peaks",
+    "recorded_motion",
+    "transfer_function",
+    "write_peaks",
+]

@@ -31,17 +31,23 @@ def recorded_motion(history: Mapping[str, Array], column: str, *, relative: bool
     ``relative``: minus the ground acceleration a_g_<axis> of the run. InputError for columns that are no accelerations.
     """
     flag("recorded_motion", "relative", relative)
-    instance("recorded_motion", "column", column, str, "give the name of a column, such as 'a_x_top'")
+    instance(
+        "recorded_motion", "column", column, str, "give the name of a column, such as 'a_x_top'"
+    )
     kind, _, rest = column.partition("_")
     axis = rest.partition("_")[2 if rest.startswith("g_") else 0]
     if kind not in ("a", "v") or "_" not in rest:
-        raise InputError(f"column '{column}' is not an acceleration: record Probe(..., acceleration=True) "
-                         "and give a_x_<label>, or give a_g_x for the ground")
+        raise InputError(
+            f"column '{column}' is not an acceleration: record Probe(..., acceleration=True) "
+            "and give a_x_<label>, or give a_g_x for the ground"
+        )
     values, t = column_of(history, column), column_of(history, "t")
     if len(t) < 3:
         raise InputError(f"the history has {len(t)} rows: give one of three or more")
     ground = np.asarray(history.get(f"a_g_{axis}", np.zeros(len(t))), dtype=float)
-    ground = np.append(ground[:1], 0.5 * (ground[1:] + ground[:-1]))  # mean over the step, as probes have it
+    ground = np.append(
+        ground[:1], 0.5 * (ground[1:] + ground[:-1])
+    )  # mean over the step, as probes have it
     if kind == "v":
         values = np.append(0.0, np.diff(values) / np.diff(t)) + ground
     elif column == f"a_g_{axis}":
@@ -55,13 +61,27 @@ def recorded_motion(history: Mapping[str, Array], column: str, *, relative: bool
         even = t[0] + dt * np.arange(int(np.floor(asked)) + 1)
         values = np.interp(even, t, values)
     frame = "relative" if relative else "absolute"
-    return Record(values, dt, title=f"{column}, {frame}", source=column, notes=(f"{frame} acceleration of a run",))
+    return Record(
+        values,
+        dt,
+        title=f"{column}, {frame}",
+        source=column,
+        notes=(f"{frame} acceleration of a run",),
+    )
 
 
-def floor_spectrum(history: Mapping[str, Array], column: str, periods: Array, *, damping: float = 0.05,
-                   relative: bool = False) -> ResponseSpectrum:
+def floor_spectrum(
+    history: Mapping[str, Array],
+    column: str,
+    periods: Array,
+    *,
+    damping: float = 0.05,
+    relative: bool = False,
+) -> ResponseSpectrum:
     """Return the response spectrum of an oscillator of each period [s] standing where the column was recorded."""
-    return response_spectrum(recorded_motion(history, column, relative=relative), periods, damping=damping)
+    return response_spectrum(
+        recorded_motion(history, column, relative=relative), periods, damping=damping
+    )
 
 
 @dataclass(frozen=True)
@@ -78,9 +98,15 @@ class TransferFunction:
         return float(self.frequencies[k]), float(self.amplitude[k])
 
 
-def transfer_function(history: Mapping[str, Array], surface: str, base: str = "a_g_x", *,
-                      frequencies: Array | None = None, bandwidth: float | None = BANDWIDTH,
-                      floor: float = 1e-3) -> TransferFunction:
+def transfer_function(
+    history: Mapping[str, Array],
+    surface: str,
+    base: str = "a_g_x",
+    *,
+    frequencies: Array | None = None,
+    bandwidth: float | None = BANDWIDTH,
+    floor: float = 1e-3,
+) -> TransferFunction:
     """Return |A_surface(f)| / |A_base(f)| of absolute accelerations, from the Fourier amplitudes of two columns.
 
     Amplitudes are smoothed alike with Konno and Ohmachi's window (1998), which widens peaks, before they are divided;
@@ -95,22 +121,34 @@ def transfer_function(history: Mapping[str, Array], surface: str, base: str = "a
     if frequencies is None:
         wanted = raw if bandwidth is None else np.geomspace(4.0 * raw[0], 0.5 * raw[-1], 200)
     else:
-        wanted = array("transfer_function", "frequencies", np.atleast_1d(np.asarray(frequencies)), (None,), unit="Hz")
+        wanted = array(
+            "transfer_function",
+            "frequencies",
+            np.atleast_1d(np.asarray(frequencies)),
+            (None,),
+            unit="Hz",
+        )
     if np.any(wanted <= 0.0) or np.any(wanted > raw[-1] * (1.0 + 1e-9)):
-        raise InputError(f"transfer_function: give frequencies above 0 and up to {raw[-1]:.4g} Hz, half the sampling")
+        raise InputError(
+            f"transfer_function: give frequencies above 0 and up to {raw[-1]:.4g} Hz, half the sampling"
+        )
     if bandwidth is None:
         smooth = [np.interp(wanted, raw, one) for one in spectra]
     else:
         smooth = [konno_ohmachi(raw, one, wanted, bandwidth=bandwidth) for one in spectra]
     largest = float(spectra[1].max())
     if not largest > 0.0:
-        raise InputError(f"transfer_function: column '{base}' is zero throughout: name the motion at the base")
+        raise InputError(
+            f"transfer_function: column '{base}' is zero throughout: name the motion at the base"
+        )
     ratio = np.full(len(wanted), np.nan)
     np.divide(smooth[0], smooth[1], out=ratio, where=smooth[1] > floor * smooth[1].max())
     return TransferFunction(wanted, ratio)
 
 
-def konno_ohmachi(frequencies: Array, amplitudes: Array, centres: Array, *, bandwidth: float = BANDWIDTH) -> Array:
+def konno_ohmachi(
+    frequencies: Array, amplitudes: Array, centres: Array, *, bandwidth: float = BANDWIDTH
+) -> Array:
     """Smooth amplitudes at the centres with the weights (sin x / x)⁴, x = b log10(f / f_c) (Konno, Ohmachi 1998)."""
     smooth = np.empty(len(centres))
     for k, centre in enumerate(centres):

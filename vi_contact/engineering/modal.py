@@ -7,7 +7,10 @@ from ..core.checks import instance, whole
 from ..core.errors import InputError
 from ..core.system import SemiDiscreteSystem
 
-SHIFT, RIGID = 1e-6, 1e-13  # of the largest K_ii / M_ii: added to K; below the other a motion is rigid
+SHIFT, RIGID = (
+    1e-6,
+    1e-13,
+)  # of the largest K_ii / M_ii: added to K; below the other a motion is rigid
 
 
 def lowest_frequency(system: SemiDiscreteSystem, *, max_iterations: int = 2000) -> float:
@@ -16,10 +19,18 @@ def lowest_frequency(system: SemiDiscreteSystem, *, max_iterations: int = 2000) 
     The start vector is the static answer to a uniform acceleration in all directions: deterministic, and not
     orthogonal to the first mode of structures that a base motion can excite.
     Raises InputError for a floating body (K singular) and when the iteration does not settle."""
-    instance("lowest_frequency", "system", system, SemiDiscreteSystem, "give a system, such as fem.assemble returns")
+    instance(
+        "lowest_frequency",
+        "system",
+        system,
+        SemiDiscreteSystem,
+        "give a system, such as fem.assemble returns",
+    )
     whole("lowest_frequency", "max_iterations", max_iterations, least=1)
     if system.floating:
-        raise InputError("the body is not held, so its lowest frequency is zero: clamp a part of it")
+        raise InputError(
+            "the body is not held, so its lowest frequency is zero: clamp a part of it"
+        )
     dot = system.algebra.dot
     factor = system.algebra.factor(system.K)
     force = system.M @ (system.influence @ (1.0 + 0.1 * np.arange(system.influence.shape[1])))
@@ -33,12 +44,15 @@ def lowest_frequency(system: SemiDiscreteSystem, *, max_iterations: int = 2000) 
         if abs(square - last) <= 1e-15 * square:
             break
     if not abs(square - last) <= 1e-10 * square:
-        raise InputError("the lowest frequency did not settle: give a larger max_iterations, or the frequency")
+        raise InputError(
+            "the lowest frequency did not settle: give a larger max_iterations, or the frequency"
+        )
     return float(np.sqrt(square)) / (2.0 * np.pi)
 
 
-def natural_modes(algebra: Algebra, K: Matrix, M: Matrix, *, count: int = 3,
-                  rigid: int = 0) -> tuple[Array, Array, int]:
+def natural_modes(
+    algebra: Algebra, K: Matrix, M: Matrix, *, count: int = 3, rigid: int = 0
+) -> tuple[Array, Array, int]:
     """Return (lowest frequencies above zero [Hz], ascending; their modes phi, (rows, k), of this rank's rows; number of
     rigid motions) of K phi = (2 pi f)² M phi.
 
@@ -47,7 +61,10 @@ def natural_modes(algebra: Algebra, K: Matrix, M: Matrix, *, count: int = 3,
     from scipy.sparse import vstack  # late: no step needs it
     from scipy.sparse.linalg import LinearOperator, eigsh
 
-    parts, found = algebra.comm.gather([algebra.entries(A, np.arange(A.rows)) for A in (K, M)]), None
+    parts, found = (
+        algebra.comm.gather([algebra.entries(A, np.arange(A.rows)) for A in (K, M)]),
+        None,
+    )
     if parts is not None:
         k, m = (vstack(rows).tocsc() for rows in zip(*parts, strict=True))
         mass, n = m.diagonal(), k.shape[0]
@@ -58,7 +75,11 @@ def natural_modes(algebra: Algebra, K: Matrix, M: Matrix, *, count: int = 3,
         order = np.argsort(squares)
         squares, vectors = squares[order], vectors[:, order]
         elastic = np.flatnonzero(squares > RIGID * scale)[:count]
-        found = squares[elastic], vectors[:, elastic], int(np.count_nonzero(squares <= RIGID * scale))
+        found = (
+            squares[elastic],
+            vectors[:, elastic],
+            int(np.count_nonzero(squares <= RIGID * scale)),
+        )
     squares, vectors, free = algebra.comm.bcast(found)
     first = algebra.first(K.rows)
     return np.sqrt(squares) / (2.0 * np.pi), vectors[first : first + K.rows], free

@@ -31,7 +31,9 @@ class Peak:
     t_min: float
 
 
-def peaks(history: Mapping[str, Array], columns: Columns, names: Sequence[str] | None = None) -> list[Peak]:
+def peaks(
+    history: Mapping[str, Array], columns: Columns, names: Sequence[str] | None = None
+) -> list[Peak]:
     """Return the peaks of these columns, of all columns of numbers but the counters when None. nan values are left out.
 
     The peak of an acceleration is that of the time step where contact closes, and is marked so: it grows as dt falls,
@@ -40,7 +42,11 @@ def peaks(history: Mapping[str, Array], columns: Columns, names: Sequence[str] |
     for kind, one in (("history", history), ("columns", columns)):
         instance("peaks", kind, one, Mapping, f"give the {kind} of a solution")
     if names is None:
-        names = [name for name in columns if name not in _NOT_PEAKS and name in history and history[name].ndim == 1]
+        names = [
+            name
+            for name in columns
+            if name not in _NOT_PEAKS and name in history and history[name].ndim == 1
+        ]
     found = []
     for name in several("peaks", "names", names, "give a list of columns, or None"):
         values, t = column_of(history, name), history["t"]
@@ -79,7 +85,9 @@ class Loop:
         return float((self.force[high] - self.force[low]) / way) if way > 0.0 else float("nan")
 
 
-def hysteresis(history: Mapping[str, Array], deformation: str, force: str, *, sign: float = 1.0) -> Loop:
+def hysteresis(
+    history: Mapping[str, Array], deformation: str, force: str, *, sign: float = 1.0
+) -> Loop:
     """Return the loop of two columns: base shear over top displacement, shear over racking, M over theta.
 
     ``sign`` = -1 turns the force: reactions on the body push against its deformation. InputError for missing columns.

@@ -25,8 +25,12 @@ def racking(corners: ArrayLike, displacements: Array) -> tuple[Array, Array]:
     gram = arms.T @ arms
     if np.linalg.eigvalsh(gram)[0] <= 1e-12 * np.trace(gram):
         raise InputError("Racking: the four corners are on one line: give the corners of a frame")
-    gradient = np.einsum("...ki,kj->...ij", np.asarray(displacements, dtype=float), arms @ np.linalg.inv(gram))
-    return gradient[..., 0, 1] + gradient[..., 1, 0], 0.5 * (gradient[..., 1, 0] - gradient[..., 0, 1])
+    gradient = np.einsum(
+        "...ki,kj->...ij", np.asarray(displacements, dtype=float), arms @ np.linalg.inv(gram)
+    )
+    return gradient[..., 0, 1] + gradient[..., 1, 0], 0.5 * (
+        gradient[..., 1, 0] - gradient[..., 0, 1]
+    )
 
 
 @dataclass
@@ -39,9 +43,17 @@ class Racking:
     frames: Mapping[str, Sequence[Sequence[float]]]
 
     def __post_init__(self) -> None:
-        instance("Racking", "frames", self.frames, Mapping, "give labels and four corners each, {'box': [(x, y), …]}")
+        instance(
+            "Racking",
+            "frames",
+            self.frames,
+            Mapping,
+            "give labels and four corners each, {'box': [(x, y), …]}",
+        )
         if not self.frames:
-            raise InputError("Racking: frames is empty; give labels and four corners each, or leave it out")
+            raise InputError(
+                "Racking: frames is empty; give labels and four corners each, or leave it out"
+            )
         for label, corners in self.frames.items():
             column_name("racking label", label)
             meaning = f"the table of four corners '{label}'"
@@ -52,15 +64,24 @@ class Racking:
         found = {}
         for label in self.frames:
             found[f"racking_{label}"] = ("rad", f"racking du_x/dy + du_y/dx of frame {label}")
-            found[f"rotation_{label}"] = ("rad", f"rotation of frame {label}, anticlockwise positive")
+            found[f"rotation_{label}"] = (
+                "rad",
+                f"rotation of frame {label}, anticlockwise positive",
+            )
         return found
 
-    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
+    def start(
+        self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
+    ) -> Row:
         """Find the nodes."""
         self._problem, space = problem, problem.system.space
         if space.dimension != 2:
-            raise InputError(f"Racking is for plane bodies and this one has {space.dimension} dimensions: leave it out")
-        self._nodes = {k: space.find_nodes(np.asarray(corners, float)) for k, corners in self.frames.items()}
+            raise InputError(
+                f"Racking is for plane bodies and this one has {space.dimension} dimensions: leave it out"
+            )
+        self._nodes = {
+            k: space.find_nodes(np.asarray(corners, float)) for k, corners in self.frames.items()
+        }
         return self._row(state)
 
     def row(self, report: Report) -> Row:

@@ -47,7 +47,9 @@ DETERMINED = 1e-9  # of the largest singular value of the rigid modes of a part:
 def check_part(name: str, centre: Any, where: Any, normal: Any) -> None:
     """Raise InputError unless centre and direction are numbers and the mask is a function."""
     optional(array, f"part '{name}'", "the centre", centre, (None,), unit="metres")
-    optional(function, f"part '{name}'", "where", where, "give a function of points and normals, or None")
+    optional(
+        function, f"part '{name}'", "where", where, "give a function of points and normals, or None"
+    )
     optional(array, f"part '{name}'", "normal", normal, (None,))
 
 
@@ -59,21 +61,40 @@ class Part:
     ``centre`` None: the middle of the part by weight, at the level of its lowest point.
     ``slots``: the numbers of the conditions whose share in it is held; those of one rank, all when None."""
 
-    def __init__(self, name: str, geometry: Geometry, centre: Sequence[float] | None, where: Where | None,
-                 normal: Sequence[float] | None, slots: Indices | None = None) -> None:
+    def __init__(
+        self,
+        name: str,
+        geometry: Geometry,
+        centre: Sequence[float] | None,
+        where: Where | None,
+        normal: Sequence[float] | None,
+        slots: Indices | None = None,
+    ) -> None:
         check_part(name, centre, where, normal)
         points, normals = geometry.points, geometry.normals
         given = np.ones(len(points), dtype=bool) if where is None else where(points, normals)
-        chosen = mask(f"part '{name}'", "what where(points, normals) returns", given, (len(points),))
+        chosen = mask(
+            f"part '{name}'", "what where(points, normals) returns", given, (len(points),)
+        )
         if not chosen.any():
             raise InputError(f"part '{name}' has no contact points: change its mask")
         weights, box = geometry.weights[chosen], points[chosen]
-        middle = np.append((weights @ box / weights.sum())[:-1], box[:, -1].min()) if centre is None else centre
+        middle = (
+            np.append((weights @ box / weights.sum())[:-1], box[:, -1].min())
+            if centre is None
+            else centre
+        )
         self.centre = array(f"part '{name}'", "the centre", middle, points.shape[1:], unit="metres")
         self.name, self.dimension = name, points.shape[1]
-        self.weights, self.normals, self.arms = geometry.weights[chosen], normals[chosen], points[chosen] - self.centre
+        self.weights, self.normals, self.arms = (
+            geometry.weights[chosen],
+            normals[chosen],
+            points[chosen] - self.centre,
+        )
         self.normal, self.whole = self._direction(name, normal), self.weights.sum()
-        places = np.unique(points, axis=0, return_inverse=True)[1].ravel()  # run folders do not tell of nodes
+        places = np.unique(points, axis=0, return_inverse=True)[
+            1
+        ].ravel()  # run folders do not tell of nodes
         self.tangents = tangent_vectors(normals, getattr(geometry, "nodes", places))[chosen]
         self.fit, self.ends = self._fit().T, self._ends(box).T
         lowest, self.tall = float(box[:, -1].min() - self.centre[-1]), float(np.ptp(box[:, -1]))
@@ -88,7 +109,9 @@ class Part:
         direction = array(f"part '{name}'", "normal", direction, self.centre.shape)
         size = float(np.linalg.norm(direction))
         if size <= 1e-6 * (self.weights.sum() if given is None else 1.0):
-            raise InputError(f"part '{name}': its contact directions cancel: give the direction of N by normal=")
+            raise InputError(
+                f"part '{name}': its contact directions cancel: give the direction of N by normal="
+            )
         return np.asarray(direction / size)
 
     def _ends(self, points: Array) -> Array:
@@ -105,7 +128,9 @@ class Part:
         root, modes = np.sqrt(self.weights), np.column_stack([self.normals, *turns])
         asked = np.roll(block_diag(self.normal, np.eye(len(turns)) / size), -1, axis=0)
         inverse = np.linalg.pinv(root[:, None] * modes, rcond=DETERMINED) * root
-        told = np.linalg.norm(asked @ inverse @ modes, axis=1) > DETERMINED * np.linalg.norm(asked, axis=1)
+        told = np.linalg.norm(asked @ inverse @ modes, axis=1) > DETERMINED * np.linalg.norm(
+            asked, axis=1
+        )
         return np.where(told[:, None], asked @ inverse, np.nan)
 
     def sums(self, r_n: Array, r_t: Array | None, active: Mask) -> Array:
@@ -117,7 +142,9 @@ class Part:
             at_points = at_points - np.einsum("rkc,kdc->rkd", r_t[:, self.mask], self.tangents)
         moments = [one.sum(axis=1) for one in turning(self.arms, at_points)]
         lifted = (~active[:, self.mask]) @ self.weights
-        return np.column_stack([at_points.sum(axis=1), *moments, r_n.sum(axis=1), r_n @ self.arms[:, -1], lifted])
+        return np.column_stack(
+            [at_points.sum(axis=1), *moments, r_n.sum(axis=1), r_n @ self.arms[:, -1], lifted]
+        )
 
     def tops(self, gap: Array, slip: Array | None) -> Array:
         """Return (rows, 1 or 2) the largest gap and slip of rows (rows, m), (rows, m, d - 1) or None."""
@@ -136,15 +163,25 @@ class Part:
         def along(kind: str, vectors: Array) -> dict[str, Array]:
             return {f"{kind}_{axis}": vectors[:, i] for i, axis in enumerate(AXES[:d])}
 
-        found = {"uplift": lifted / self.whole} | dict(zip(("opening", "slip"), tops.T, strict=False))
+        found = {"uplift": lifted / self.whole} | dict(
+            zip(("opening", "slip"), tops.T, strict=False)
+        )
         found |= along("force", force) | {"N": compression, "T": np.linalg.norm(across, axis=1)}
         if d == 2:
             found |= {"T": force @ [-self.normal[1], self.normal[0]], "M": moment[:, 0]}
-            return found | {"e": _ratio(moment[:, 0], compression), "height": _ratio(raised, thrust)}
+            return found | {
+                "e": _ratio(moment[:, 0], compression),
+                "height": _ratio(raised, thrust),
+            }
         if d == 3:
             lever = np.cross(moment, self.normal)
-            found |= along("T", across) | along("M", moment) | along("e", _ratio(lever.T, compression).T)
-        return found | {"e": _ratio(np.linalg.norm(lever, axis=1), compression), "height": _ratio(raised, thrust)}
+            found |= (
+                along("T", across) | along("M", moment) | along("e", _ratio(lever.T, compression).T)
+            )
+        return found | {
+            "e": _ratio(np.linalg.norm(lever, axis=1), compression),
+            "height": _ratio(raised, thrust),
+        }
 
 
 def turning(arms: Array, vectors: Array) -> list[Array]:
@@ -157,7 +194,9 @@ def _ratio(one: Array, other: Array) -> Array:
     return np.divide(one, other, out=np.full(one.shape, np.nan), where=other != 0.0)
 
 
-_MEANING = tomllib.loads(files(__package__).joinpath("resultants.toml").read_text(encoding="utf-8"))  # unit, meaning
+_MEANING = tomllib.loads(
+    files(__package__).joinpath("resultants.toml").read_text(encoding="utf-8")
+)  # unit, meaning
 
 
 @dataclass
@@ -194,7 +233,9 @@ class Resultants:
         if self.part is not None and self.where is not None:
             raise InputError(f"part '{self.name}' has both part and where: leave one of them out")
         if not hasattr(self.part, "indices"):
-            optional(array, f"part '{self.name}'", "part, a box,", self.part, (2, None), unit="metres")
+            optional(
+                array, f"part '{self.name}'", "part, a box,", self.part, (2, None), unit="metres"
+            )
 
     def columns(self) -> Columns:
         """Call ``start`` first."""
@@ -202,10 +243,15 @@ class Resultants:
         for quantity in self._quantities:
             kind, _, axis = ("", "", "") if quantity in _MEANING else quantity.partition("_")
             unit, text = _MEANING[kind or quantity]
-            found[f"{quantity}_{self.name}"] = (unit, f"{text}{f' along {axis}' if axis else ''}, part {self.name}")
+            found[f"{quantity}_{self.name}"] = (
+                unit,
+                f"{text}{f' along {axis}' if axis else ''}, part {self.name}",
+            )
         return found
 
-    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
+    def start(
+        self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
+    ) -> Row:
         """Find the part once, and return the row of the state, a static one or the start of a run. Collective."""
         self._surface, self._problem = problem.surface, problem
         whole = problem.surface.whole()
@@ -217,14 +263,24 @@ class Resultants:
         """What picks the part out of all conditions. Collective."""
         if hasattr(self.part, "indices"):
             space: Any = self._problem.system.space
-            provides(f"part '{self.name}'", "the system's space", space, ("facet_blocks",), "use one of fem.assemble")
+            provides(
+                f"part '{self.name}'",
+                "the system's space",
+                space,
+                ("facet_blocks",),
+                "use one of fem.assemble",
+            )
             own = space.nodes[space.facet_blocks(self.part.indices)]
             found = np.isin(whole.nodes, np.concatenate(from_each(self._surface.comm, own)))  # type: ignore[arg-type]
             clamped = from_each(self._surface.comm, space.nodes[space.held.all(axis=1)])
-            touching = np.isin(space.corners_of_facets(self.part.indices), np.concatenate([whole.nodes, *clamped]))
+            touching = np.isin(
+                space.corners_of_facets(self.part.indices), np.concatenate([whole.nodes, *clamped])
+            )
             if not largest(self._surface.comm, touching.all(axis=1).any()):
-                raise InputError(f"part '{self.name}': its group has no whole facet in contact: give a group of the "
-                                 "contact, or a box")
+                raise InputError(
+                    f"part '{self.name}': its group has no whole facet in contact: give a group of the "
+                    "contact, or a box"
+                )
             alone = found.copy()
             for rows in whole.corners:
                 alone[rows] = False
@@ -245,37 +301,65 @@ class Resultants:
         surface, part, r_n, d = self._surface, self._part, state.r_n, self._part.dimension
         u_n, slip = surface.normal_values(state.u), surface.slip(state.u, state.t)
         gap = surface.gap(state.t) - u_n + surface.compliance * r_n
-        sums = part.sums(r_n[None], None if state.r_t is None else state.r_t[None], state.active[None])
+        sums = part.sums(
+            r_n[None], None if state.r_t is None else state.r_t[None], state.active[None]
+        )
         limit = self._problem.friction.limit(r_n, surface.weights, 1.0)[part.mask].sum()
         slid = np.einsum("k,kdc,kc->d", part.weights, part.tangents, slip[part.mask]) / part.whole
         more = [u_n[part.mask] @ part.fit, r_n[part.mask] @ part.ends, slid, [limit]]
         whole = surface.comm.sum(np.concatenate([sums[0], *more]))
-        sums, motion, (low, high), slid, (limit,) = np.split(whole, np.cumsum([len(sums[0]), *map(len, more[:-1])]))
+        sums, motion, (low, high), slid, (limit,) = np.split(
+            whole, np.cumsum([len(sums[0]), *map(len, more[:-1])])
+        )
         tops = surface.comm.max(part.tops(gap[None], slip[None])[0])
-        names = ([], ["theta", "settlement"], [*(f"theta_{axis}" for axis in AXES), "settlement"])[d - 1]
-        found = {quantity: float(values[0]) for quantity, values in part.quantities(sums[None], tops[None]).items()}
+        names = ([], ["theta", "settlement"], [*(f"theta_{axis}" for axis in AXES), "settlement"])[
+            d - 1
+        ]
+        found = {
+            quantity: float(values[0])
+            for quantity, values in part.quantities(sums[None], tops[None]).items()
+        }
         found |= dict(zip(names, motion.tolist(), strict=False))
         along = slid @ [-part.normal[1], part.normal[0]] if d == 2 else np.linalg.norm(slid)
-        found |= {"level": (found["height"] - part.lowest) / part.tall if part.tall else np.nan,
-                  "sliding": float(along), "pressure_low": float(low), "pressure_high": float(high)}
+        found |= {
+            "level": (found["height"] - part.lowest) / part.tall if part.tall else np.nan,
+            "sliding": float(along),
+            "pressure_low": float(low),
+            "pressure_high": float(high),
+        }
         if self._problem.frictional:
             found["margin"] = float(1.0 - abs(found["T"]) / limit) if limit > 0.0 else np.nan
         self._quantities = list(found)
         return {f"{quantity}_{self.name}": value for quantity, value in found.items()}
 
 
-def contact_summary(history: Mapping[str, Array], geometry: Geometry, *, centre: Sequence[float], name: str = "contact",
-                    where: Where | None = None, normal: Sequence[float] | None = None) -> dict[str, Array]:
+def contact_summary(
+    history: Mapping[str, Array],
+    geometry: Geometry,
+    *,
+    centre: Sequence[float],
+    name: str = "contact",
+    where: Where | None = None,
+    normal: Sequence[float] | None = None,
+) -> dict[str, Array]:
     """Return the resultants of a run that recorded ``Contact()``: quantity -> (rows,), without theta and settlement.
 
     ``geometry``: the surface of the problem (then collective), or ``read_run(folder).contact``. Slip and friction count
     where they were recorded, with friction. InputError without arrays of the contact points."""
     instance("contact_summary", "history", history, Mapping, "give the history of a solution")
-    provides("contact_summary", "geometry", geometry, ("points", "normals", "weights"), "give a contact surface")
+    provides(
+        "contact_summary",
+        "geometry",
+        geometry,
+        ("points", "normals", "weights"),
+        "give a contact surface",
+    )
     column_name("part name", name)
     missing = [column for column in ("pressure", "gap", "active") if column not in history]
     if missing:
-        raise InputError(f"the history has no column {missing[0]}: record Contact(), and read history.h5")
+        raise InputError(
+            f"the history has no column {missing[0]}: record Contact(), and read history.h5"
+        )
     geometry = geometry.whole() if isinstance(geometry, ContactSurface) else geometry
     part = Part(name, geometry, centre, where, normal)
     rows, m = len(history["t"]), len(geometry.weights)
@@ -285,5 +369,7 @@ def contact_summary(history: Mapping[str, Array], geometry: Geometry, *, centre:
 
     r_t = per_point("traction_t") * geometry.weights[:, None] if "traction_t" in history else None
     slip = per_point("slip") if "slip" in history else None
-    sums = part.sums(per_point("pressure")[:, :, 0] * geometry.weights, r_t, per_point("active")[:, :, 0] > 0.5)
+    sums = part.sums(
+        per_point("pressure")[:, :, 0] * geometry.weights, r_t, per_point("active")[:, :, 0] > 0.5
+    )
     return part.quantities(sums, part.tops(per_point("gap")[:, :, 0], slip))

@@ -16,6 +16,8 @@ if find_spec("dolfinx") is None:
     raise ModuleNotFoundError(
         "vi_contact.fem needs DOLFINx, which is missing here and which pip does not have: install it by apt (on Debian "
         "python3-dolfinx-real, and make virtual environments with --system-site-packages) or by conda (fenics-dolfinx "
-        "of conda-forge), see docs/start/install.md", name="dolfinx")
+        "of conda-forge), see docs/start/install.md",
+        name="dolfinx",
+    )
 
 __all__, __getattr__, __dir__ = lazy(__name__, __file__)

@@ -38,18 +38,34 @@ from .ties import Tied
 Field = tuple[float, ...] | Callable[[Array], Array]
 Initial = Field | Sequence[tuple[Cells, Field]] | None
 
-LIGHTER = ("inertia load of the ground motion: the convention of the catalogue's reference numbers, which leave out "
-           "the mass that elements share with the base")
+LIGHTER = (
+    "inertia load of the ground motion: the convention of the catalogue's reference numbers, which leave out "
+    "the mass that elements share with the base"
+)
 
 
 @stage("assembling")
-def assemble(mesh: Any, material: Materials | None = None, *, forms: Forms | None = None,
-             section: Section | None = None, clamped: Facets | Sequence[Facets] = (),
-             prescribed: Prescribed | Sequence[Prescribed] = (), tied: Tied | Sequence[Tied] = (),
-             dashpots: Dashpots | Sequence[Dashpots] = (), loads: Loads = (), damping: Damping | None = None,
-             initial_displacement: Initial = None, initial_velocity: Initial = None, base_inertia: bool = True,
-             degree: int = 1, quadrature_degree: int | None = None, integration: str = "full", space: Any = None,
-             bcs: Any = ()) -> SemiDiscreteSystem:
+def assemble(
+    mesh: Any,
+    material: Materials | None = None,
+    *,
+    forms: Forms | None = None,
+    section: Section | None = None,
+    clamped: Facets | Sequence[Facets] = (),
+    prescribed: Prescribed | Sequence[Prescribed] = (),
+    tied: Tied | Sequence[Tied] = (),
+    dashpots: Dashpots | Sequence[Dashpots] = (),
+    loads: Loads = (),
+    damping: Damping | None = None,
+    initial_displacement: Initial = None,
+    initial_velocity: Initial = None,
+    base_inertia: bool = True,
+    degree: int = 1,
+    quadrature_degree: int | None = None,
+    integration: str = "full",
+    space: Any = None,
+    bcs: Any = (),
+) -> SemiDiscreteSystem:
     """Assemble the system of a body, on the free unknowns.
 
     Args:
@@ -78,50 +94,103 @@ def assemble(mesh: Any, material: Materials | None = None, *, forms: Forms | Non
             components that do not exist, a damping law that damps nothing, ratios xi that no law reads, dashpots on
             held facets, groups without facets or cells, of another mesh or kind, contradictions."""
     if hasattr(mesh, "comm"):
-        agree(MpiComm(mesh.comm), "assemble", {
-            "material": material, "forms": Parts(forms), "section": section, "clamped": as_tuple(clamped),
-            "prescribed": as_tuple(prescribed), "tied": as_tuple(tied), "dashpots": as_tuple(dashpots),
-            "loads": as_tuple(loads), "damping": damping, "initial_displacement": initial_displacement,
-            "initial_velocity": initial_velocity, "base_inertia": base_inertia, "degree": degree,
-            "quadrature_degree": quadrature_degree, "integration": integration})
+        agree(
+            MpiComm(mesh.comm),
+            "assemble",
+            {
+                "material": material,
+                "forms": Parts(forms),
+                "section": section,
+                "clamped": as_tuple(clamped),
+                "prescribed": as_tuple(prescribed),
+                "tied": as_tuple(tied),
+                "dashpots": as_tuple(dashpots),
+                "loads": as_tuple(loads),
+                "damping": damping,
+                "initial_displacement": initial_displacement,
+                "initial_velocity": initial_velocity,
+                "base_inertia": base_inertia,
+                "degree": degree,
+                "quadrature_degree": quadrature_degree,
+                "integration": integration,
+            },
+        )
     V, degree = taken_space(mesh, space, as_tuple(bcs), degree)
-    section, damping = check_body(mesh, material, forms, section, damping, base_inertia, degree, integration)
+    section, damping = check_body(
+        mesh, material, forms, section, damping, base_inertia, degree, integration
+    )
     held, moved, boundaries = as_tuple(clamped), as_tuple(prescribed), as_tuple(dashpots)
     check_boundaries(mesh, held, moved, as_tuple(tied), boundaries, as_tuple(loads))
     check_initial(mesh, displacement=initial_displacement, velocity=initial_velocity)
     given = (*(Prescribed(facets) for facets in held), *moved, *taken(mesh, V, as_tuple(bcs)))
     space = FemSpace(mesh, given, as_tuple(tied), degree, V, quadrature_degree)
     refuse_contradictions(space)
-    body = _stated(space, material, forms, section, damping, boundaries, selective=integration == "selective")
+    body = _stated(
+        space, material, forms, section, damping, boundaries, selective=integration == "selective"
+    )
     algebra = algebra_for(space.comm.mpi, space.dimension, space.unknowns, symmetric=body.symmetric)
     absorbers = [DashpotMatrix(space, body, one) for one in boundaries]
     acting = [one.dashpots.loads(one, body) for one in absorbers]
     load = assemble_loads(space, section, as_tuple(loads))
     rigid = np.column_stack([space.restrict(one) for one in space.translations])
-    K, pull = _reduced(body.matrix("K"), space, algebra, 0)  # one after the other: each is large before it is reduced
+    K, pull = _reduced(
+        body.matrix("K"), space, algebra, 0
+    )  # one after the other: each is large before it is reduced
     damper = _damper(body, absorbers)
     C, viscous = _reduced(damper, space, algebra, 1) if damper is not None else (None, ())
-    mass = body.matrix("M")  # momenta, less M r: what accelerated prescribed nodes pull on the free ones
-    momenta = [space.pull(PetscMatrix(mass) @ one) for one in space.translations] if base_inertia else []
+    mass = body.matrix(
+        "M"
+    )  # momenta, less M r: what accelerated prescribed nodes pull on the free ones
+    momenta = (
+        [space.pull(PetscMatrix(mass) @ one) for one in space.translations] if base_inertia else []
+    )
     M, inertial = _reduced(mass, space, algebra, 2)
-    load = replace(load, inertial=inertial, viscous=(*viscous, *(one for part in acting for one in part.viscous)),
-                   general=(*load.general, *pull, *(one for part in acting for one in part.elastic)))
-    system = floating(SemiDiscreteSystem(
-        algebra=algebra, M=M, C=C, K=K, load=load, influence=rigid,
-        base_mass=np.column_stack([one - M @ r for one, r in zip(momenta, rigid.T, strict=True)]) if momenta else None,
-        u0=_initial(space, "initial displacement", initial_displacement),
-        v0=_initial(space, "initial velocity", initial_velocity),
-        space=space, tied=space.tied_unknowns, absolute=any(one.lets_waves_in for one in boundaries),
-        notes=describe_boundaries(boundaries, mesh.comm.rank, body.notes if base_inertia else (*body.notes, LIGHTER)),
-        companions=tuple(one for part in (*moved, *acting) for one in part.companions)))
+    load = replace(
+        load,
+        inertial=inertial,
+        viscous=(*viscous, *(one for part in acting for one in part.viscous)),
+        general=(*load.general, *pull, *(one for part in acting for one in part.elastic)),
+    )
+    system = floating(
+        SemiDiscreteSystem(
+            algebra=algebra,
+            M=M,
+            C=C,
+            K=K,
+            load=load,
+            influence=rigid,
+            base_mass=np.column_stack(
+                [one - M @ r for one, r in zip(momenta, rigid.T, strict=True)]
+            )
+            if momenta
+            else None,
+            u0=_initial(space, "initial displacement", initial_displacement),
+            v0=_initial(space, "initial velocity", initial_velocity),
+            space=space,
+            tied=space.tied_unknowns,
+            absolute=any(one.lets_waves_in for one in boundaries),
+            notes=describe_boundaries(
+                boundaries, mesh.comm.rank, body.notes if base_inertia else (*body.notes, LIGHTER)
+            ),
+            companions=tuple(one for part in (*moved, *acting) for one in part.companions),
+        )
+    )
     body.own(system)
     del absorbers, damper, mass
     give_back(mesh.comm)
     return system
 
 
-def _stated(space: FemSpace, material: Materials | None, forms: Forms | None, section: Section, damping: Damping,
-            boundaries: tuple[Dashpots, ...], *, selective: bool) -> ElasticForms:
+def _stated(
+    space: FemSpace,
+    material: Materials | None,
+    forms: Forms | None,
+    section: Section,
+    damping: Damping,
+    boundaries: tuple[Dashpots, ...],
+    *,
+    selective: bool,
+) -> ElasticForms:
     """The forms of the materials, or the user's own with those of the materials beside them."""
     materials = [] if material is None else cell_materials(space.mesh, material)
     if forms is None:
@@ -138,15 +207,21 @@ def _damper(forms: ElasticForms, absorbers: Sequence[DashpotMatrix]) -> Any:
     terms = ([forms.matrix("C")] if forms.damped else []) + [one.mat for one in absorbers]
     if not terms:
         return None
-    return as_petsc(PetscAlgebra(forms.space.mesh.comm).combine([(1.0, PetscMatrix(one)) for one in terms])).mat
+    return as_petsc(
+        PetscAlgebra(forms.space.mesh.comm).combine([(1.0, PetscMatrix(one)) for one in terms])
+    ).mat
 
 
-def _reduced(full: Any, space: FemSpace, algebra: PetscAlgebra,
-             derivative: int) -> tuple[PetscMatrix, tuple[Callable[[float], Array], ...]]:
+def _reduced(
+    full: Any, space: FemSpace, algebra: PetscAlgebra, derivative: int
+) -> tuple[PetscMatrix, tuple[Callable[[float], Array], ...]]:
     """(Pᵀ A P as the algebra stores it, the load of prescribed motions); the full matrix is destroyed."""
     pull: tuple[Callable[[float], Array], ...] = ()
     if any(condition.moves for condition in space.prescribed):  # a part of -Pᵀ(K U + C U' + M U'')
-        matrix, held = PetscMatrix(moved(space.held_columns(full), space.comm.mpi)), space.held.ravel()
+        matrix, held = (
+            PetscMatrix(moved(space.held_columns(full), space.comm.mpi)),
+            space.held.ravel(),
+        )
         pull = (lambda t: -space.pull(matrix @ space.prescribed_values(t, derivative)[held]),)
     part = space.reduced(full)
     full.destroy()
@@ -198,7 +273,9 @@ def _initial(space: FemSpace, name: str, value: Initial) -> Array:
         values = np.zeros((len(space.nodes), space.dimension))
         for cells, one in pairs:
             blocks = np.unique(compat.cell_blocks(space.V)[cells.indices])
-            shared = np.concatenate(from_each(space.comm, space.node_of_block[blocks[blocks >= len(values)]]))
+            shared = np.concatenate(
+                from_each(space.comm, space.node_of_block[blocks[blocks >= len(values)]])
+            )
             touched = np.isin(space.nodes, shared)  # by cells of other ranks
             touched[blocks[blocks < len(values)]] = True
             values[touched] = _nodal(space, name, one)[touched]

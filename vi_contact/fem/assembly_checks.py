@@ -38,20 +38,39 @@ from .ties import Tied
 log = logging.getLogger(__name__)
 OWNER = "assemble"
 SIDES = ("facets", "first", "second")  # attributes of conditions and loads that are boundary groups
-LOCKING = 0.495  # Poisson's ratio; CHOSEN: 0.49 is common for wet soil, 0.499 is 10 % to 40 % too stiff
+LOCKING = (
+    0.495  # Poisson's ratio; CHOSEN: 0.49 is common for wet soil, 0.499 is 10 % to 40 % too stiff
+)
 
 
-def check_body(mesh: Any, material: Any, forms: Any, section: Any, damping: Any, base_inertia: Any, degree: Any = 1,
-               integration: Any = "full") -> tuple[Section, Damping]:
+def check_body(
+    mesh: Any,
+    material: Any,
+    forms: Any,
+    section: Any,
+    damping: Any,
+    base_inertia: Any,
+    degree: Any = 1,
+    integration: Any = "full",
+) -> tuple[Section, Damping]:
     """Return (section, damping), the usual for None; InputError for objects of another kind, cells of another mesh."""
     instance(OWNER, "mesh", mesh, Mesh, "give a DOLFINx mesh, such as fem.read_mesh(path, comm)[0]")
     if mesh.topology.dim != mesh.geometry.dim:
-        raise InputError(f"assemble: the mesh has cells of dimension {mesh.topology.dim} at points of "
-                         f"{mesh.geometry.dim} coordinates; read it with gdim={mesh.topology.dim}")
+        raise InputError(
+            f"assemble: the mesh has cells of dimension {mesh.topology.dim} at points of "
+            f"{mesh.geometry.dim} coordinates; read it with gdim={mesh.topology.dim}"
+        )
     _refuse_lonely_nodes(mesh)
     _check_degree(mesh, degree)
     refuse_complex("assemble")
-    optional(instance, OWNER, "forms", forms, Forms, "give fem.Forms(stiffness=…, mass=…), or leave them out")
+    optional(
+        instance,
+        OWNER,
+        "forms",
+        forms,
+        Forms,
+        "give fem.Forms(stiffness=…, mass=…), or leave them out",
+    )
     if material is None and forms is None:
         raise InputError("assemble: neither a material nor forms are given; give one of them")
     if material is not None and not isinstance(material, KINDS):
@@ -63,23 +82,51 @@ def check_body(mesh: Any, material: Any, forms: Any, section: Any, damping: Any,
     if section is None:
         section = PlaneStrain() if mesh.geometry.dim == 2 else Solid()
     damping = NoDamping() if damping is None else damping
-    provides(OWNER, "section", section, ("thickness", "elastic_constants"), "give PlaneStrain(), PlaneStress() or None")
+    provides(
+        OWNER,
+        "section",
+        section,
+        ("thickness", "elastic_constants"),
+        "give PlaneStrain(), PlaneStress() or None",
+    )
     if mesh.geometry.dim == 3 and isinstance(section, PlaneStrain | PlaneStress):
-        raise InputError(f"assemble: {section} is a section of a plane body and this one has three dimensions; give "
-                         "Solid(), or leave it out")
+        raise InputError(
+            f"assemble: {section} is a section of a plane body and this one has three dimensions; give "
+            "Solid(), or leave it out"
+        )
     if mesh.geometry.dim == 2 and isinstance(section, Solid):
-        raise InputError("assemble: Solid() is for a body in space and this one is plane; give PlaneStrain() or "
-                         "PlaneStress(thickness)")
-    provides(OWNER, "damping", damping, ("coefficients",), "give Rayleigh(alpha, beta), MassProportional(c) or None")
-    if forms is not None and not (isinstance(damping, Rayleigh | NoDamping) or hasattr(damping, "viscosities")):
-        raise InputError(f"assemble: {damping} needs the density of a material and forms=… have none; give "
-                         "Rayleigh(alpha, beta), KelvinVoigt(…), or Forms(…, damping=)")
+        raise InputError(
+            "assemble: Solid() is for a body in space and this one is plane; give PlaneStrain() or "
+            "PlaneStress(thickness)"
+        )
+    provides(
+        OWNER,
+        "damping",
+        damping,
+        ("coefficients",),
+        "give Rayleigh(alpha, beta), MassProportional(c) or None",
+    )
+    if forms is not None and not (
+        isinstance(damping, Rayleigh | NoDamping) or hasattr(damping, "viscosities")
+    ):
+        raise InputError(
+            f"assemble: {damping} needs the density of a material and forms=… have none; give "
+            "Rayleigh(alpha, beta), KelvinVoigt(…), or Forms(…, damping=)"
+        )
     if isinstance(section, PlaneStress) and any(getattr(damping, "viscosities", ())):
-        raise InputError(f"assemble: {damping} does not go with PlaneStress, where the strain across the panel would "
-                         "need its own motion; give Rayleigh(0, beta), or another section")
+        raise InputError(
+            f"assemble: {damping} does not go with PlaneStress, where the strain across the panel would "
+            "need its own motion; give Rayleigh(0, beta), or another section"
+        )
     flag(OWNER, "base_inertia", base_inertia)
-    found = [material] if material is None or isinstance(material, KINDS) else [one for _, one in material]
-    _check_integration(mesh, found if forms is None else [forms], section, damping, degree, integration)
+    found = (
+        [material]
+        if material is None or isinstance(material, KINDS)
+        else [one for _, one in material]
+    )
+    _check_integration(
+        mesh, found if forms is None else [forms], section, damping, degree, integration
+    )
     thick = mesh.geometry.dim > 1 and not isinstance(section, PlaneStress)
     if forms is None and degree == 1 and thick and integration == "full" and mesh.comm.rank == 0:
         _tell_locking([one for one in found if isinstance(one, LinearElastic)])
@@ -92,17 +139,25 @@ def check_ratios(body: ElasticForms, of_materials: bool) -> None:
     body: the forms of a body, with its dashpots; of_materials: whether its stiffness and mass are those of materials,
     and not the user's own forms."""
     law, ratio = body.damping, body.largest_ratio
-    if isinstance(law, DampingRatio) and not any(callable(one.xi) or one.xi for _, one in body.materials):
-        raise InputError(f"assemble: {law} damps by the ratios xi of the materials, and none of them has one; give "
-                         "LinearElastic(…, xi=0.05), or another law, such as Rayleigh(alpha, beta)")
+    if isinstance(law, DampingRatio) and not any(
+        callable(one.xi) or one.xi for _, one in body.materials
+    ):
+        raise InputError(
+            f"assemble: {law} damps by the ratios xi of the materials, and none of them has one; give "
+            "LinearElastic(…, xi=0.05), or another law, such as Rayleigh(alpha, beta)"
+        )
     rayleigh = isinstance(law, Rayleigh) and (law.alpha > 0.0 or law.beta > 0.0)
     damps = body.damped if of_materials else rayleigh or body.viscous is not None
     if not isinstance(law, NoDamping | DampingRatio) and not damps:
-        raise InputError(f"assemble: {law} damps nothing, as its coefficients are zero; give coefficients above zero, "
-                         "or leave damping out")
+        raise InputError(
+            f"assemble: {law} damps nothing, as its coefficients are zero; give coefficients above zero, "
+            "or leave damping out"
+        )
     if ratio and isinstance(law, BLIND_TO_RATIOS):
-        raise InputError(f"assemble: a material has the damping ratio xi = {ratio:g}, which {law} does not read; give "
-                         "damping=DampingRatio(frequency), or leave xi out")
+        raise InputError(
+            f"assemble: a material has the damping ratio xi = {ratio:g}, which {law} does not read; give "
+            "damping=DampingRatio(frequency), or leave xi out"
+        )
     _refuse_ratio_behind(body)
 
 
@@ -112,8 +167,10 @@ def _refuse_ratio_behind(body: ElasticForms) -> None:
     for boundary in body.boundaries:
         behind = boundary.material
         if behind is not None and behind.xi and behind not in inside:
-            raise InputError(f"assemble: the material of {type(boundary).__name__} on '{boundary.facets.name}' has the "
-                             f"damping ratio xi = {behind.xi:g}, and dashpots read none; leave xi out there")
+            raise InputError(
+                f"assemble: the material of {type(boundary).__name__} on '{boundary.facets.name}' has the "
+                f"damping ratio xi = {behind.xi:g}, and dashpots read none; leave xi out there"
+            )
 
 
 def _refuse_lonely_nodes(mesh: Mesh) -> None:
@@ -121,65 +178,104 @@ def _refuse_lonely_nodes(mesh: Mesh) -> None:
     own = np.arange(mesh.geometry.index_map().size_local)
     lonely = mesh.comm.allreduce(len(np.setdiff1d(own, compat.geometry_dofmap(mesh))))
     if lonely:
-        raise InputError(f"assemble: {lonely} nodes of the mesh belong to ranks that have none of their cells, as "
-                         "create_submesh may leave them; write the part to a file and read it, or use fewer ranks")
+        raise InputError(
+            f"assemble: {lonely} nodes of the mesh belong to ranks that have none of their cells, as "
+            "create_submesh may leave them; write the part to a file and read it, or use fewer ranks"
+        )
 
 
 def _check_degree(mesh: Mesh, degree: Any) -> None:
     """Raise InputError unless the degree is 1 or 2 and suits the cells, and curved cells are not folded. Collective."""
     if isinstance(degree, bool) or degree not in (1, 2):
-        raise InputError(f"assemble: degree is {shown(degree)}; give 1 for P1 and Q1, 2 for P2 and Q2")
+        raise InputError(
+            f"assemble: degree is {shown(degree)}; give 1 for P1 and Q1, 2 for P2 and Q2"
+        )
     if not is_curved(mesh):
         return
     if degree == 1:
-        raise InputError("assemble: the mesh has cells of second order; give degree=2, or mesh it in first order")
-    if compat.geometry_dofmap(mesh).shape[1] != compat.cell_blocks(compat.vector_space(mesh, 2)).shape[1]:
-        raise InputError("assemble: the mesh has cells of an order above 2 or without all mid-points; mesh it with "
-                         "complete cells of first or second order")
+        raise InputError(
+            "assemble: the mesh has cells of second order; give degree=2, or mesh it in first order"
+        )
+    if (
+        compat.geometry_dofmap(mesh).shape[1]
+        != compat.cell_blocks(compat.vector_space(mesh, 2)).shape[1]
+    ):
+        raise InputError(
+            "assemble: the mesh has cells of an order above 2 or without all mid-points; mesh it with "
+            "complete cells of first or second order"
+        )
     size, det = ufl.TestFunction(compat.cell_space(mesh)), ufl.JacobianDeterminant(mesh)
-    signed, whole = (compat.assemble_vector(compat.compile_form(one * size * ufl.dx)).array_r
-                     for one in (det / abs(det), 1.0))
+    signed, whole = (
+        compat.assemble_vector(compat.compile_form(one * size * ufl.dx)).array_r
+        for one in (det / abs(det), 1.0)
+    )
     folded = mesh.comm.allreduce(int(np.sum(np.abs(signed) < (1.0 - 1e-9) * whole)))
     if folded:
-        raise InputError(f"assemble: {folded} curved cells of the mesh are folded, their Jacobian changes its sign; "
-                         "mesh them finer, or with straight sides")
+        raise InputError(
+            f"assemble: {folded} curved cells of the mesh are folded, their Jacobian changes its sign; "
+            "mesh them finer, or with straight sides"
+        )
 
 
-def _check_integration(mesh: Mesh, materials: Sequence[Any], section: Section, damping: Damping, degree: int,
-                       integration: Any) -> None:
+def _check_integration(
+    mesh: Mesh,
+    materials: Sequence[Any],
+    section: Section,
+    damping: Damping,
+    degree: int,
+    integration: Any,
+) -> None:
     """Raise InputError for a word that is none, and where cells cannot or need not be integrated selectively."""
     check_word("integration of assemble", integration, ("full", "selective"))
     if integration == "full":
         return
     if mesh.topology.cell_type.name not in ("quadrilateral", "hexahedron"):
-        raise InputError("assemble: integration='selective' needs quadrilaterals or hexahedra, because other cells "
-                         "lock with it too; take degree=2")
+        raise InputError(
+            "assemble: integration='selective' needs quadrilaterals or hexahedra, because other cells "
+            "lock with it too; take degree=2"
+        )
     if degree == 2 or isinstance(section, PlaneStress):
-        raise InputError("assemble: integration='selective' is for degree=1 in plane strain or in space: neither "
-                         "degree=2 nor plane stress locks; leave it out")
-    if any(getattr(damping, "viscosities", ())) or not all(isinstance(one, LinearElastic) for one in materials):
-        raise InputError("assemble: integration='selective' is for LinearElastic materials without KelvinVoigt "
-                         "damping; take degree=2 for others")
+        raise InputError(
+            "assemble: integration='selective' is for degree=1 in plane strain or in space: neither "
+            "degree=2 nor plane stress locks; leave it out"
+        )
+    if any(getattr(damping, "viscosities", ())) or not all(
+        isinstance(one, LinearElastic) for one in materials
+    ):
+        raise InputError(
+            "assemble: integration='selective' is for LinearElastic materials without KelvinVoigt "
+            "damping; take degree=2 for others"
+        )
 
 
 def _tell_locking(materials: Sequence[LinearElastic]) -> None:
     """Warn of materials that first-order cells cannot deform without changing their volume."""
     stiff = max((one.nu for one in materials), default=0.0)
     if stiff > LOCKING:
-        log.warning("Poisson's ratio %.10g locks first-order cells, so displacements are too small: give at most %g, "
-                    "integration='selective' (quadrilaterals and hexahedra) or degree=2", stiff, LOCKING)
+        log.warning(
+            "Poisson's ratio %.10g locks first-order cells, so displacements are too small: give at most %g, "
+            "integration='selective' (quadrilaterals and hexahedra) or degree=2",
+            stiff,
+            LOCKING,
+        )
 
 
-def check_boundaries(mesh: Mesh, clamped: Any, prescribed: Any, tied: Any, dashpots: Any, loads: Any) -> None:
+def check_boundaries(
+    mesh: Mesh, clamped: Any, prescribed: Any, tied: Any, dashpots: Any, loads: Any
+) -> None:
     """Raise InputError, on all ranks, for conditions and loads of another kind or on groups of another mesh, and for
     prescribed displacements that contradict each other on the same facets. Collective. All are tuples."""
     for group in clamped:
         facets_of(OWNER, "clamped", group, mesh)
     for name, items, kinds in (
-        ("prescribed", prescribed, (Prescribed,)), ("tied", tied, (Tied,)), ("dashpots", dashpots, (Dashpots,)),
+        ("prescribed", prescribed, (Prescribed,)),
+        ("tied", tied, (Tied,)),
+        ("dashpots", dashpots, (Dashpots,)),
         ("loads", loads, LOADS),
     ):
-        remedy = f"give {' or '.join(f'fem.{kind.__name__}(…)' for kind in kinds)}, or a list of them"
+        remedy = (
+            f"give {' or '.join(f'fem.{kind.__name__}(…)' for kind in kinds)}, or a list of them"
+        )
         for item in items:
             instance(OWNER, name, item, kinds, remedy)
             for group in (getattr(item, one, None) for one in SIDES):
@@ -196,39 +292,65 @@ def _refuse_repeated(**lists: Sequence[Any]) -> None:
     for name, items in lists.items():
         for one, other in combinations(items, 2):
             if one is other:
-                raise InputError(f"assemble: {name} names one {type(one).__name__} twice, which would act twice; leave "
-                                 "it out once, or give one of twice the size")
+                raise InputError(
+                    f"assemble: {name} names one {type(one).__name__} twice, which would act twice; leave "
+                    "it out once, or give one of twice the size"
+                )
 
 
-def _refuse_empty(mesh: Mesh, clamped: Any, prescribed: Any, tied: Any, dashpots: Any, loads: Any) -> None:
+def _refuse_empty(
+    mesh: Mesh, clamped: Any, prescribed: Any, tied: Any, dashpots: Any, loads: Any
+) -> None:
     """Raise InputError, on all ranks, for a boundary group without facets on any rank: it holds and loads nothing."""
-    own = {"clamped": clamped, "prescribed": prescribed, "tied": tied, "dashpots": dashpots, "loads": loads}
-    found = [(name, group) for name, items in own.items() for item in items
-             for group in ([item] if name == "clamped" else [getattr(item, side, None) for side in SIDES])
-             if group is not None]
+    own = {
+        "clamped": clamped,
+        "prescribed": prescribed,
+        "tied": tied,
+        "dashpots": dashpots,
+        "loads": loads,
+    }
+    found = [
+        (name, group)
+        for name, items in own.items()
+        for item in items
+        for group in (
+            [item] if name == "clamped" else [getattr(item, side, None) for side in SIDES]
+        )
+        if group is not None
+    ]
     counts = mesh.comm.allreduce(np.array([len(group.indices) for _, group in found], dtype=float))
     for (name, group), count in zip(found, counts, strict=True):
         if not count:
-            raise InputError(f"assemble: the boundary group '{group.name}' of {name} has no facets, so it has no "
-                             "effect; correct the group, or leave it out")
+            raise InputError(
+                f"assemble: the boundary group '{group.name}' of {name} has no facets, so it has no "
+                "effect; correct the group, or leave it out"
+            )
 
 
-def _contradictions(held: Sequence[Prescribed], tied: Sequence[Tied], damped: Sequence[Dashpots]) -> Iterator[str]:
+def _contradictions(
+    held: Sequence[Prescribed], tied: Sequence[Tied], damped: Sequence[Dashpots]
+) -> Iterator[str]:
     """Pairs of conditions on the same facets of this rank: other values of one component, ties and dashpots."""
     for one, two in combinations(held, 2):
         if not one.same_motion(two) and len(np.intersect1d(one.facets.indices, two.facets.indices)):
-            yield (f"assemble: boundary groups '{one.facets.name}' and '{two.facets.name}' share facets on which "
-                   "different displacements are prescribed: leave out one of the two")
+            yield (
+                f"assemble: boundary groups '{one.facets.name}' and '{two.facets.name}' share facets on which "
+                "different displacements are prescribed: leave out one of the two"
+            )
     sides = [side for tie in tied if tie.components is None for side in (tie.first, tie.second)]
     for side, absorbing in product(sides, damped):
         if len(np.intersect1d(side.indices, absorbing.facets.indices)):
-            yield (f"assemble: boundary '{side.name}' is tied and has dashpots, which would brake the waves through "
-                   "the ties: leave out one of the two")
+            yield (
+                f"assemble: boundary '{side.name}' is tied and has dashpots, which would brake the waves through "
+                "the ties: leave out one of the two"
+            )
 
 
 def check_initial(mesh: Mesh, **values: Any) -> None:
     """Raise InputError unless each is None, a field, or (cells, field) pairs of this mesh."""
-    for name, value in ((f"initial_{name}", value) for name, value in values.items() if value is not None):
+    for name, value in (
+        (f"initial_{name}", value) for name, value in values.items() if value is not None
+    ):
         fields = [value]
         if isinstance(value, Sequence) and value and isinstance(value[0], tuple):
             pairs = [_pair(name, pair, "give (cells, value) pairs") for pair in value]

@@ -16,7 +16,10 @@ from .petsc_algebra import PetscAlgebra, PetscMatrix, UnsymmetricAlgebra, as_pet
 from .petsc_rows import aij_of, rows_of
 
 COMPACT = 20_000  # unknowns in space from which on it pays: those that are solved iteratively
-WASTE, SAMPLE = 1.8, 1000  # entries of blocks over those that are not zero, at so many nodes: with more, no blocks
+WASTE, SAMPLE = (
+    1.8,
+    1000,
+)  # entries of blocks over those that are not zero, at so many nodes: with more, no blocks
 
 
 class Half(PetscMatrix):
@@ -53,7 +56,9 @@ class Replaced(PetscMatrix):
         whole = whole.copy() if whole is self._base.stored else whole
         if self._alike:
             rows = (whole.getOwnershipRange()[0] + self._rows).astype(kind)
-            whole.setValuesIJV(part.indptr.astype(kind), part.indices.astype(kind), part.data, rowmap=rows)
+            whole.setValuesIJV(
+                part.indptr.astype(kind), part.indices.astype(kind), part.data, rowmap=rows
+            )
             whole.assemble()
             return whole
         both, order = sp.vstack([rows_of(whole), part], format="csr"), np.arange(self.rows)
@@ -109,18 +114,27 @@ class CompactAlgebra(PetscAlgebra):
         rows, first, width = rows_of(mat), mat.getOwnershipRange()[0], self._dimension
         (n, size), kind = rows.shape, PETSc.IntType
         mat.destroy()
-        odd, wasted = self.comm.sum(np.array([n % width, 0.0 if n % width or size % width else _wasted(rows, width)]))
+        odd, wasted = self.comm.sum(
+            np.array([n % width, 0.0 if n % width or size % width else _wasted(rows, width)])
+        )
         if odd or wasted > 0.0:
             width, kept, every = 1, rows.data != 0.0, np.arange(n, dtype=kind)
-            row = np.append(np.repeat(every, np.diff(rows.indptr))[kept], every)  # and the diagonal, as PETSc expects
-            values, columns = np.append(rows.data[kept], np.zeros(n)), np.append(rows.indices[kept], first + every)
+            row = np.append(
+                np.repeat(every, np.diff(rows.indptr))[kept], every
+            )  # and the diagonal, as PETSc expects
+            values, columns = (
+                np.append(rows.data[kept], np.zeros(n)),
+                np.append(rows.indices[kept], first + every),
+            )
             del rows
             rows = sp.csr_matrix((values, (row, columns)), shape=(n, size))
             del values, row, columns, kept
         ends, columns, values = upper_blocks(rows, width, first)
         del rows
         arrays = (ends.astype(kind), columns.astype(kind), values)
-        made = PETSc.Mat().createSBAIJ(((n, None), (n, None)), width, csr=arrays, comm=self.comm.mpi)
+        made = PETSc.Mat().createSBAIJ(
+            ((n, None), (n, None)), width, csr=arrays, comm=self.comm.mpi
+        )
         made.assemble()
         del arrays, ends, columns, values
         give_back(self.comm.mpi)
@@ -138,15 +152,25 @@ class CompactAlgebra(PetscAlgebra):
         return np.flatnonzero(marks.array_r)
 
 
-def algebra_for(comm: Any, dimension: int, unknowns: int, *, symmetric: bool = True) -> PetscAlgebra:
+def algebra_for(
+    comm: Any, dimension: int, unknowns: int, *, symmetric: bool = True
+) -> PetscAlgebra:
     """Return the algebra for the matrices of a body of this size."""
     if not symmetric:
         return UnsymmetricAlgebra(comm)
-    return CompactAlgebra(comm, dimension) if dimension == 3 and unknowns >= COMPACT else PetscAlgebra(comm)
+    return (
+        CompactAlgebra(comm, dimension)
+        if dimension == 3 and unknowns >= COMPACT
+        else PetscAlgebra(comm)
+    )
 
 
 def _wasted(rows: sp.csr_matrix, width: int) -> float:
     """How many of the entries in blocks are too many, by some nodes all over the rows."""
-    nodes = np.unique(np.linspace(0, rows.shape[0] // width - 1, SAMPLE).astype(int)) if rows.shape[0] else []
+    nodes = (
+        np.unique(np.linspace(0, rows.shape[0] // width - 1, SAMPLE).astype(int))
+        if rows.shape[0]
+        else []
+    )
     some = rows[(width * np.asarray(nodes, dtype=int)[:, None] + np.arange(width)).ravel()]
     return float(some.tobsr((width, width)).nnz - WASTE * np.count_nonzero(some.data))

@@ -25,17 +25,23 @@ from ..core.errors import InputError
 
 Indices = npt.NDArray[np.int32]
 
-fem: Any = dolfinx.fem  # untyped on purpose: names missing from the installed version are not errors here
+fem: Any = (
+    dolfinx.fem
+)  # untyped on purpose: names missing from the installed version are not errors here
 _mesh: Any = dolfinx.mesh
 
-VERSION: tuple[int, ...] = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])  # DOLFINx's (major, minor)
+VERSION: tuple[int, ...] = tuple(
+    int(part) for part in dolfinx.__version__.split(".")[:2]
+)  # DOLFINx's (major, minor)
 
 _BASIX_ELEMENTS = VERSION >= (0, 7)
 _DOFMAP_PER_CELL_TYPE = VERSION >= (0, 11)
 
 # Seconds to wait for a form that another process compiles: a busy machine may take more than the 10 of the default.
 _jit: Any = dolfinx.jit
-_defaults = _jit.DOLFINX_DEFAULT_JIT_OPTIONS if VERSION >= (0, 6) else _jit.DOLFINX_DEFAULT_JIT_PARAMETERS
+_defaults = (
+    _jit.DOLFINX_DEFAULT_JIT_OPTIONS if VERSION >= (0, 6) else _jit.DOLFINX_DEFAULT_JIT_PARAMETERS
+)
 _defaults["timeout"] = (120, "Timeout for JIT compilation [s]")
 
 # What compiles --------------------------------------------------------------------------------------------------------
@@ -61,14 +67,20 @@ def _compiling(comm: MPI.Comm, make: Callable[[], Any]) -> Any:
         raise InputError(
             f"DOLFINx cannot compile a finite element form ({found}): it needs a C compiler and the headers of Python "
             "and of the C library; install them (Debian: gcc libc6-dev python3-dev), or name the compiler by the "
-            "environment variable CC") from error
+            "environment variable CC"
+        ) from error
 
 
 # Meshes ---------------------------------------------------------------------------------------------------------------
 
 
-def create_mesh(comm: MPI.Comm, cell: str, cells: npt.NDArray[np.int64], x: npt.NDArray[np.float64],
-                destinations: tuple[Indices, Indices]) -> Mesh:
+def create_mesh(
+    comm: MPI.Comm,
+    cell: str,
+    cells: npt.NDArray[np.int64],
+    x: npt.NDArray[np.float64],
+    destinations: tuple[Indices, Indices],
+) -> Mesh:
     """Create a mesh of cells of first or second order, distributed as told.
 
     `cell` is a UFL name ("interval", "triangle", "quadrilateral", "tetrahedron", "hexahedron"). `cells`
@@ -76,7 +88,9 @@ def create_mesh(comm: MPI.Comm, cell: str, cells: npt.NDArray[np.int64], x: npt.
     [m], `destinations` the ranks each cell goes to, its owner first, and the offsets of the cells in that list. A rank
     without input passes arrays of the right width and no rows. Collective."""
 
-    def told(*_: Any) -> Any:  # the arguments of a partitioner changed twice, what it returns did not
+    def told(
+        *_: Any,
+    ) -> Any:  # the arguments of a partitioner changed twice, what it returns did not
         return dolfinx.cpp.graph.AdjacencyList_int32(*destinations)
 
     gdim = x.shape[1]
@@ -86,9 +100,15 @@ def create_mesh(comm: MPI.Comm, cell: str, cells: npt.NDArray[np.int64], x: npt.
 
         domain = ufl.Mesh(element("Lagrange", cell, degree, shape=(gdim,)))
         return _mesh.create_mesh(comm, cells=cells, x=x, e=domain, partitioner=told)
-    domain = ufl.Mesh(ufl.VectorElement("Lagrange", ufl.Cell(cell, geometric_dimension=gdim), degree))
-    rows = dolfinx.cpp.graph.AdjacencyList_int64(cells)  # it tries an array first, and its error prints all arguments
-    return _mesh.create_mesh(comm, rows, x, domain, ghost_mode=GhostMode.shared_facet, partitioner=told)
+    domain = ufl.Mesh(
+        ufl.VectorElement("Lagrange", ufl.Cell(cell, geometric_dimension=gdim), degree)
+    )
+    rows = dolfinx.cpp.graph.AdjacencyList_int64(
+        cells
+    )  # it tries an array first, and its error prints all arguments
+    return _mesh.create_mesh(
+        comm, rows, x, domain, ghost_mode=GhostMode.shared_facet, partitioner=told
+    )
 
 
 def geometry_dofmap(mesh: Mesh) -> Indices:
@@ -134,7 +154,9 @@ def entities_to_geometry(mesh: Mesh, dim: int, entities: Indices) -> Indices:
     if not len(entities):  # 0.9 divides by their number
         return np.empty((0, count), dtype=np.int32)
     if _BASIX_ELEMENTS:
-        return _mesh.entities_to_geometry(mesh, dim, entities)[:, :count]  # since 0.8 mid-points follow
+        return _mesh.entities_to_geometry(mesh, dim, entities)[
+            :, :count
+        ]  # since 0.8 mid-points follow
     return dolfinx.cpp.mesh.entities_to_geometry(mesh._mesh, dim, entities, False)
 
 
@@ -176,7 +198,9 @@ def cell_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
 def measure(mesh: Mesh, dim: int, indices: Indices) -> ufl.Measure:
     """Return dx (dim = topological dimension) or ds (one less) on these local entities; ds skips inner facets."""
     kind = "dx" if dim == mesh.topology.dim else "ds"
-    tags = meshtags(mesh, dim, np.asarray(indices, dtype=np.int32), np.ones(len(indices), dtype=np.int32))
+    tags = meshtags(
+        mesh, dim, np.asarray(indices, dtype=np.int32), np.ones(len(indices), dtype=np.int32)
+    )
     return ufl.Measure(kind, domain=mesh, subdomain_data=tags)(1)
 
 
@@ -188,7 +212,9 @@ def vector_space(mesh: Mesh, degree: int = 1) -> Any:
     return lagrange(mesh, degree, (mesh.geometry.dim,))
 
 
-def lagrange(mesh: Mesh, degree: int, shape: tuple[int, ...] = (), *, continuous: bool = True) -> Any:
+def lagrange(
+    mesh: Mesh, degree: int, shape: tuple[int, ...] = (), *, continuous: bool = True
+) -> Any:
     """Make the space of Lagrange fields of values of this shape: (), (d,) or that of a matrix."""
     family = "Lagrange" if continuous else "DG" if _BASIX_ELEMENTS or is_simplex(mesh) else "DQ"
 
@@ -228,7 +254,11 @@ def blocks_of_cells(space: Any) -> Indices:
     """Return the same of the space of a ``dirichletbc``, of V or of V.sub(i): in C++ up to 0.11, in Python since."""
     rows = getattr(space.dofmap, "map", None) or space.dofmap.list
     table = _as_table(rows() if callable(rows) else rows, space.dofmap.dof_layout)
-    return table if space.dofmap.bs == space.dofmap.index_map_bs else table // space.dofmap.index_map_bs
+    return (
+        table
+        if space.dofmap.bs == space.dofmap.index_map_bs
+        else table // space.dofmap.index_map_bs
+    )
 
 
 def bc_values(bc: Any, count: int) -> tuple[Indices, npt.NDArray[np.float64]]:
@@ -305,7 +335,9 @@ def facet_dofs(space: Any, facets: Indices) -> Indices:
 def nodal(space: Any) -> bool:
     """Say whether the unknowns of a space are values at points, of one field: not moments, and no mixed element."""
     element = space.element
-    return element.num_sub_elements in (0, space.dofmap.index_map_bs) and element.interpolation_ident
+    return (
+        element.num_sub_elements in (0, space.dofmap.index_map_bs) and element.interpolation_ident
+    )
 
 
 def constrains(bc: Any, space: Any) -> bool:

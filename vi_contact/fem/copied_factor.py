@@ -23,8 +23,13 @@ def contact_last(comm: Any, mat: Any, last: Indices) -> ContactLast | None:
         if comm.size == 1:
             made = ContactLast(functions, rows, last)
         else:
-            whole, first = sp.vstack(comm.mpi.allgather(rows), format="csr"), mat.getOwnershipRange()
-            made = ContactLast(functions, whole, last, whole=_gathering(comm.mpi, mat), mine=slice(*first))
+            whole, first = (
+                sp.vstack(comm.mpi.allgather(rows), format="csr"),
+                mat.getOwnershipRange(),
+            )
+            made = ContactLast(
+                functions, whole, last, whole=_gathering(comm.mpi, mat), mine=slice(*first)
+            )
     except ArithmeticError:
         pass
     return None if largest(comm, made is None) else made

@@ -57,12 +57,21 @@ class Dashpots:
     material: LinearElastic | None = None
     normal: float = 1.0
     tangential: float = 1.0
-    lets_waves_in: ClassVar[bool] = False  # the run's motion does not come in here; displacements would be of space
+    lets_waves_in: ClassVar[bool] = (
+        False  # the run's motion does not come in here; displacements would be of space
+    )
 
     def __post_init__(self) -> None:
         owner = type(self).__name__
         facets_of(owner, "facets", self.facets)
-        optional(instance, owner, "material", self.material, LinearElastic, "give a LinearElastic, or None")
+        optional(
+            instance,
+            owner,
+            "material",
+            self.material,
+            LinearElastic,
+            "give a LinearElastic, or None",
+        )
         attributes(self, not_negative=("normal", "tangential"))
 
     def loads(self, matrix: "DashpotMatrix", forms: Any) -> BoundaryLoads:
@@ -84,7 +93,12 @@ class CompliantBase(Dashpots):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        function("CompliantBase", "motion", self.motion, "give upgoing(record), or a function of the time [s]")
+        function(
+            "CompliantBase",
+            "motion",
+            self.motion,
+            "give upgoing(record), or a function of the time [s]",
+        )
 
     def loads(self, matrix: "DashpotMatrix", forms: Any) -> BoundaryLoads:
         """Return the load of the upgoing wave, 2 Pᵀ D v_up."""
@@ -106,10 +120,14 @@ class DashpotMatrix:
         self.space, self.dashpots = space, dashpots
         own = dashpots.material is not None
         if not own and not forms.fields:
-            raise InputError(f"dashpots on '{dashpots.facets.name}' need a density and wave speeds, and forms=… have "
-                             f"none: give {type(dashpots).__name__}(…, material=), or a material beside the forms")
+            raise InputError(
+                f"dashpots on '{dashpots.facets.name}' need a density and wave speeds, and forms=… have "
+                f"none: give {type(dashpots).__name__}(…, material=), or a material beside the forms"
+            )
         cells = compat.cell_space(space.mesh) if own else forms.fields["rho"].function_space
-        moduli = (0.0 if own else forms.fields[name].x.array for name in ("lame", "shear", "rho"))  # times thickness
+        moduli = (
+            0.0 if own else forms.fields[name].x.array for name in ("lame", "shear", "rho")
+        )  # times thickness
         cellwise = []
         for values in impedances(dashpots, forms.section, *moduli):
             cellwise.append(compat.function(cells))
@@ -135,20 +153,26 @@ class DashpotMatrix:
     def _refuse_held(self) -> None:
         name, total = self.dashpots.facets.name, self._resistance(self.mat).sum()
         if np.isnan(total):
-            raise InputError(f"dashpots on '{name}' stand beside orthotropic cells, whose waves have several speeds: "
-                             f"give {type(self.dashpots).__name__}(…, material=)")
+            raise InputError(
+                f"dashpots on '{name}' stand beside orthotropic cells, whose waves have several speeds: "
+                f"give {type(self.dashpots).__name__}(…, material=)"
+            )
         if total == 0.0:
-            raise InputError(f"dashpots on '{name}' resist nothing: choose facets of the outer boundary and a positive "
-                             "factor")
+            raise InputError(
+                f"dashpots on '{name}' resist nothing: choose facets of the outer boundary and a positive "
+                "factor"
+            )
         for condition in self.space.prescribed:
             for both, held in condition.on_facets(self.space, self.dashpots.facets.indices):
                 if not largest(self.space.comm, len(both)):
                     continue
                 resisted = self._resistance(self._matrix(both)) > NO_RESISTANCE * total
                 if any(resisted[c] for c in held):
-                    raise InputError(f"boundary '{name}' has dashpots in a direction that is prescribed on "
-                                     f"'{condition.name}': a component is either prescribed or damped, so leave "
-                                     "out one of the two")
+                    raise InputError(
+                        f"boundary '{name}' has dashpots in a direction that is prescribed on "
+                        f"'{condition.name}': a component is either prescribed or damped, so leave "
+                        "out one of the two"
+                    )
 
     def moved_by(self, motion: Callable[[float], Array], factor: float) -> Callable[[float], Array]:
         """Return the load factor Pᵀ D v(t), v the same at all nodes."""
@@ -159,24 +183,36 @@ class DashpotMatrix:
         def load(t: float) -> Array:
             v = np.asarray(motion(t))
             if v.dtype.kind not in "iuf" or v.shape != (len(rows),) or not np.all(np.isfinite(v)):
-                raise InputError(f"{name}: motion({t:g}) is {v}: return {len(rows)} finite velocities")
+                raise InputError(
+                    f"{name}: motion({t:g}) is {v}: return {len(rows)} finite velocities"
+                )
             return np.asarray(columns @ v)
 
         return load
 
 
-def impedances(dashpots: Dashpots, section: Section, lame: Any, shear: Any, rho: Any) -> tuple[Any, Any]:
+def impedances(
+    dashpots: Dashpots, section: Section, lame: Any, shear: Any, rho: Any
+) -> tuple[Any, Any]:
     """Return thickness · (normal rho c_P, tangential rho c_S): of the ground beside the dashpots, whose constants given
     here hold the thickness already, or of their own material."""
     if dashpots.material is not None:
         rho = section.thickness * dashpots.material.rho
-        lame, shear = (section.thickness * value for value in section.elastic_constants(dashpots.material))
-    return dashpots.normal * np.sqrt((lame + 2.0 * shear) * rho), dashpots.tangential * np.sqrt(shear * rho)
+        lame, shear = (
+            section.thickness * value for value in section.elastic_constants(dashpots.material)
+        )
+    return dashpots.normal * np.sqrt((lame + 2.0 * shear) * rho), dashpots.tangential * np.sqrt(
+        shear * rho
+    )
 
 
-def describe_boundaries(boundaries: Sequence[Dashpots], rank: int, notes: tuple[str, ...] = ()) -> tuple[str, ...]:
+def describe_boundaries(
+    boundaries: Sequence[Dashpots], rank: int, notes: tuple[str, ...] = ()
+) -> tuple[str, ...]:
     """Return these notes and what each boundary expects, logged on rank 0."""
-    notes += tuple(f"{type(one).__name__} on '{one.facets.name}' {one.expects}" for one in boundaries)
+    notes += tuple(
+        f"{type(one).__name__} on '{one.facets.name}' {one.expects}" for one in boundaries
+    )
     for note in notes if rank == 0 else ():
         log.info("%s", note)
     return notes

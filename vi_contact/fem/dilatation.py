@@ -24,8 +24,12 @@ class MeanDilatation:
     def __init__(self, V: Any) -> None:
         self._cells = compat.cell_space(V.mesh)
         q, u = ufl.TestFunction(self._cells), ufl.TrialFunction(V)
-        self._integral = PetscMatrix(compat.assemble_matrix(compat.compile_form(q * ufl.div(u) * ufl.dx)))
-        self._volume: Array = np.array(compat.assemble_vector(compat.compile_form(q * ufl.dx)).array_r)
+        self._integral = PetscMatrix(
+            compat.assemble_matrix(compat.compile_form(q * ufl.div(u) * ufl.dx))
+        )
+        self._volume: Array = np.array(
+            compat.assemble_vector(compat.compile_form(q * ufl.dx)).array_r
+        )
         self._means: list[tuple[Any, Any]] = []
 
     def add(self, matrix: Any, *moduli: Any) -> None:

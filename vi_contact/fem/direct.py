@@ -15,7 +15,9 @@ from ..core.errors import InputError
 log = logging.getLogger(__name__)
 FULL_ROW = 40.0  # entries of a row: 2D meshes have fewer, 3D meshes more
 FEW_ROWS = 10_000  # with full rows: beyond, MUMPS' dense blocks pay
-COPIED_ROWS = 300_000  # with sparse rows: a copy of the factor on every rank takes about 0.5 GB here
+COPIED_ROWS = (
+    300_000  # with sparse rows: a copy of the factor on every rank takes about 0.5 GB here
+)
 ZERO_PIVOT = (71, 81)  # errors of PETSc: a zero pivot of LU, of Cholesky
 MEMORY = (55,)  # PETSC_ERR_MEM
 OUT_OF_MEMORY = 3  # PC_FACTOR_OUTMEMORY
@@ -43,13 +45,19 @@ def by_mumps(mat: Any, *, symmetric: bool, own: bool) -> bool:
     what is missing, unless options of the user choose (``own``). Collective."""
     serves = symmetric and own_serves(mat)
     mumps = packages.petsc_has("mumps") and not serves
-    missing = [] if packages.petsc_has("cholmod") and packages.petsc_has("amd") else ["SuiteSparse (CHOLMOD, AMD)"]
+    missing = (
+        []
+        if packages.petsc_has("cholmod") and packages.petsc_has("amd")
+        else ["SuiteSparse (CHOLMOD, AMD)"]
+    )
     missing += [] if packages.petsc_has("mumps") or serves else ["MUMPS"]
     if missing and not own and mat.comm.rank == 0:
         kind = "Cholesky" if symmetric else "LU"
         taken = "MUMPS" if mumps else f"PETSc's own {kind}, ordered by '{ordering()}'"
         copied = "" if mat.comm.size == 1 or mumps else ", with a copy on every rank,"
-        log.info("%s%s factorises, as this PETSc has no %s", taken, copied, " and no ".join(missing))
+        log.info(
+            "%s%s factorises, as this PETSc has no %s", taken, copied, " and no ".join(missing)
+        )
     return mumps
 
 
@@ -61,15 +69,23 @@ def failure(pc: Any, mat: Any, error: Any = None) -> InputError:
     code = 0 if error is None else error.ierr
     reason = _reason(pc, mat) if error is None else None
     if code in MEMORY or reason == "memory":
-        return InputError(f"there is not enough memory to factorise the effective matrix of {rows} unknowns: take "
-                          "Iterative(), which factorises nothing, or more memory")
-    no_diagonal = "missing diagonal" in said  # a row of a symmetric matrix without one: no positive definite matrix
+        return InputError(
+            f"there is not enough memory to factorise the effective matrix of {rows} unknowns: take "
+            "Iterative(), which factorises nothing, or more memory"
+        )
+    no_diagonal = (
+        "missing diagonal" in said
+    )  # a row of a symmetric matrix without one: no positive definite matrix
     if code in ZERO_PIVOT or no_diagonal or reason == "singular":
-        return InputError("the effective matrix cannot be factorised: it is singular or contains NaN: check the "
-                          "materials, and that every part of the body is clamped or has mass")
+        return InputError(
+            "the effective matrix cannot be factorised: it is singular or contains NaN: check the "
+            "materials, and that every part of the body is clamped or has mass"
+        )
     what = f"error {code}, {said}" if error is not None else reason
-    return InputError(f"PETSc cannot factorise the effective matrix ({what}): take Iterative(), which factorises "
-                      "nothing, or another factorisation by PETSc's options vi_contact_factor_…")
+    return InputError(
+        f"PETSc cannot factorise the effective matrix ({what}): take Iterative(), which factorises "
+        "nothing, or another factorisation by PETSc's options vi_contact_factor_…"
+    )
 
 
 def _reason(pc: Any, mat: Any) -> str:

@@ -47,27 +47,47 @@ def taken_space(mesh: Any, V: Any, bcs: Sequence[Any], degree: int) -> tuple[Any
     """Return (the user's space, or that of the conditions without one; its degree); (None, degree) without both."""
     counts = mesh.comm.allgather(len(bcs)) if hasattr(mesh, "comm") else [0]
     if min(counts) < max(counts):
-        raise InputError(f"assemble: bcs has {max(counts)} items on one rank and {min(counts)} on another; give all "
-                         "ranks the same list, also where a rank has none of its unknowns")
+        raise InputError(
+            f"assemble: bcs has {max(counts)} items on one rank and {min(counts)} on another; give all "
+            "ranks the same list, also where a rank has none of its unknowns"
+        )
     for bc in bcs:
         provides("assemble", "bcs", bc, ("dof_indices", "function_space", "g"), REMEDY)
         if not compat.is_on(bc.function_space, mesh):
             raise InputError(f"assemble: a dirichletbc of bcs is on another mesh; {REMEDY}")
     if V is None:
         made = (compat.vector_space(mesh, one) for one in (1, 2)) if bcs else ()
-        found = [(one, k) for k, one in enumerate(made, 1) if _block_of(one, bcs[0].function_space) is not None]
+        found = [
+            (one, k)
+            for k, one in enumerate(made, 1)
+            if _block_of(one, bcs[0].function_space) is not None
+        ]
         if bcs and not found:
-            raise InputError(f"assemble: a dirichletbc of bcs is on a space of another kind; {REMEDY}")
+            raise InputError(
+                f"assemble: a dirichletbc of bcs is on a space of another kind; {REMEDY}"
+            )
         return found[0] if found else (None, degree)
-    provides("assemble", "space", V, ("dofmap", "ufl_element", "component"), "give a DOLFINx function space, or None")
+    provides(
+        "assemble",
+        "space",
+        V,
+        ("dofmap", "ufl_element", "component"),
+        "give a DOLFINx function space, or None",
+    )
     if not compat.is_on(V, mesh):
         raise InputError("assemble: space is on another mesh; give a space on this one")
     for k in (1, 2):
         known = compat.vector_space(mesh, k)
-        if V.ufl_element() == known.ufl_element() and _block_of(known, V) is not None and not len(V.component()):
+        if (
+            V.ufl_element() == known.ufl_element()
+            and _block_of(known, V) is not None
+            and not len(V.component())
+        ):
             return V, k
-    raise InputError(f"assemble: space is one of {V.ufl_element()}; give the Lagrange space of degree 1 or 2 with "
-                     f"{mesh.geometry.dim} components, not a part of another space")
+    raise InputError(
+        f"assemble: space is one of {V.ufl_element()}; give the Lagrange space of degree 1 or 2 with "
+        f"{mesh.geometry.dim} components, not a part of another space"
+    )
 
 
 def taken(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[GivenValues, ...]:
@@ -77,16 +97,26 @@ def taken(mesh: Any, V: Any, bcs: Sequence[Any]) -> tuple[GivenValues, ...]:
     for k, bc in enumerate(bcs):
         name, block = f"bcs[{k}]", _block_of(V, bc.function_space)
         if block is None:
-            raise InputError(f"assemble: {name} is on another space than the displacement's; {REMEDY}")
+            raise InputError(
+                f"assemble: {name} is on another space than the displacement's; {REMEDY}"
+            )
         dofs, values = compat.bc_values(bc, d * len(block))
         known = block[dofs // d] >= 0
         where = block[dofs[known] // d], dofs[known] % d
-        mask, given = np.zeros((2, V.dofmap.index_map.size_local + V.dofmap.index_map.num_ghosts, d))
+        mask, given = np.zeros(
+            (2, V.dofmap.index_map.size_local + V.dofmap.index_map.num_ghosts, d)
+        )
         mask[where], given[where] = 1.0, values[known]
-        defect = "" if np.all(np.isfinite(values)) else f"assemble: {name} has NaN or infinite values; correct them"
+        defect = (
+            ""
+            if np.all(np.isfinite(values))
+            else f"assemble: {name} has NaN or infinite values; correct them"
+        )
         refuse([defect], comm)
         if not largest(comm, len(dofs)):
-            raise InputError(f"assemble: {name} prescribes no unknown on any rank; check how its dofs were located")
+            raise InputError(
+                f"assemble: {name} prescribes no unknown on any rank; check how its dofs were located"
+            )
         found.append(GivenValues(name, mask > 0.0, given, bool(largest(comm, max_abs(values)))))
     return tuple(found)
 
@@ -103,19 +133,35 @@ def refuse_contradictions(space: Any) -> None:
     for i, j in product(np.flatnonzero(~given), np.flatnonzero(given)):
         moves = space.prescribed[i].moves and callable(space.prescribed[i].displacement)
         apart = np.abs(held[i] - held[j])
-        both, *each = space.comm.sum(np.array([np.isfinite(one).sum() for one in (apart, held[i], held[j])]))
+        both, *each = space.comm.sum(
+            np.array([np.isfinite(one).sum() for one in (apart, held[i], held[j])])
+        )
         if both and both in each and (moves or largest(space.comm, np.nanmax(apart, initial=0.0))):
-            raise InputError(f"assemble: {space.prescribed[j].name} and what is prescribed on "
-                             f"'{space.prescribed[i].name}' differ at an unknown of both: leave one of them out")
+            raise InputError(
+                f"assemble: {space.prescribed[j].name} and what is prescribed on "
+                f"'{space.prescribed[i].name}' differ at an unknown of both: leave one of them out"
+            )
 
 
 def _block_of(V: Any, S: Any) -> Indices | None:
     """The block of V that each block of a space is, of S = V or V.sub(i), -1 without cells; None, on all ranks, where
     S is of another kind. Spaces made twice may be numbered differently. Collective."""
-    d, theirs, mine, rows = V.mesh.geometry.dim, S.dofmap.index_map, compat.cell_blocks(V), compat.blocks_of_cells(S)
-    fits = S.dofmap.index_map_bs == d and S.dofmap.bs == (1 if len(S.component()) else d) and rows.shape == mine.shape
+    d, theirs, mine, rows = (
+        V.mesh.geometry.dim,
+        S.dofmap.index_map,
+        compat.cell_blocks(V),
+        compat.blocks_of_cells(S),
+    )
+    fits = (
+        S.dofmap.index_map_bs == d
+        and S.dofmap.bs == (1 if len(S.component()) else d)
+        and rows.shape == mine.shape
+    )
     block = np.full(theirs.size_local + theirs.num_ghosts, -1, dtype=np.int64)
     if fits:
         block[rows] = mine
-        fits = np.array_equal(block[rows], mine) and V.dofmap.index_map.size_global == theirs.size_global
+        fits = (
+            np.array_equal(block[rows], mine)
+            and V.dofmap.index_map.size_global == theirs.size_global
+        )
     return None if largest(MpiComm(V.mesh.comm), not fits) else block

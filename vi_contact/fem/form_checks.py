@@ -24,8 +24,10 @@ PROBES = 4
 def refuse_complex(owner: str) -> None:
     """Raise InputError where PETSc computes with complex numbers: inequalities have no meaning there."""
     if np.issubdtype(PETSc.ScalarType, np.complexfloating):
-        raise InputError(f"{owner}: this PETSc computes with complex numbers, of which none is less than another; use "
-                         "DOLFINx with a PETSc of real numbers (Debian: python3-dolfinx-real)")
+        raise InputError(
+            f"{owner}: this PETSc computes with complex numbers, of which none is less than another; use "
+            "DOLFINx with a PETSc of real numbers (Debian: python3-dolfinx-real)"
+        )
 
 
 def takes(name: str, call: Any, *arguments: str) -> None:
@@ -35,7 +37,9 @@ def takes(name: str, call: Any, *arguments: str) -> None:
     try:
         signature(call).bind(*arguments)
     except TypeError as error:
-        raise InputError(f"Forms: {name} cannot be called with ({', '.join(arguments)}), {error}; {remedy}") from None
+        raise InputError(
+            f"Forms: {name} cannot be called with ({', '.join(arguments)}), {error}; {remedy}"
+        ) from None
     except ValueError:  # of a function in C: it tells when it is called
         return
 
@@ -44,21 +48,35 @@ def form_of(said: str, call: Callable[..., Any], space: FemSpace, *arguments: An
     """Return call(*arguments), a form linear in all of them on the mesh of the space; InputError, which begins with
     ``said``, on all ranks otherwise. Collective."""
     form = on_all(space.comm, said, lambda: call(*arguments))
-    instance(said, "what it returns", form, ufl.Form, "return an integral, such as ufl.inner(…, …) * ufl.dx")
+    instance(
+        said,
+        "what it returns",
+        form,
+        ufl.Form,
+        "return an integral, such as ufl.inner(…, …) * ufl.dx",
+    )
     if set(on_all(space.comm, said, form.arguments)) != set(arguments):
-        raise InputError(f"{said} is not a form in the given trial and test functions; return one that is not zero and "
-                         "is linear in each of them")
+        raise InputError(
+            f"{said} is not a form in the given trial and test functions; return one that is not zero and "
+            "is linear in each of them"
+        )
     on_all(space.comm, said, lambda: refuse_not_linear(said, form))
     own = space.mesh.ufl_domain().ufl_id()
     functions = (getattr(one, "function_space", space.V) for one in form.coefficients())
-    if any(one.ufl_id() != own for one in form.ufl_domains()) or any(V.mesh is not space.mesh for V in functions):
-        raise InputError(f"{said} is of another mesh; give measures and Functions of the mesh of the body")
+    if any(one.ufl_id() != own for one in form.ufl_domains()) or any(
+        V.mesh is not space.mesh for V in functions
+    ):
+        raise InputError(
+            f"{said} is of another mesh; give measures and Functions of the mesh of the body"
+        )
     if any(one.integral_type() == "interior_facet" for one in form.integrals()):
         maps = space.V.dofmap.index_map, space.mesh.topology.index_map(space.mesh.topology.dim)
         nodes, cells = space.comm.sum(np.array([one.num_ghosts for one in maps]))
         if nodes and not cells:  # no rank knows both cells of a facet between ranks
-            raise InputError(f"{said} integrates over interior facets (dS), which on several ranks needs a mesh with "
-                             "ghost_mode=shared_facet")
+            raise InputError(
+                f"{said} integrates over interior facets (dS), which on several ranks needs a mesh with "
+                "ghost_mode=shared_facet"
+            )
     return form
 
 
@@ -66,15 +84,23 @@ def refuse_not_linear(said: str, form: Any) -> None:
     """Ask UFL here, on every rank: the compiler asks on one, and the others would wait for it."""
     try:
         compute_form_data(form)
-    except (ArityMismatch, TypeError, ValueError):  # the first is no Exception; others where UFL words it and fails
-        raise InputError(f"{said} is not linear in u or in v; return a sum of products of one and the other") from None
+    except (
+        ArityMismatch,
+        TypeError,
+        ValueError,
+    ):  # the first is no Exception; others where UFL words it and fails
+        raise InputError(
+            f"{said} is not linear in u or in v; return a sum of products of one and the other"
+        ) from None
 
 
 def matrix_of(name: str, space: FemSpace, compiled: Callable[[], Any]) -> Any:
     """Return the assembled matrix of a form, finite. Collective."""
     matrix = compat.assemble_matrix(on_all(space.comm, f"Forms: {name}", compiled))
     if not np.isfinite(matrix.norm(PETSc.NormType.FROBENIUS)):
-        raise InputError(f"Forms: {name} has NaN or infinite entries; check its Functions and Constants")
+        raise InputError(
+            f"Forms: {name} has NaN or infinite entries; check its Functions and Constants"
+        )
     return matrix
 
 
@@ -87,13 +113,17 @@ def refuse_masses(matrix: Any, space: FemSpace) -> None:
     """Raise InputError unless a full mass matrix is symmetric and positive, as its diagonal and some products tell."""
     M = PetscMatrix(matrix)
     if not is_symmetric(matrix, space):
-        raise InputError("Forms: mass is not symmetric; give a form in which u and v may be exchanged")
+        raise InputError(
+            "Forms: mass is not symmetric; give a form in which u and v may be exchanged"
+        )
     least = -largest(space.comm, -np.min(M.diagonal(), initial=np.inf))
     motions = [*space.translations, *(probe(_numbers(space), j) for j in range(PROBES))]
     energies = [space.comm.sum(np.array([w @ (M @ w)]))[0] for w in motions]
     if not (least > 0.0 and min(energies) > 0.0):
-        raise InputError("Forms: mass is not positive: some motion would have a kinetic energy of zero or less; "
-                         "give a density above zero everywhere")
+        raise InputError(
+            "Forms: mass is not positive: some motion would have a kinetic energy of zero or less; "
+            "give a density above zero everywhere"
+        )
 
 
 def _numbers(space: FemSpace) -> Any:
@@ -108,4 +138,6 @@ def refuse_stress(call: Callable[[Any], Any], space: FemSpace) -> None:
     shape = getattr(stress, "ufl_shape", None)
     if shape != (d, d) and not (d == 2 and shape == (3, 3)):
         more = " or, with sigma_zz, (3, 3)" if d == 2 else ""
-        raise InputError(f"Forms: stress has shape {shape}; return a tensor of shape {(d, d)}{more}")
+        raise InputError(
+            f"Forms: stress has shape {shape}; return a tensor of shape {(d, d)}{more}"
+        )

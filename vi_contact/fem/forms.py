@@ -49,8 +49,13 @@ class ElasticForms:
     notes: tuple[str, ...] = ()
 
     def __init__(
-        self, space: FemSpace, materials: list[tuple[Any, Material]], section: Section, damping: Damping,
-        *, selective: bool = False,
+        self,
+        space: FemSpace,
+        materials: list[tuple[Any, Material]],
+        section: Section,
+        damping: Damping,
+        *,
+        selective: bool = False,
     ) -> None:
         self.space, self.section, self.damping, space.forms = space, section, damping, self
         self.dilatation = MeanDilatation(space.V) if selective else None
@@ -63,21 +68,32 @@ class ElasticForms:
         values = [_constants(cells, where, one) for where, one in materials]
         found = getattr(damping, "viscosities", None)
         self.viscous = found if found and any(found) else None  # (lambda_v, mu_v) [Pa s]
-        damped = self.viscous is not None or any(np.any(one) for each in values for one in damping.coefficients(each))
-        self.damped = bool(largest(space.comm, damped))  # a ratio may be zero in all cells of some ranks
-        ratios = [_largest_ratio(cells, where, one) for (where, _), one in zip(materials, values, strict=True)]
+        damped = self.viscous is not None or any(
+            np.any(one) for each in values for one in damping.coefficients(each)
+        )
+        self.damped = bool(
+            largest(space.comm, damped)
+        )  # a ratio may be zero in all cells of some ranks
+        ratios = [
+            _largest_ratio(cells, where, one)
+            for (where, _), one in zip(materials, values, strict=True)
+        ]
         self.largest_ratio = float(largest(space.comm, max(ratios, default=0.0)))
         self.fields = {name: compat.function(cells) for name in names} if materials else {}
         if not self.damped and materials:
             self.fields["alpha_rho"] = self.fields["beta"]  # zeros
         for (where, _), one in zip(materials, values, strict=True):
             dofs = compat.cell_blocks(cells)[where]
-            for name, value in zip(names, _fields(one, section, damping, space.dimension), strict=True):
+            for name, value in zip(
+                names, _fields(one, section, damping, space.dimension), strict=True
+            ):
                 value = section.thickness * value if name != "beta" else value
                 self.fields[name].x.array[dofs] = value[dofs] if np.ndim(value) else value
         self._anisotropic: Any = None
         if any(isinstance(one, Orthotropic) for _, one in materials):
-            self._anisotropic = _anisotropic(cells, degree, materials, self.fields, section, space.dimension)
+            self._anisotropic = _anisotropic(
+                cells, degree, materials, self.fields, section, space.dimension
+            )
 
     def cellwise(self, name: str) -> Array:
         """Return the means of a field over the local cells, (cells,)."""
@@ -93,7 +109,9 @@ class ElasticForms:
 
     def foreign(self, system: SemiDiscreteSystem, names: str) -> str:
         """Return the letters of ``names`` whose matrices in a system were not made of these materials."""
-        return "".join(name for name in names if getattr(system, name) not in (None, *self._matrices[name]))
+        return "".join(
+            name for name in names if getattr(system, name) not in (None, *self._matrices[name])
+        )
 
     def stress(self, u: Any) -> Any:
         """Return sigma(u) (d, d) times the thickness, of a Function less that of initial strains. With these, or with
@@ -118,7 +136,9 @@ class ElasticForms:
         place = {pair: k for k, pair in enumerate(VOIGT[d])}
         strains = [eps[i, j] if i == j else 2 * eps[i, j] for i, j in place] + [across] * (d == 2)
         flat = ufl.dot(self._anisotropic, ufl.as_vector(strains))
-        sigma = ufl.as_tensor([[flat[place[min(i, j), max(i, j)]] for j in range(d)] for i in range(d)])
+        sigma = ufl.as_tensor(
+            [[flat[place[min(i, j), max(i, j)]] for j in range(d)] for i in range(d)]
+        )
         return sigma, flat[3] if d == 2 else 0.0 * trace
 
     def _trace(self, u: Any) -> Any:
@@ -156,7 +176,10 @@ class ElasticForms:
 
     def _viscous_form(self) -> Any:
         """∫ of the viscous stresses of KelvinVoigt."""
-        lame, shear = (compat.constant(self.space.mesh, self.section.thickness * one) for one in self.viscous or ())
+        lame, shear = (
+            compat.constant(self.space.mesh, self.section.thickness * one)
+            for one in self.viscous or ()
+        )
         rate, strain = (ufl.sym(ufl.grad(one)) for one in (self.u, self.v))
         return (lame * ufl.tr(rate) * ufl.tr(strain) + 2 * shear * ufl.inner(rate, strain)) * ufl.dx
 
@@ -164,7 +187,9 @@ class ElasticForms:
         """Assemble the full matrix M, K, or C of the materials (PETSc), before elimination."""
         matrix = compat.assemble_matrix(self.space.compiled(self.bilinear(name)))
         if self.dilatation is not None and name != "M":
-            self.dilatation.add(matrix, self.fields["lame"], self.fields["beta"] if name == "C" else None)
+            self.dilatation.add(
+                matrix, self.fields["lame"], self.fields["beta"] if name == "C" else None
+            )
         return matrix
 
 
@@ -205,11 +230,18 @@ def _fields(one: Any, section: Section, damping: Damping, dimension: int) -> tup
 
 
 def _anisotropic(
-    cells: Any, degree: int, materials: list[tuple[Any, Material]], fields: dict[str, Any], section: Section, d: int
+    cells: Any,
+    degree: int,
+    materials: list[tuple[Any, Material]],
+    fields: dict[str, Any],
+    section: Section,
+    d: int,
 ) -> Any:
     """The matrix of all cells (see ``Orthotropic.matrix``) times the thickness, as a function."""
     if d == 1:
-        raise InputError("Orthotropic is for bodies in the plane or in space: give a LinearElastic here")
+        raise InputError(
+            "Orthotropic is for bodies in the plane or in space: give a LinearElastic here"
+        )
     n, trace = len(VOIGT[d]), np.array([float(i == j) for i, j in VOIGT[d]])
     rows = n + (d == 2)  # the last one is that of the strain and the stress across the plane
     found = compat.function(compat.lagrange(cells.mesh, degree, (rows, rows), continuous=False))
@@ -217,10 +249,15 @@ def _anisotropic(
     for where, one in materials:
         dofs = np.ravel(compat.cell_blocks(cells)[where])
         if isinstance(one, Orthotropic):
-            told, corner = section.thickness * one.matrix(section, d), section.thickness * one.stiffness[2, 2, 2, 2]
+            told, corner = (
+                section.thickness * one.matrix(section, d),
+                section.thickness * one.stiffness[2, 2, 2, 2],
+            )
             whole, across = told[:n], told[n:]
         else:
-            lame, shear, out = (fields[name].x.array[dofs][:, None, None] for name in ("lame", "shear", "lame_out"))
+            lame, shear, out = (
+                fields[name].x.array[dofs][:, None, None] for name in ("lame", "shear", "lame_out")
+            )
             whole = lame * np.outer(trace, trace) + shear * np.diag(1.0 + trace)
             across, corner = out * trace, out + 2.0 * shear
         values[dofs, :n, :n], values[dofs, n:, :n] = whole, across
@@ -239,13 +276,19 @@ def cell_materials(mesh: Any, material: Materials) -> list[tuple[Any, Material]]
         covered[cells.indices] += 1
     own = covered[: cell_map.size_local]
     counts = [np.sum(np.asarray(cells.indices) < cell_map.size_local) for cells, _ in material]
-    missing, twice, *counts = mesh.comm.allreduce(np.array([np.sum(own == 0), np.sum(own > 1), *counts]))
+    missing, twice, *counts = mesh.comm.allreduce(
+        np.array([np.sum(own == 0), np.sum(own > 1), *counts])
+    )
     for (cells, _), count in zip(material, counts, strict=True):
         if not count:
-            raise InputError(f"the cell group '{cells.name}' of a material has no cells: correct the group, or leave "
-                             "its (cells, material) pair out")
+            raise InputError(
+                f"the cell group '{cells.name}' of a material has no cells: correct the group, or leave "
+                "its (cells, material) pair out"
+            )
     if twice:
-        raise InputError(f"{twice} cells have more than one material: give cell groups that do not overlap")
+        raise InputError(
+            f"{twice} cells have more than one material: give cell groups that do not overlap"
+        )
     if missing:
         raise InputError(
             f"{missing} cells have no material: give a (cells, material) pair for every cell group of the mesh"

@@ -28,14 +28,22 @@ def _group(owner: str, meaning: str, group: Any, mesh: Mesh | None, wanted: type
     if isinstance(group, wanted):
         if mesh is None or group.mesh is mesh:
             return group
-        raise InputError(f"{owner}: {meaning} is the {kind} '{group.name}' of another mesh; give one of this mesh")
+        raise InputError(
+            f"{owner}: {meaning} is the {kind} '{group.name}' of another mesh; give one of this mesh"
+        )
     if isinstance(group, Group):
-        raise InputError(f"{owner}: {meaning} is the {KINDS[type(group)]} '{group.name}'; give a {kind}")
+        raise InputError(
+            f"{owner}: {meaning} is the {KINDS[type(group)]} '{group.name}'; give a {kind}"
+        )
     if hasattr(group, "find") and hasattr(group, "indices"):
-        raise InputError(f"{owner}: {meaning} is a DOLFINx MeshTags, with several values; give "
-                         f"fem.{wanted.__name__}.tagged(name, tags, value, mesh) with the value that is meant")
-    raise InputError(f"{owner}: {meaning} is {shown(group)}; give a {kind}, such as tags['name'] of fem.read_mesh or "
-                     f"fem.{wanted.__name__}(name, numbers, mesh)")
+        raise InputError(
+            f"{owner}: {meaning} is a DOLFINx MeshTags, with several values; give "
+            f"fem.{wanted.__name__}.tagged(name, tags, value, mesh) with the value that is meant"
+        )
+    raise InputError(
+        f"{owner}: {meaning} is {shown(group)}; give a {kind}, such as tags['name'] of fem.read_mesh or "
+        f"fem.{wanted.__name__}(name, numbers, mesh)"
+    )
 
 
 def field_given(owner: str, meaning: str, value: Any) -> None:
@@ -43,7 +51,9 @@ def field_given(owner: str, meaning: str, value: Any) -> None:
     if callable(value):
         function(owner, meaning, value, "give numbers, one per dimension, or a function")
         return
-    for one in several(owner, meaning, value, "give numbers, one per dimension, or a function of points and time"):
+    for one in several(
+        owner, meaning, value, "give numbers, one per dimension, or a function of points and time"
+    ):
         if not isinstance(one, float):  # NaN too
             array(owner, f"a component of {meaning}", one, ())
 
@@ -52,11 +62,17 @@ def components_of(meaning: str, given: tuple[int, ...] | None, dimension: int) -
     """Return the components that are given, all of them for None; InputError for one that does not exist."""
     for c in given or ():
         if not 0 <= c < dimension:
-            raise InputError(f"{meaning} component {c} does not exist: give numbers from 0 to {dimension - 1}")
+            raise InputError(
+                f"{meaning} component {c} does not exist: give numbers from 0 to {dimension - 1}"
+            )
     return tuple(range(dimension) if given is None else given)
 
 
 def components_given(owner: str, value: Any) -> None:
     """Raise InputError unless it is None or a tuple of whole numbers (whose range is told where they are used)."""
-    for one in () if value is None else several(owner, "components", value, "give a tuple, such as (0,), or None"):
+    for one in (
+        ()
+        if value is None
+        else several(owner, "components", value, "give a tuple, such as (0,), or None")
+    ):
         whole(owner, "a component", one)

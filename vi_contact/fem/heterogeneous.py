@@ -21,7 +21,12 @@ RANGES: dict[str, tuple[str, float, float, str]] = {
     "E": ("Young's modulus E [Pa]", 0.0, np.inf, "values above zero"),
     "nu": ("Poisson's ratio nu", -1.0, 0.5, "values between -1 and 0.5, both excluded"),
     "rho": ("the mass density rho [kg/m³]", 0.0, np.inf, "values above zero"),
-    "xi": ("the damping ratio xi", np.nextafter(0.0, -1.0), 1.0, "ratios from 0 to less than 1, not per cent"),
+    "xi": (
+        "the damping ratio xi",
+        np.nextafter(0.0, -1.0),
+        1.0,
+        "ratios from 0 to less than 1, not per cent",
+    ),
 }
 
 
@@ -51,8 +56,10 @@ class Heterogeneous:
             value = getattr(self, name)
             if isinstance(value, Expr):
                 if value.ufl_shape:
-                    raise InputError(f"Heterogeneous: {words} has values of shape {value.ufl_shape}; give one that is "
-                                     "scalar")
+                    raise InputError(
+                        f"Heterogeneous: {words} has values of shape {value.ufl_shape}; give one that is "
+                        "scalar"
+                    )
                 continue
             given = callable(value) and not isinstance(value, type)
             if not given and not low < number_given("Heterogeneous", words, value) < high:
@@ -62,7 +69,10 @@ class Heterogeneous:
     def varies(self) -> bool:
         """Return whether something changes inside of cells."""
         given = [one for one in (self.E, self.nu, self.rho, self.xi) if callable(one)]
-        return not all(_is_function(one) and one.function_space.dofmap.dof_layout.num_dofs == 1 for one in given)
+        return not all(
+            _is_function(one) and one.function_space.dofmap.dof_layout.num_dofs == 1
+            for one in given
+        )
 
     def at(self, space: Any, cells: Indices) -> ElasticValues:
         """Return the constants at all unknowns of a DG0 or DG1 space. InputError, on all ranks, for values on these
@@ -70,7 +80,10 @@ class Heterogeneous:
         comm = MpiComm(space.mesh.comm)
         mine = np.zeros(len(compat.function(space).x.array), dtype=bool)
         mine[compat.cell_blocks(space)[cells]] = True
-        values = {name: _values(words, getattr(self, name), space, comm) for name, (words, *_) in RANGES.items()}
+        values = {
+            name: _values(words, getattr(self, name), space, comm)
+            for name, (words, *_) in RANGES.items()
+        }
         refuse(_defects(values, mine, space), comm)
         return ElasticValues(**values)
 
@@ -80,15 +93,25 @@ def _is_function(value: Any) -> bool:
 
 
 def _values(words: str, value: Values, space: Any, comm: MpiComm) -> Array:
-    found, domains = compat.function(space), extract_domains(value) if isinstance(value, Expr) else ()
+    found, domains = (
+        compat.function(space),
+        extract_domains(value) if isinstance(value, Expr) else (),
+    )
     if any(one.ufl_id() != space.mesh.ufl_domain().ufl_id() for one in domains):
-        raise InputError(f"Heterogeneous: {words} is of another mesh; give it on the mesh of the body")
+        raise InputError(
+            f"Heterogeneous: {words} is of another mesh; give it on the mesh of the body"
+        )
 
     def at_points(x: Array) -> Array:
         values = np.positive(value(x), dtype=float)  # an error for complex numbers
-        if values.shape not in (x.shape[1:], (1, *x.shape[1:])):  # DOLFINx reads beyond values that are too few
-            raise InputError(f"Heterogeneous: {words} has values of shape {values.shape} at {x.shape[1]} points; give "
-                             "a function of points x (3, k) that returns (k,)")
+        if values.shape not in (
+            x.shape[1:],
+            (1, *x.shape[1:]),
+        ):  # DOLFINx reads beyond values that are too few
+            raise InputError(
+                f"Heterogeneous: {words} has values of shape {values.shape} at {x.shape[1]} points; give "
+                "a function of points x (3, k) that returns (k,)"
+            )
         return np.asarray(values)
 
     def fill() -> None:

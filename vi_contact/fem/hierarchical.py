@@ -61,13 +61,18 @@ class Hierarchy:
 
     def between(self, nodal: Array, known: Mask, mean: Any) -> Array:
         """Return owned nodal values (k, c), with a ``mean`` of the ends of edges at mid-points that are known."""
-        every, found = self.with_ghosts(nodal), self.with_ghosts(known[:, None])[self._mids, 0] > 0.0
+        every, found = (
+            self.with_ghosts(nodal),
+            self.with_ghosts(known[:, None])[self._mids, 0] > 0.0,
+        )
         every[self._mids[found]] = mean(every[self._ends[found]], axis=1)
         return every[: len(nodal)]
 
     def around(self, turn: Matrix | None, dual: Matrix | None) -> tuple[Matrix, Matrix]:
         """Return (T, T⁻ᵀ) of u = T û, the nodal unknowns of û being turned by ``turn`` and forces by ``dual``."""
-        return _product(self.H, turn), _product(PetscMatrix(self.back.mat.transpose(PETSc.Mat())), dual)
+        return _product(self.H, turn), _product(
+            PetscMatrix(self.back.mat.transpose(PETSc.Mat())), dual
+        )
 
     def _shares(self, share: float) -> PetscMatrix:
         """The identity and, in rows of mid-points, so much at the ends of their edges."""
@@ -75,12 +80,16 @@ class Hierarchy:
         n, d, owned = len(space.ids), space.dimension, self._mids < len(space.nodes)
         own = space.free_index.reshape(-1, d)[self._mids[owned]]
         ends = self.with_ghosts(space.numbers).astype(np.int64)[self._ends[owned]]
-        columns = np.concatenate([np.where(own >= 0, own + algebra.first(n), -1)[:, None], ends], axis=1)
+        columns = np.concatenate(
+            [np.where(own >= 0, own + algebra.first(n), -1)[:, None], ends], axis=1
+        )
         values = np.broadcast_to(np.array([1.0, share, share])[:, None], columns.shape)
         free = own >= 0
         row = np.broadcast_to((np.cumsum(free).reshape(free.shape) - 1)[:, None], columns.shape)
         used = (columns >= 0) & free[:, None]
-        entries = sp.csr_matrix((values[used], (row[used], columns[used])), shape=(free.sum(), space.unknowns))
+        entries = sp.csr_matrix(
+            (values[used], (row[used], columns[used])), shape=(free.sum(), space.unknowns)
+        )
         return as_petsc(algebra.replaced_rows(n, own[free], entries))
 
 

@@ -43,7 +43,13 @@ class InitialStrain(ActingLoad):
     cells: Cells | None = None
 
     def __post_init__(self) -> None:
-        optional(function, "InitialStrain", "history", self.history, "give a function of the time [s], or None")
+        optional(
+            function,
+            "InitialStrain",
+            "history",
+            self.history,
+            "give a function of the time [s], or None",
+        )
         optional(cells_of, "InitialStrain", "cells", self.cells)
         if not callable(self.value):
             dimensions = (1, 2, 3) if self.cells is None else (self.cells.mesh.geometry.dim,)
@@ -51,23 +57,35 @@ class InitialStrain(ActingLoad):
 
     def at(self, points: Array, room: Array, t: float) -> Array:
         """Return the tensors at points (k, d), less the history, in the shape (k, 9) of the room."""
-        value: Any = self.value(points, 0.0 if self.history else t) if callable(self.value) else self.value
+        value: Any = (
+            self.value(points, 0.0 if self.history else t) if callable(self.value) else self.value
+        )
         at_points = (len(points),) if callable(self.value) else ()
         found = _tensors(f"InitialStrain at t = {t:g} s", value, at_points, points.shape[1:])
         whole = np.zeros((len(points), 3, 3))
         whole[:, : found.shape[-1], : found.shape[-1]] = found
         if points.shape[1] == 2 and (whole + whole.swapaxes(1, 2))[:, 2, :2].any():
-            raise InputError("InitialStrain: value shears across the plane (xz or yz), where a body in the plane does "
-                             "not move; give zero there, or a body in space")
+            raise InputError(
+                "InitialStrain: value shears across the plane (xz or yz), where a body in the plane does "
+                "not move; give zero there, or a body in space"
+            )
         return whole.reshape(room.shape)
 
 
-def _tensors(owner: str, value: Any, leading: tuple[int, ...], dimensions: tuple[int, ...]) -> Array:
+def _tensors(
+    owner: str, value: Any, leading: tuple[int, ...], dimensions: tuple[int, ...]
+) -> Array:
     """Return strains, one or one at each point, as tensors; InputError unless one of these dimensions has the shape."""
     shape = shape_of(value)
-    if shape != leading and shape not in {(*leading, n, n) for d in dimensions for n in (d, 3 if d == 2 else d)}:
+    if shape != leading and shape not in {
+        (*leading, n, n) for d in dimensions for n in (d, 3 if d == 2 else d)
+    }:
         what = f"is {shown(value)}" if -1 in shape else f"has shape {shape}"
-        ask, k = (f"numbers ({leading[0]},), tensors", f"{leading[0]}, ") if leading else ("a number, a tensor", "")
+        ask, k = (
+            (f"numbers ({leading[0]},), tensors", f"{leading[0]}, ")
+            if leading
+            else ("a number, a tensor", "")
+        )
         raise InputError(f"{owner}: value {what}; give {ask} ({k}d, d) or in the plane ({k}3, 3)")
     found = array(owner, "value", value, shape)
     return np.multiply.outer(found, np.eye(3)) if shape == leading else found
@@ -84,8 +102,12 @@ class InitialStrains:
         self.parts = own, across = self._split(self._field)
         sigma, beyond = body.hooke(own, across, ufl.tr(own))
         self._work = self._space.compiled(ufl.inner(sigma, ufl.sym(ufl.grad(body.v))) * ufl.dx)
-        self._energy = self._space.compiled(0.5 * (ufl.inner(sigma, own) + beyond * across) * cell * ufl.dx)
-        self._still: tuple[Array, float] | None = None  # what ``energy`` takes of strains that never change
+        self._energy = self._space.compiled(
+            0.5 * (ufl.inner(sigma, own) + beyond * across) * cell * ufl.dx
+        )
+        self._still: tuple[Array, float] | None = (
+            None  # what ``energy`` takes of strains that never change
+        )
         for one in given:
             self.follow(0.0, only=one)  # tells of wrong functions before there is any work
 
@@ -93,16 +115,24 @@ class InitialStrains:
         """(Strain (d, d), that across the plane, none in plane stress) of tensors."""
         d, panel = self._space.dimension, isinstance(self._body.section, PlaneStress)
         free = d != 2 or panel
-        if d == 1:  # a bar cannot strain sideways, as its stiffness says: what is held there presses along it
+        if (
+            d == 1
+        ):  # a bar cannot strain sideways, as its stiffness says: what is held there presses along it
             lame, shear = self._body.fields["lame"], self._body.fields["shear"]
             sides = eps[1, 1] if panel else eps[1, 1] + eps[2, 2]
             return ufl.as_tensor([[eps[0, 0] + lame / (lame + 2 * shear) * sides]]), 0.0
-        return ufl.sym(ufl.as_tensor([[eps[i, j] for j in range(d)] for i in range(d)])), 0.0 if free else eps[2, 2]
+        return ufl.sym(
+            ufl.as_tensor([[eps[i, j] for j in range(d)] for i in range(d)])
+        ), 0.0 if free else eps[2, 2]
 
     def against(self, r: Any, inside: Any) -> Any:
         """Return -rᵀf_0 of the cells inside as a linear form, whose products are with what ``follow`` returns."""
         own, across = self._split(ufl.TestFunction(self.tensors))
-        return -inside * ufl.inner(self._body.hooke(own, across, ufl.tr(own))[0], ufl.sym(ufl.grad(r))) * ufl.dx
+        return (
+            -inside
+            * ufl.inner(self._body.hooke(own, across, ufl.tr(own))[0], ufl.sym(ufl.grad(r)))
+            * ufl.dx
+        )
 
     def follow(self, t: float, *, only: InitialStrain | None = None) -> Array:
         """Sum up the strains at a time, or one of them less its history; return the owned values."""
@@ -124,7 +154,10 @@ class InitialStrains:
 
     def energy(self, u: Array, t: float) -> float:
         """Return ½ ∫ eps_0 : C eps_0 - f_0·u [J], what they add to ½ uᵀKu of the free unknowns."""
-        found = self._still or (self.forces(t), float(compat.assemble_vector(self._energy).array_r.sum()))
+        found = self._still or (
+            self.forces(t),
+            float(compat.assemble_vector(self._energy).array_r.sum()),
+        )
         if not any(one.history or callable(one.value) for one in self._given):
             self._still = found
         return total(self._space.comm, found[1] - found[0] @ u)

@@ -42,12 +42,25 @@ class LinearForm:
     form: Callable[[Any], Any]
     history: Callable[[float], float] | None = None
     update: Callable[[float], Any] | None = None
-    _once: Any = field(default_factory=WeakKeyDictionary, init=False, repr=False, compare=False)  # space -> forces
+    _once: Any = field(
+        default_factory=WeakKeyDictionary, init=False, repr=False, compare=False
+    )  # space -> forces
 
     def __post_init__(self) -> None:
-        function(NAME, "form", self.form, "give a function of the test function v that returns a UFL form")
+        function(
+            NAME,
+            "form",
+            self.form,
+            "give a function of the test function v that returns a UFL form",
+        )
         for name in ("history", "update"):
-            optional(function, NAME, name, getattr(self, name), "give a function of the time [s], or None")
+            optional(
+                function,
+                NAME,
+                name,
+                getattr(self, name),
+                "give a function of the time [s], or None",
+            )
         if self.history is not None and self.update is not None:
             raise InputError(f"{NAME} has a history and an update; give one of the two only")
 
@@ -73,7 +86,9 @@ class LinearForm:
             vector.destroy()
             defect = f"{NAME} gives NaN or infinite forces at t = {t:g} s: check its Functions, Constants and numbers"
             refuse(["" if np.all(np.isfinite(forces)) else defect], space.comm)
-            return np.asarray(forces if update is not None else self._once.setdefault(space, forces))
+            return np.asarray(
+                forces if update is not None else self._once.setdefault(space, forces)
+            )
 
         return at
 

@@ -33,8 +33,14 @@ def evaluate_here(name: str, value: Value, points: Array, t: float) -> tuple[Arr
     if len(points) == 0:
         return np.zeros_like(points), ""  # users' functions need not cope with no points
     try:
-        result = np.asarray(value(points, t)) if callable(value) else np.tile(np.asarray(value), (len(points), 1))
-    except Exception as error:  # of a user's function, at the points of one rank: the others must not wait for it
+        result = (
+            np.asarray(value(points, t))
+            if callable(value)
+            else np.tile(np.asarray(value), (len(points), 1))
+        )
+    except (
+        Exception
+    ) as error:  # of a user's function, at the points of one rank: the others must not wait for it
         return np.zeros_like(points), ended(f"{name} at t = {t:g} s", error)
     if result.dtype.kind not in "iuf":
         defect = f"{name} returned {shown(result)}: return real numbers"
@@ -42,7 +48,9 @@ def evaluate_here(name: str, value: Value, points: Array, t: float) -> tuple[Arr
         shape = f"shape {result.shape} for {len(points)} points"
         defect = f"{name} returned {shape}: return {points.shape[1]} components per point"
     elif not np.all(np.isfinite(result)):
-        defect = f"{name} contains NaN or infinite values at t = {t:g} s: check its function or data"
+        defect = (
+            f"{name} contains NaN or infinite values at t = {t:g} s: check its function or data"
+        )
     else:
         return result.astype(float, copy=False), ""
     return np.zeros_like(points), defect
@@ -95,7 +103,9 @@ class Prescribed:
     def at(self, space: Any, places: tuple[Any, Any], t: float, derivative: int) -> tuple[Any, str]:
         """Return (values of the motion or a rate at the places, what is wrong with them or an empty text)."""
         name = f"prescribed motion on '{self.facets.name}'"
-        motion, defect = evaluate_here(name, self.motions[derivative], space.points[places[0][:, 0]], t)
+        motion, defect = evaluate_here(
+            name, self.motions[derivative], space.points[places[0][:, 0]], t
+        )
         return motion[:, places[1]], defect
 
     def on_facets(self, space: Any, facets: Any) -> list[tuple[Any, Any]]:
@@ -106,14 +116,19 @@ class Prescribed:
     @property
     def companions(self) -> tuple[Any, ...]:
         """Return the motions that are marched beside the run: objects whose methods are given, as ``BaseMotion``."""
-        owners = {id(owner): owner for owner in (getattr(value, "__self__", None) for value in self.motions)}
+        owners = {
+            id(owner): owner
+            for owner in (getattr(value, "__self__", None) for value in self.motions)
+        }
         return tuple(one for owner in owners.values() for one in getattr(owner, "companions", ()))
 
     def same_motion(self, other: "Prescribed") -> bool:
         """Return whether both say the same of the components that both prescribe."""
         mine, theirs = self.components, other.components
         apart = mine is not None and theirs is not None and not set(mine) & set(theirs)
-        return apart or all(_same(one, two) for one, two in zip(self.motions, other.motions, strict=True))
+        return apart or all(
+            _same(one, two) for one, two in zip(self.motions, other.motions, strict=True)
+        )
 
 
 def _same(one: Value, other: Value) -> bool:
@@ -136,7 +151,9 @@ class ActingLoad:
     def __post_init__(self) -> None:
         owner = type(self).__name__
         field_given(owner, "value", self.value)
-        optional(function, owner, "history", self.history, "give a function of the time [s], or None")
+        optional(
+            function, owner, "history", self.history, "give a function of the time [s], or None"
+        )
 
     @property
     def is_constant(self) -> bool:
@@ -195,12 +212,16 @@ class Pressure(Traction):
             function("Pressure", "value", given, "give a number or a function of points and time")
 
             def field(points: Array, t: float) -> Array:
-                return np.multiply.outer(np.broadcast_to(given(points, t), len(points)), np.eye(points.shape[1])[0])
+                return np.multiply.outer(
+                    np.broadcast_to(given(points, t), len(points)), np.eye(points.shape[1])[0]
+                )
 
             object.__setattr__(self, "value", field)
         else:
             axes = facets_of("Pressure", "facets", self.facets).mesh.geometry.dim
-            object.__setattr__(self, "value", (number("Pressure", "value", given, unit="Pa"), *[0.0] * (axes - 1)))
+            object.__setattr__(
+                self, "value", (number("Pressure", "value", given, unit="Pa"), *[0.0] * (axes - 1))
+            )
         super().__post_init__()
 
     def acting(self, g: Any, mesh: Mesh) -> Any:

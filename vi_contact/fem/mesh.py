@@ -44,13 +44,17 @@ class Group:
     def __post_init__(self) -> None:
         owner = type(self).__name__
         instance(owner, "name", self.name, str, "give a text")
-        mesh = instance(owner, "mesh", self.mesh, Mesh, "give the DOLFINx mesh that the numbers belong to")
+        mesh = instance(
+            owner, "mesh", self.mesh, Mesh, "give the DOLFINx mesh that the numbers belong to"
+        )
         count, numbers, defect = local_count(mesh, self.codimension), np.asarray(self.indices), ""
         if numbers.ndim != 1 or (numbers.dtype.kind not in "iu" and numbers.size):
             defect = f"{owner}: indices is {shown(self.indices)}; give local numbers, such as tags.find(value) returns"
         elif numbers.size and not 0 <= numbers.min() <= numbers.max() < count:
-            defect = (f"{owner}: '{self.name}' has numbers from {numbers.min()} to {numbers.max()} but the mesh has "
-                      f"{count} {owner.lower()} here, counted from 0: give numbers of this mesh")
+            defect = (
+                f"{owner}: '{self.name}' has numbers from {numbers.min()} to {numbers.max()} but the mesh has "
+                f"{count} {owner.lower()} here, counted from 0: give numbers of this mesh"
+            )
         refuse([defect], MpiComm(mesh.comm))
         object.__setattr__(self, "indices", np.unique(numbers).astype(np.int32))
 
@@ -63,18 +67,28 @@ class Group:
         instance(owner, "mesh", mesh, Mesh, "give the DOLFINx mesh of the tags")
         provides(owner, "meshtags", meshtags, ("dim", "indices", "values"), "give DOLFINx MeshTags")
         dim, values = mesh.topology.dim - cls.codimension, np.asarray(meshtags.values)
-        chosen = np.asarray(meshtags.indices)[values == whole(owner, "value", value, least=-(2**31))]
+        chosen = np.asarray(meshtags.indices)[
+            values == whole(owner, "value", value, least=-(2**31))
+        ]
         defect = ""
         if not compat.tags_of(meshtags, mesh):
-            defect = f"{owner}: the tags of '{name}' are those of another mesh; give tags of this mesh"
+            defect = (
+                f"{owner}: the tags of '{name}' are those of another mesh; give tags of this mesh"
+            )
         elif meshtags.dim != dim:
-            defect = (f"{owner}: the tags of '{name}' are of dimension {meshtags.dim} and {things} of this mesh have "
-                      f"dimension {dim}; give the tags of its {things}")
+            defect = (
+                f"{owner}: the tags of '{name}' are of dimension {meshtags.dim} and {things} of this mesh have "
+                f"dimension {dim}; give the tags of its {things}"
+            )
         refuse([defect], MpiComm(mesh.comm))
         if not mesh.comm.allreduce(len(chosen)):
             found = np.unique(np.concatenate(mesh.comm.allgather(np.unique(values))))
-            there = ", ".join(map(str, found[:MOST_NAMED])) + (", …" if len(found) > MOST_NAMED else "")
-            raise InputError(f"{owner}: no {things} have the value {value} of '{name}'; give one of {there or 'none'}")
+            there = ", ".join(map(str, found[:MOST_NAMED])) + (
+                ", …" if len(found) > MOST_NAMED else ""
+            )
+            raise InputError(
+                f"{owner}: no {things} have the value {value} of '{name}'; give one of {there or 'none'}"
+            )
         return cls(name, chosen, mesh)
 
     @classmethod
@@ -90,7 +104,9 @@ class Group:
         def safe(x: Any) -> Any:  # the other ranks must not wait where it raises
             try:
                 if x.shape[1]:
-                    return mask(owner, f"what the marker of '{name}' returned", marker(x), (x.shape[1],))
+                    return mask(
+                        owner, f"what the marker of '{name}' returned", marker(x), (x.shape[1],)
+                    )
             except Exception as error:  # of a user's function, which may raise anything
                 defects.append(ended(f"{owner}: the marker of '{name}'", error))
             return np.zeros(x.shape[1], dtype=bool)
@@ -99,8 +115,10 @@ class Group:
         refuse(defects, MpiComm(mesh.comm))
         if not mesh.comm.allreduce(len(chosen)):
             of = "facets of the boundary" if cls.codimension else "cells"
-            raise InputError(f"{owner}: the marker of '{name}' marks no {of}; mark all vertices of some {things}, "
-                             "coordinates compared with np.isclose")
+            raise InputError(
+                f"{owner}: the marker of '{name}' marks no {of}; mark all vertices of some {things}, "
+                "coordinates compared with np.isclose"
+            )
         return cls(name, chosen, mesh)
 
 
@@ -139,9 +157,11 @@ class Tags(dict[str, Any]):
         facets = [key for key, group in self.items() if isinstance(group, Facets)]
         cells = [key for key, group in self.items() if isinstance(group, Cells)]
         near = " or ".join(get_close_matches(str(name), self, cutoff=0.5))
-        raise InputError(f"mesh has no group '{name}'; its boundary groups are {', '.join(facets) or 'none'}, its cell "
-                         f"groups {', '.join(cells)}: {near and f'did you mean {near}? Else '}name it in Gmsh as a "
-                         "physical group")
+        raise InputError(
+            f"mesh has no group '{name}'; its boundary groups are {', '.join(facets) or 'none'}, its cell "
+            f"groups {', '.join(cells)}: {near and f'did you mean {near}? Else '}name it in Gmsh as a "
+            "physical group"
+        )
 
 
 def alone() -> MPI.Comm:
@@ -165,7 +185,13 @@ def build_mesh(mesh: MeshScript, comm: MPI.Comm) -> tuple[Mesh, Tags]:
     It raises the errors of `read_mesh`. Collective."""
     if isinstance(comm, MPI.Comm):
         agree(MpiComm(comm), "build_mesh", {"mesh": Parts(mesh)})
-    provides("build_mesh", "mesh", mesh, ("build",), "give a script of vi_contact.meshes, BlockMesh(…) for example")
+    provides(
+        "build_mesh",
+        "mesh",
+        mesh,
+        ("build",),
+        "give a script of vi_contact.meshes, BlockMesh(…) for example",
+    )
     return _distribute(comm, lambda: arrays_from_script(mesh))
 
 
@@ -175,7 +201,10 @@ def node_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
     Collective. A part of a mesh (``create_submesh``) knows the numbers of the whole, and is numbered in their order."""
     instance("node_numbers", "mesh", mesh, Mesh, "give a DOLFINx mesh")
     given = np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)
-    if mesh.comm.allreduce(given.max(initial=-1), op=MPI.MAX) < mesh.geometry.index_map().size_global:
+    if (
+        mesh.comm.allreduce(given.max(initial=-1), op=MPI.MAX)
+        < mesh.geometry.index_map().size_global
+    ):
         return given
     return np.searchsorted(np.unique(np.concatenate(mesh.comm.allgather(given))), given)
 
@@ -184,16 +213,24 @@ def node_numbers(mesh: Mesh) -> npt.NDArray[np.int64]:
 def _distribute(comm: MPI.Comm, produce: Callable[[], MeshArrays]) -> tuple[Mesh, Tags]:
     instance("mesh", "comm", comm, MPI.Comm, "give a communicator, such as MPI.COMM_WORLD")
     arrays = on_root(MpiComm(comm), produce)  # what rank 0 raises, all ranks raise
-    groups = comm.bcast(arrays and replace(arrays, points=arrays.points[:0], cells=arrays.cells[:0]))
+    groups = comm.bcast(
+        arrays and replace(arrays, points=arrays.points[:0], cells=arrays.cells[:0])
+    )
     arrays = arrays or groups  # without points and cells on the others
     cells = arrays.cells[:, compat.gmsh_order(arrays.cell, arrays.cells.shape[1])]
-    where = destinations(arrays.points, arrays.cells, arrays.cell, comm.size) if comm.rank == 0 else _NOWHERE
+    where = (
+        destinations(arrays.points, arrays.cells, arrays.cell, comm.size)
+        if comm.rank == 0
+        else _NOWHERE
+    )
     mesh = compat.create_mesh(comm, arrays.cell, cells, arrays.points, where)
     tags = Tags()
     original = np.asarray(mesh.topology.original_cell_index, dtype=np.int64)
     for name, members in arrays.cell_groups.items():
         tags[name] = Cells(name, np.flatnonzero(members[original]).astype(np.int32), mesh)
-    everyone = compat.entities_to_geometry(mesh, mesh.topology.dim - 1, np.arange(local_count(mesh, 1), dtype=np.int32))
+    everyone = compat.entities_to_geometry(
+        mesh, mesh.topology.dim - 1, np.arange(local_count(mesh, 1), dtype=np.int32)
+    )
     facets, *named = number_alike(node_numbers(mesh)[everyone], *arrays.facet_groups.values())
     for name, numbers in zip(arrays.facet_groups, named, strict=True):
         tags[name] = Facets(name, np.flatnonzero(found_in(facets, numbers)).astype(np.int32), mesh)

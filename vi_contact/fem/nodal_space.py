@@ -9,7 +9,9 @@ from ..core.checks import at
 from ..core.errors import InputError
 from ..meshes.rows import connected
 
-MEANT = 0.05  # of the size of a body: how far from it a point may be that stands for the nearest node
+MEANT = (
+    0.05  # of the size of a body: how far from it a point may be that stands for the nearest node
+)
 
 
 class NodalSpace:
@@ -73,14 +75,20 @@ class NodalSpace:
         found = np.empty(len(points), dtype=np.int64)
         for i, point in enumerate(np.atleast_2d(np.asarray(points, dtype=float))):
             if point.shape != (self.dimension,):
-                raise InputError(f"point {tuple(point)} has {len(point)} coordinates: give {self.dimension}")
+                raise InputError(
+                    f"point {tuple(point)} has {len(point)} coordinates: give {self.dimension}"
+                )
             distance = np.linalg.norm(self.points - point, axis=1)
             nearest = -largest(self.comm, -np.min(distance, initial=np.inf))
             if nearest > MEANT * self.size:
-                raise InputError(f"point {at(point)} is {nearest:.3g} m away from the nearest node: give a point of "
-                                 "the body")
+                raise InputError(
+                    f"point {at(point)} is {nearest:.3g} m away from the nearest node: give a point of "
+                    "the body"
+                )
             close = self.nodes[distance <= nearest + 1e-9 * self.size]
-            found[i] = -int(largest(self.comm, -float(np.min(close, initial=np.iinfo(np.int64).max))))
+            found[i] = -int(
+                largest(self.comm, -float(np.min(close, initial=np.iinfo(np.int64).max)))
+            )
         return found
 
 

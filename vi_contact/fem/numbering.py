@@ -26,7 +26,9 @@ def supports(V: Any) -> list[list[int]]:
 
     ``V``: a space of degree 1 or 2; the order is that of ``compat.cell_blocks``."""
     dim, count = V.mesh.topology.dim, V.dofmap.dof_layout.num_dofs
-    return [vertices for one in range(dim + 1) for vertices in compat.sub_entities(V.mesh, one)][:count]
+    return [vertices for one in range(dim + 1) for vertices in compat.sub_entities(V.mesh, one)][
+        :count
+    ]
 
 
 def numbered(V: Any) -> tuple[Indices, Array]:
@@ -66,7 +68,9 @@ def _ranked(comm: Any, keys: Indices, count: int) -> tuple[Indices, int]:
     Members are less than ``count`` and ascend in a row: its first one tells which rank sorts it. Collective."""
     sorts = keys[:, 0] * comm.size // count
     order = np.argsort(sorts, kind="stable")
-    received = comm.alltoall(np.split(keys[order], np.searchsorted(sorts[order], np.arange(1, comm.size))))
+    received = comm.alltoall(
+        np.split(keys[order], np.searchsorted(sorts[order], np.arange(1, comm.size)))
+    )
     (place,) = number_alike(np.concatenate(received))
     mine = int(place.max(initial=-1)) + 1
     place += comm.exscan(mine) or 0
@@ -83,9 +87,15 @@ def facet_rows(V: Any, facets: Any) -> Indices:
     mesh, tdim = V.mesh, V.mesh.topology.dim
     mesh.topology.create_connectivity(tdim - 1, tdim)
     mesh.topology.create_connectivity(tdim, tdim - 1)
-    beside, sides = (mesh.topology.connectivity(*pair) for pair in ((tdim - 1, tdim), (tdim, tdim - 1)))
+    beside, sides = (
+        mesh.topology.connectivity(*pair) for pair in ((tdim - 1, tdim), (tdim, tdim - 1))
+    )
     around, corners = supports(V), compat.sub_entities(mesh, tdim - 1)
-    on = np.array([[place for place, one in enumerate(around) if set(one) <= set(side)] for side in corners])
+    on = np.array(
+        [[place for place, one in enumerate(around) if set(one) <= set(side)] for side in corners]
+    )
     cells = beside.array[beside.offsets[:-1][facets]]
-    side = np.argmax(sides.array.reshape(-1, len(corners))[cells] == np.asarray(facets)[:, None], axis=1)
+    side = np.argmax(
+        sides.array.reshape(-1, len(corners))[cells] == np.asarray(facets)[:, None], axis=1
+    )
     return np.asarray(compat.cell_blocks(V)[cells[:, None], on[side]])

@@ -57,11 +57,19 @@ class OwnForms(ElasticForms):
 
     Its matrices are assembled and checked at once. InputError as for ``Forms``. Collective."""
 
-    def __init__(self, space: FemSpace, given: Forms, materials: list[tuple[Any, Material]], section: Section,
-                 damping: Damping) -> None:
+    def __init__(
+        self,
+        space: FemSpace,
+        given: Forms,
+        materials: list[tuple[Any, Material]],
+        section: Section,
+        damping: Damping,
+    ) -> None:
         super().__init__(space, materials, section, damping)
         if given.mass is None and not materials:
-            raise InputError("assemble: forms=… have no mass; give Forms(…, mass=), or a material for its density")
+            raise InputError(
+                "assemble: forms=… have no mass; give Forms(…, mass=), or a material for its density"
+            )
         self._given, self.tells_stress = given, given.stress is not None
         self.own_damping = given.damping is not None
         self.densities = given.mass is None and given.damping is None
@@ -70,14 +78,22 @@ class OwnForms(ElasticForms):
         self.damped = given.damping is not None or any(shares.values()) or self.viscous is not None
         if given.stress is not None:
             refuse_stress(given.stress, space)
-        self._forms = {name: self._own(name) or super(OwnForms, self).bilinear(name) for name in "KM"}
-        dampers = [compat.constant(space.mesh, share) * self._forms[name] for name, share in shares.items() if share]
+        self._forms = {
+            name: self._own(name) or super(OwnForms, self).bilinear(name) for name in "KM"
+        }
+        dampers = [
+            compat.constant(space.mesh, share) * self._forms[name]
+            for name, share in shares.items()
+            if share
+        ]
         dampers += [self._viscous_form()] if self.viscous else []
         dampers += [] if given.damping is None else [self._own("C")]
         if dampers:
             self._forms["C"] = sum(dampers[1:], dampers[0])
-        self._full = {name: matrix_of(ROLES[name], space, partial(space.compiled, form))
-                      for name, form in self._forms.items()}
+        self._full = {
+            name: matrix_of(ROLES[name], space, partial(space.compiled, form))
+            for name, form in self._forms.items()
+        }
         refuse_masses(self._full["M"], space)
         self.symmetric = all(is_symmetric(one, space) for one in self._full.values())
         self.notes = self._notes(bool(materials))
@@ -85,16 +101,31 @@ class OwnForms(ElasticForms):
     def _own(self, name: str) -> Any:
         """The form that was given for a matrix, or None."""
         call = getattr(self._given, ROLES[name])
-        return None if call is None else form_of(f"Forms: {ROLES[name]}", call, self.space, self.u, self.v)
+        return (
+            None
+            if call is None
+            else form_of(f"Forms: {ROLES[name]}", call, self.space, self.u, self.v)
+        )
 
     def _notes(self, material: bool) -> tuple[str, ...]:
         mass = "the density of the material" if self._given.mass is None else "a form"
-        stress, waves = "a" if self.tells_stress else "no", "the material beside them" if material else "no material"
-        notes = [f"the body is stated by forms: its mass by {mass}, its stress by {stress} form, wave speeds at "
-                 f"boundaries by {waves}"]
+        stress, waves = (
+            "a" if self.tells_stress else "no",
+            "the material beside them" if material else "no material",
+        )
+        notes = [
+            f"the body is stated by forms: its mass by {mass}, its stress by {stress} form, wave speeds at "
+            f"boundaries by {waves}"
+        ]
         if not self.symmetric:
-            notes.append("its matrices are not symmetric: for Volume() and Condensed(Lemke()), and ½ uᵀKu is no energy")
-        if self.tells_stress and isinstance(self.section, PlaneStrain) and self._stress(self.u).ufl_shape == (2, 2):
+            notes.append(
+                "its matrices are not symmetric: for Volume() and Condensed(Lemke()), and ½ uᵀKu is no energy"
+            )
+        if (
+            self.tells_stress
+            and isinstance(self.section, PlaneStrain)
+            and self._stress(self.u).ufl_shape == (2, 2)
+        ):
             notes.append("von Mises stresses take sigma_zz as zero: give a stress of shape (3, 3)")
         return tuple(notes)
 
@@ -104,7 +135,9 @@ class OwnForms(ElasticForms):
         return h * ufl.as_tensor([[sigma[i, j] for j in range(d)] for i in range(d)]), across
 
     def hooke(self, eps: Any, across: Any, trace: Any) -> tuple[Any, Any]:
-        raise InputError("InitialStrain needs the C of a material; give a LinearForm, and stress= less C eps_0")
+        raise InputError(
+            "InitialStrain needs the C of a material; give a LinearForm, and stress= less C eps_0"
+        )
 
     def _stress(self, u: Any) -> Any:
         if self._given.stress is None:

@@ -11,7 +11,17 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ..core.algebra import Algebra, Array, Indices, Mask, Matrix, SerialAlgebra, SerialMatrix, largest, total
+from ..core.algebra import (
+    Algebra,
+    Array,
+    Indices,
+    Mask,
+    Matrix,
+    SerialAlgebra,
+    SerialMatrix,
+    largest,
+    total,
+)
 from ..core.checks import array, integers, on_all, refuse
 from ..core.errors import InputError
 from ..core.matrix_checks import SYMMETRIC, asymmetry, matrix_defects
@@ -22,9 +32,18 @@ from .nodal_space import NodalSpace, bounding_box, parts_of
 OWNER = "system_from_arrays"
 
 
-def system_from_arrays(M: Any, C: Any, K: Any, *, coordinates: Any, unknowns: Any = None, clamped: Any = (),
-                       load: Load | Sequence[float] | Array | None = None, u0: Any = None,
-                       v0: Any = None) -> SemiDiscreteSystem:
+def system_from_arrays(
+    M: Any,
+    C: Any,
+    K: Any,
+    *,
+    coordinates: Any,
+    unknowns: Any = None,
+    clamped: Any = (),
+    load: Load | Sequence[float] | Array | None = None,
+    u0: Any = None,
+    v0: Any = None,
+) -> SemiDiscreteSystem:
     """Make the system M u'' + C u' + K u = f of scipy or dense matrices, on one process, by numpy and scipy alone.
 
     ``contact_points`` makes contact for it. All that asks for no material works: every scheme and impact law, friction,
@@ -43,13 +62,26 @@ def system_from_arrays(M: Any, C: Any, K: Any, *, coordinates: Any, unknowns: An
     Raises:
         InputError: matrices that are not real, finite, square and of one size, M that is not symmetric or has masses
             below zero; coordinates, unknowns or vectors that do not fit them."""
-    matrices = {name: _serial(name, A) for name, A in (("M", M), ("C", C), ("K", K)) if name != "C" or A is not None}
+    matrices = {
+        name: _serial(name, A)
+        for name, A in (("M", M), ("C", C), ("K", K))
+        if name != "C" or A is not None
+    }
     n = matrices["K"].csr.shape[0]
     for name, one in matrices.items():
         if one.csr.shape != (n, n):
-            raise InputError(f"{OWNER}: {name} has shape {one.csr.shape} and K has {n} rows; give square matrices of "
-                             "one size")
-    given = {"coordinates": coordinates, "unknowns": unknowns, "clamped": clamped, "load": load, "u0": u0, "v0": v0}
+            raise InputError(
+                f"{OWNER}: {name} has shape {one.csr.shape} and K has {n} rows; give square matrices of "
+                "one size"
+            )
+    given = {
+        "coordinates": coordinates,
+        "unknowns": unknowns,
+        "clamped": clamped,
+        "load": load,
+        "u0": u0,
+        "v0": v0,
+    }
     return own_system(OWNER, SerialAlgebra(), SerialAlgebra(symmetric=False), matrices, given)
 
 
@@ -64,15 +96,27 @@ def _serial(name: str, value: Any) -> SerialMatrix:
     return SerialMatrix(sp.csr_matrix(value, dtype=float, copy=True))
 
 
-def own_system(owner: str, algebra: Algebra, unsymmetric: Algebra, matrices: Mapping[str, Matrix],
-               given: Mapping[str, Any]) -> SemiDiscreteSystem:
+def own_system(
+    owner: str,
+    algebra: Algebra,
+    unsymmetric: Algebra,
+    matrices: Mapping[str, Matrix],
+    given: Mapping[str, Any],
+) -> SemiDiscreteSystem:
     """Return the system of matrices M, K and perhaps C of one size and of what is given of this rank's rows and nodes,
     which is checked here. ``unsymmetric``: the algebra for C or K that are not symmetric. Collective."""
     comm, n = algebra.comm, matrices["K"].rows
     points, block, component, free = on_all(comm, owner, lambda: _meaning(owner, n, given))
     load, u0, v0 = on_all(comm, owner, lambda: _vectors(owner, n, given))
     d = points.shape[1]
-    refuse([f"{owner}: nodes of one rank have {d} coordinates, others more" if d < largest(comm, d) else ""], comm)
+    refuse(
+        [
+            f"{owner}: nodes of one rank have {d} coordinates, others more"
+            if d < largest(comm, d)
+            else ""
+        ],
+        comm,
+    )
     numbers = algebra.first(n) + np.arange(n)
     refuse(list(matrix_defects(owner, comm, numbers, **matrices)), comm)
     skew = [name for name, A in matrices.items() if asymmetry(A, comm, numbers) > SYMMETRIC]
@@ -83,14 +127,30 @@ def own_system(owner: str, algebra: Algebra, unsymmetric: Algebra, matrices: Map
         matrices = {name: algebra.block(A, free) for name, A in matrices.items()}
         load = load.in_basis(SerialMatrix(sp.identity(n, format="csc")[:, free]))
     M, K = matrices["M"], matrices["K"]
-    momenta = [(every @ r)[free] - M @ r[free] for r in influence.T]  # of rows that stand still, when all move
+    momenta = [
+        (every @ r)[free] - M @ r[free] for r in influence.T
+    ]  # of rows that stand still, when all move
     massless = M.diagonal() == 0.0
     space = MatrixSpace(algebra, points, block[free], component[free], K)
-    return floating(SemiDiscreteSystem(
-        algebra=algebra, M=M, C=matrices.get("C"), K=K, load=load, influence=influence[free], u0=u0[free],
-        v0=v0[free], space=space, base_mass=np.column_stack(momenta),
-        massless=massless if largest(comm, massless.any()) else None,
-        notes=tuple(f"{name} not symmetric: for Volume() and Condensed(Lemke()); no energy ½ uᵀKu" for name in skew)))
+    return floating(
+        SemiDiscreteSystem(
+            algebra=algebra,
+            M=M,
+            C=matrices.get("C"),
+            K=K,
+            load=load,
+            influence=influence[free],
+            u0=u0[free],
+            v0=v0[free],
+            space=space,
+            base_mass=np.column_stack(momenta),
+            massless=massless if largest(comm, massless.any()) else None,
+            notes=tuple(
+                f"{name} not symmetric: for Volume() and Condensed(Lemke()); no energy ½ uᵀKu"
+                for name in skew
+            ),
+        )
+    )
 
 
 def _meaning(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Array, Indices, Indices, Mask]:
@@ -98,35 +158,50 @@ def _meaning(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Array, Indic
     points = array(owner, "coordinates", given["coordinates"], (None, None), unit="metres")
     k, d = points.shape
     if d not in (1, 2, 3):
-        raise InputError(f"{owner}: coordinates has shape {points.shape}; give 1, 2 or 3 coordinates of every node")
+        raise InputError(
+            f"{owner}: coordinates has shape {points.shape}; give 1, 2 or 3 coordinates of every node"
+        )
     if given["unknowns"] is None and n != k * d:
-        raise InputError(f"{owner}: K has {n} rows, and {k} nodes have {k * d} components; give unknowns=, the node "
-                         "and the component of every row")
+        raise InputError(
+            f"{owner}: K has {n} rows, and {k} nodes have {k * d} components; give unknowns=, the node "
+            "and the component of every row"
+        )
     table = np.column_stack(np.divmod(np.arange(n), d))
     if given["unknowns"] is not None:
         table = integers(owner, "unknowns", given["unknowns"], (n, 2))
     block, component = table.T
     wrong = (block < 0) | (block >= k) | (component < -1) | (component >= d)
     if wrong.any():
-        raise InputError(f"{owner}: row {np.argmax(wrong)} of unknowns is {table[wrong][0].tolist()}; give a node from "
-                         f"0 to {k - 1} and a component from -1 to {d - 1}")
+        raise InputError(
+            f"{owner}: row {np.argmax(wrong)} of unknowns is {table[wrong][0].tolist()}; give a node from "
+            f"0 to {k - 1} and a component from -1 to {d - 1}"
+        )
     places, counts = np.unique((block * d + component)[component >= 0], return_counts=True)
     if (counts > 1).any():
         node, c = divmod(int(places[counts > 1][0]), d)
-        raise InputError(f"{owner}: component {c} of node {node} has several rows in unknowns; give it one")
+        raise InputError(
+            f"{owner}: component {c} of node {node} has several rows in unknowns; give it one"
+        )
     rows, free = integers(owner, "clamped", given["clamped"], (None,)), np.ones(n, dtype=bool)
     if len(rows) and not 0 <= rows.min() <= rows.max() < n:
-        raise InputError(f"{owner}: clamped goes from {rows.min()} to {rows.max()}; give numbers of rows below {n}")
+        raise InputError(
+            f"{owner}: clamped goes from {rows.min()} to {rows.max()}; give numbers of rows below {n}"
+        )
     free[rows] = False
     return points, block, component, free
 
 
 def _vectors(owner: str, n: int, given: Mapping[str, Any]) -> tuple[Load, Array, Array]:
     """Load and initial values of all rows, zero where there are none."""
+
     def vector(name: str, value: Any, unit: str) -> Array:
         return np.zeros(n) if value is None else array(owner, name, value, (n,), unit=unit)
 
-    load = given["load"] if isinstance(given["load"], Load) else Load(vector("load", given["load"], "N"))
+    load = (
+        given["load"]
+        if isinstance(given["load"], Load)
+        else Load(vector("load", given["load"], "N"))
+    )
     for one in (load.constant, *(part for part, _ in load.separable)):
         vector("a vector of load", one, "N")
     return load, vector("u0", given["u0"], "m"), vector("v0", given["v0"], "m/s")
@@ -139,7 +214,9 @@ class MatrixSpace(NodalSpace):
         coordinates: (n, d) position of the node of each unknown [m]; component: (n,), -1 for what is no displacement;
             bodies: (n,) body of each."""
 
-    def __init__(self, algebra: Algebra, points: Array, block: Indices, component: Indices, K: Matrix) -> None:
+    def __init__(
+        self, algebra: Algebra, points: Array, block: Indices, component: Indices, K: Matrix
+    ) -> None:
         """``block``: (n,) the owned node of each unknown; nodes are numbered over the ranks. Collective."""
         self.algebra, self.comm, self.points = algebra, algebra.comm, points
         (k, d), n, first = points.shape, len(block), algebra.first(len(block))

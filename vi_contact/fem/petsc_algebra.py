@@ -19,7 +19,11 @@ from .petsc_rows import aij_of, rows_of
 
 PREFIX = "vi_contact_factor_"
 OWN_FACTOR = {"ksp_type": "preonly", "pc_factor_mat_solver_type": "petsc"}
-TUNING = ("redundant_", "mat_mumps_icntl_14", "mat_mumps_icntl_20")  # options that choose no other factor
+TUNING = (
+    "redundant_",
+    "mat_mumps_icntl_14",
+    "mat_mumps_icntl_20",
+)  # options that choose no other factor
 _ENTRY = 8 + np.dtype(PETSc.IntType).itemsize  # bytes of an entry and its column
 RIGHT_SIDES = 64  # right-hand sides per block solve: bounds the memory of the dense blocks
 
@@ -42,7 +46,9 @@ class PetscMatrix:
     def __init__(self, mat: Any) -> None:
         self.stored = mat
         sizes = mat.getLocalSize()
-        (self._in, self._x), (self._out, self._y) = (_vector(mat.comm, sizes[way], way) for way in (1, 0))
+        (self._in, self._x), (self._out, self._y) = (
+            _vector(mat.comm, sizes[way], way) for way in (1, 0)
+        )
 
     @property
     def mat(self) -> Any:
@@ -97,7 +103,9 @@ class PetscFactor:
         self._pc = PETSc.PC().create(mat.comm)
         self._pc.setOptionsPrefix(PREFIX)
         self._pc.setOperators(mat)
-        self._by_blocks = by_mumps(mat, symmetric=symmetric, own=bool(PETSc.Options(PREFIX).getAll()))
+        self._by_blocks = by_mumps(
+            mat, symmetric=symmetric, own=bool(PETSc.Options(PREFIX).getAll())
+        )
         defaults: dict[str, object] = {}
         if self._by_blocks:
             self._pc.setType(kind)
@@ -121,7 +129,9 @@ class PetscFactor:
         try:
             self._pc.setUp()
             self._b.set(1.0)
-            self._pc.apply(self._b, self._x)  # PETSc fills it with infinity when the factorisation failed
+            self._pc.apply(
+                self._b, self._x
+            )  # PETSc fills it with infinity when the factorisation failed
             found = finite(self._x)
         except PETSc.Error as error:
             raise failure(self._pc, self._mat, error) from error
@@ -133,7 +143,9 @@ class PetscFactor:
         """Return the bytes of the entries, an equal share on each rank; 0 for factors that tell nothing, as copies."""
         if self._pc.getType() not in ("cholesky", "lu"):
             return 0.0
-        count = self._pc.getFactorMatrix().getInfo()["nz_used"]  # MUMPS counts many in millions, below zero
+        count = self._pc.getFactorMatrix().getInfo()[
+            "nz_used"
+        ]  # MUMPS counts many in millions, below zero
         return _ENTRY * (count if count >= 0.0 else -1e6 * count) / self._b.comm.size
 
     def solve(self, b: Array) -> Array:
@@ -141,7 +153,9 @@ class PetscFactor:
         self._pc.apply(self._b, self._x)
         return np.array(self._x.array_r)
 
-    def solve_units(self, owned: Indices, slots: Indices, m: int, rows: Indices | None = None) -> Array:
+    def solve_units(
+        self, owned: Indices, slots: Indices, m: int, rows: Indices | None = None
+    ) -> Array:
         size = self._x.getLocalSize()
         rows = np.arange(size) if rows is None else rows
         columns = np.zeros((len(rows), m))
@@ -238,11 +252,15 @@ class PetscAlgebra:
         return found
 
     def replaced_rows(self, n: int, rows: Indices, entries: sp.csr_matrix) -> Matrix:
-        return PetscMatrix(aij_of(identity_with(n, rows, entries, first=self.first(n)), self.comm.mpi))
+        return PetscMatrix(
+            aij_of(identity_with(n, rows, entries, first=self.first(n)), self.comm.mpi)
+        )
 
     def with_identity_rows(self, A: Matrix, mask: Mask) -> Matrix:
         every = np.arange(len(mask))
-        ones = self.local(every, every, mask.astype(float), len(mask))  # a row of zeros may have no diagonal entry
+        ones = self.local(
+            every, every, mask.astype(float), len(mask)
+        )  # a row of zeros may have no diagonal entry
         mat = as_petsc(self.combine([(1.0, A), (1.0, ones)])).mat
         rows = (mat.getOwnershipRange()[0] + np.flatnonzero(mask)).astype(PETSc.IntType)
         mat.zeroRowsColumns(rows, diag=1.0)
@@ -259,7 +277,9 @@ class PetscAlgebra:
 
     def contact_last(self, A: Matrix, last: Indices) -> ContactLast | None:
         mat, given = as_petsc(A).mat, PETSc.Options(PREFIX).getAll()
-        chosen = any(not name.startswith(TUNING) for name in given)  # options of the user choose the factor
+        chosen = any(
+            not name.startswith(TUNING) for name in given
+        )  # options of the user choose the factor
         serves = not chosen and (self.comm.size == 1 or own_serves(mat))
         return contact_last(self.comm, mat, last) if serves else None
 

@@ -24,6 +24,8 @@ def aij_of(rows: sp.spmatrix, comm: Any, columns: int | None = None) -> Any:
     rank owns, as many as rows unless given. Collective."""
     entries, kind, n = sp.csr_matrix(rows), PETSc.IntType, rows.shape[0]
     csr = (entries.indptr.astype(kind), entries.indices.astype(kind), entries.data)
-    mat = PETSc.Mat().createAIJ(((n, None), (n if columns is None else columns, None)), csr=csr, comm=comm)
+    mat = PETSc.Mat().createAIJ(
+        ((n, None), (n if columns is None else columns, None)), csr=csr, comm=comm
+    )
     mat.assemble()
     return mat

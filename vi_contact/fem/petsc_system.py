@@ -20,9 +20,18 @@ from .petsc_rows import aij_of, rows_of
 OWNER = "system_from_matrices"
 
 
-def system_from_matrices(M: Any, C: Any, K: Any, *, coordinates: Any, unknowns: Any = None, clamped: Any = (),
-                         load: Load | Sequence[float] | Array | None = None, u0: Any = None,
-                         v0: Any = None) -> SemiDiscreteSystem:
+def system_from_matrices(
+    M: Any,
+    C: Any,
+    K: Any,
+    *,
+    coordinates: Any,
+    unknowns: Any = None,
+    clamped: Any = (),
+    load: Load | Sequence[float] | Array | None = None,
+    u0: Any = None,
+    v0: Any = None,
+) -> SemiDiscreteSystem:
     """Make the system M u'' + C u' + K u = f of PETSc matrices, on the ranks of these. Collective.
 
     The arguments are those of ``vc.system_from_arrays``, each rank giving them for the rows that it owns and for the
@@ -36,9 +45,18 @@ def system_from_matrices(M: Any, C: Any, K: Any, *, coordinates: Any, unknowns: 
         clamped: its rows that stand still, counted from 0 on every rank.
     Raises:
         InputError: matrices of another type, layout or communicator; what ``system_from_arrays`` refuses."""
-    given = {"coordinates": coordinates, "unknowns": unknowns, "clamped": clamped, "load": load, "u0": u0, "v0": v0}
+    given = {
+        "coordinates": coordinates,
+        "unknowns": unknowns,
+        "clamped": clamped,
+        "load": load,
+        "u0": u0,
+        "v0": v0,
+    }
     if not isinstance(K, PETSc.Mat):
-        raise InputError(f"{OWNER}: K is {shown(K)}; give a PETSc.Mat, or scipy matrices to vc.system_from_arrays")
+        raise InputError(
+            f"{OWNER}: K is {shown(K)}; give a PETSc.Mat, or scipy matrices to vc.system_from_arrays"
+        )
     comm = kept(K.comm.tompi4py())
     named = [("M", M), ("K", K)] + ([] if C is None else [("C", C)])
     rows = on_all(MpiComm(comm), OWNER, lambda: {name: _rows(name, A, K) for name, A in named})

@@ -28,8 +28,13 @@ log = logging.getLogger(__name__)
 BALANCED = 1e-6  # of the largest nodal force: what may be missing where nothing was released
 
 
-def release(static: ContactProblem, state: State, problem: ContactProblem, *,
-            earlier: Sequence[ContactProblem] = ()) -> tuple[ContactProblem, State]:
+def release(
+    static: ContactProblem,
+    state: State,
+    problem: ContactProblem,
+    *,
+    earlier: Sequence[ContactProblem] = (),
+) -> tuple[ContactProblem, State]:
     """Return (problem with the reactions of removed supports as forces, its first state at rest) after a static stage.
 
     ``state``: of ``static_equilibrium`` on ``static``; ``problem``: on the same mesh, with the same materials, loads
@@ -54,11 +59,17 @@ def release(static: ContactProblem, state: State, problem: ContactProblem, *,
 
 def _spaces(static: ContactProblem, problem: ContactProblem) -> tuple[FemSpace, FemSpace]:
     before, after = static.system.space, problem.system.space
-    if not isinstance(before, FemSpace) or not isinstance(after, FemSpace) or before.mesh is not after.mesh:
+    if (
+        not isinstance(before, FemSpace)
+        or not isinstance(after, FemSpace)
+        or before.mesh is not after.mesh
+    ):
         raise InputError("release: give two problems of fem.assemble on one mesh")
     if largest(before.comm, not np.array_equal(static.surface.points, problem.surface.points)):
-        raise InputError("the static stage and the problem have different contact points, perhaps because clamped "
-                         "nodes are left out: name the same points for both (points=)")
+        raise InputError(
+            "the static stage and the problem have different contact points, perhaps because clamped "
+            "nodes are left out: name the same points for both (points=)"
+        )
     return before, after
 
 
@@ -66,14 +77,18 @@ def same_supports(before: ContactProblem, problem: ContactProblem) -> bool:
     """Say whether two problems of one mesh and contact hold and tie the same; the later one stands where the earlier
     one does then. InputError for other contact points. Collective."""
     one, other = _spaces(before, problem)
-    if largest(one.comm, not (np.array_equal(one.held, other.held) and np.array_equal(one.numbers, other.numbers))):
+    if largest(
+        one.comm,
+        not (np.array_equal(one.held, other.held) and np.array_equal(one.numbers, other.numbers)),
+    ):
         return False
     other.stands = one.stands
     return True
 
 
-def started(problem: ContactProblem, u0: Array, v0: Array, state: State,
-            force: Array | float = 0.0) -> tuple[ContactProblem, State]:
+def started(
+    problem: ContactProblem, u0: Array, v0: Array, state: State, force: Array | float = 0.0
+) -> tuple[ContactProblem, State]:
     """Return the problem that begins with u0, v0 (its own unknowns) and has a constant force [N] more; that beginning
     with the contact of another state."""
     surface, system, load = problem.surface, problem.system, problem.system.load
@@ -95,13 +110,19 @@ def _missing(problem: ContactProblem, u0: Array, state: State, was_held: Mask) -
     missing = np.array([max_abs(force[~was_held]), max_abs(elastic), max_abs(force)])
     missing = problem.surface.comm.max(missing)
     if missing[0] > BALANCED * max(missing[1:]):
-        raise InputError(f"{missing[0]:.3g} N are missing where no support was released: give both stages the same "
-                         "materials, loads and friction, and a motion that starts from rest")
-    log.info("supports released: their reactions remain as nodal forces, the largest %.4g N", missing[2])
+        raise InputError(
+            f"{missing[0]:.3g} N are missing where no support was released: give both stages the same "
+            "materials, loads and friction, and a motion that starts from rest"
+        )
+    log.info(
+        "supports released: their reactions remain as nodal forces, the largest %.4g N", missing[2]
+    )
     return force
 
 
-def removed_support(before: ContactProblem, after: ContactProblem, force: Array) -> tuple[str, float]:
+def removed_support(
+    before: ContactProblem, after: ContactProblem, force: Array
+) -> tuple[str, float]:
     """Return (name, reaction [N]) of the support that ``after`` does without and that carries most of this force; ""
     for none. The reaction is its resultant, or its largest nodal force where this is larger. Collective."""
     (old, new), found = _spaces(before, after), [("", 0.0)]
@@ -109,7 +130,10 @@ def removed_support(before: ContactProblem, after: ContactProblem, force: Array)
     nodal[new.free] = force
     size = largest(new.comm, max(max_abs(after.system.K @ after.system.u0), max_abs(force)))
     untied = np.isin(old.nodes, np.setdiff1d(old.tied_nodes, new.tied_nodes)), slice(None)
-    for name, places in [*((one.name, one.places(old)) for one in old.prescribed), ("tied", untied)]:
+    for name, places in [
+        *((one.name, one.places(old)) for one in old.prescribed),
+        ("tied", untied),
+    ]:
         own = np.zeros_like(old.points)
         own[places] = np.where(new.held, 0.0, nodal.reshape(own.shape))[places]
         peak = largest(new.comm, max_abs(own.ravel()))
@@ -131,11 +155,15 @@ def _beside(space: FemSpace, chosen: Mask) -> Mask:
     """All components of the owned nodes that share a cell, of any rank, with nodes of chosen components (k, d)."""
     numbers = np.concatenate(from_each(space.comm, space.nodes[chosen.any(axis=1)]))
     cells = space.node_of_block[compat.cell_blocks(space.V)]
-    near = np.concatenate(from_each(space.comm, np.unique(cells[np.isin(cells, numbers).any(axis=1)])))
+    near = np.concatenate(
+        from_each(space.comm, np.unique(cells[np.isin(cells, numbers).any(axis=1)]))
+    )
     return np.isin(space.nodes, near)[:, None] & np.ones_like(space.held)
 
 
-def _refuse_moved(static: ContactProblem, state: State, nodal: Array, problem: ContactProblem, begun: State) -> None:
+def _refuse_moved(
+    static: ContactProblem, state: State, nodal: Array, problem: ContactProblem, begun: State
+) -> None:
     """The new supports must hold the body, and what its contact points face, where the static stage has left it."""
     there = problem.system.space.expand(problem.cartesian(begun.u), 0.0)  # type: ignore[attr-defined]
     before = static.surface.gap(state.t) - static.surface.normal_values(state.u)
@@ -143,8 +171,10 @@ def _refuse_moved(static: ContactProblem, state: State, nodal: Array, problem: C
     away = max(max_abs((there - nodal).ravel()), max_abs(after - before))
     distance, size = problem.surface.comm.max(np.array([away, max_abs(nodal.ravel())]))
     if distance > BALANCED * size:
-        raise InputError(f"a support or tie of the problem is {distance:.3g} m away from where the static stage has "
-                         "left the body: hold or tie it there in both stages, or free it in both")
+        raise InputError(
+            f"a support or tie of the problem is {distance:.3g} m away from where the static stage has "
+            "left the body: hold or tie it there in both stages, or free it in both"
+        )
 
 
 def _contact_force(problem: ContactProblem, state: State) -> Array:

@@ -32,7 +32,9 @@ def body_numbers(mesh: Any) -> Indices:
     """Return the body (0, 1, ..., in the order of their least node number) of each local geometry node. Collective."""
     cells, numbers = compat.geometry_dofmap(mesh), node_numbers(mesh)
     first = np.repeat(cells[:, :1], cells.shape[1] - 1, axis=1)
-    ghosts = numbers[mesh.geometry.index_map().size_local :]  # there are such also where there are no ghost cells
+    ghosts = numbers[
+        mesh.geometry.index_map().size_local :
+    ]  # there are such also where there are no ghost cells
     shared = np.flatnonzero(np.isin(numbers, np.concatenate(mesh.comm.allgather(ghosts))))
     return parts_of(MpiComm(mesh.comm), first.ravel(), cells[:, 1:].ravel(), numbers, shared)
 
@@ -42,7 +44,9 @@ log = logging.getLogger(__name__)
 
 def space_of(owner: str, system: Any) -> "FemSpace":
     """Return the space of a system that fem.assemble made; InputError for anything else."""
-    instance(owner, "system", system, SemiDiscreteSystem, "give a system, such as fem.assemble returns")
+    instance(
+        owner, "system", system, SemiDiscreteSystem, "give a system, such as fem.assemble returns"
+    )
     if not isinstance(system.space, FemSpace) or system.space.forms is None:
         raise InputError(f"{owner} needs a system made by fem.assemble")
     return system.space
@@ -56,10 +60,14 @@ def bodies_of(system: SemiDiscreteSystem, cells: Cells) -> tuple[int, ...]:
     cells_of("bodies_of", "cells", cells, space.mesh)
     body = body_numbers(space.mesh)[compat.geometry_dofmap(space.mesh)[:, 0]]
     inside = np.isin(np.arange(len(body)), cells.indices)
-    mine, rest = (np.unique(np.concatenate(from_each(space.comm, body[part]))) for part in (inside, ~inside))
+    mine, rest = (
+        np.unique(np.concatenate(from_each(space.comm, body[part]))) for part in (inside, ~inside)
+    )
     if np.isin(mine, rest).any():
-        raise InputError(f"bodies_of: the cell group '{cells.name}' is a part of a body and shares nodes with other "
-                         "cells; give a group of whole bodies")
+        raise InputError(
+            f"bodies_of: the cell group '{cells.name}' is a part of a body and shares nodes with other "
+            "cells; give a group of whole bodies"
+        )
     return tuple(mine.tolist())
 
 
@@ -69,8 +77,12 @@ def known_matrices(owner: str, system: SemiDiscreteSystem, names: str) -> None:
     Springs added to K leave the stresses of the elements as they are; another material does not."""
     found = system.space.forms.foreign(system, names)  # type: ignore[attr-defined]
     if found and system.algebra.comm.rank == 0:
-        log.warning("%s: %s of the system is not the one that fem.assemble made: this output uses the materials, "
-                    "section and damping given there", owner, " and ".join(found))
+        log.warning(
+            "%s: %s of the system is not the one that fem.assemble made: this output uses the materials, "
+            "section and damping given there",
+            owner,
+            " and ".join(found),
+        )
 
 
 class FemSpace(NodalSpace):
@@ -89,8 +101,15 @@ class FemSpace(NodalSpace):
         ids: rank-independent numbers of the free unknowns (node * d + component).
         unknowns: number of free unknowns on all ranks."""
 
-    def __init__(self, mesh: Any, prescribed: Sequence[Prescribed | GivenValues], tied: Sequence[Tied] = (),
-                 degree: int = 1, V: Any = None, quadrature_degree: int | None = None) -> None:
+    def __init__(
+        self,
+        mesh: Any,
+        prescribed: Sequence[Prescribed | GivenValues],
+        tied: Sequence[Tied] = (),
+        degree: int = 1,
+        V: Any = None,
+        quadrature_degree: int | None = None,
+    ) -> None:
         optional(whole, "assemble", "quadrature_degree", quadrature_degree)
         self.mesh, self.degree = mesh, degree
         self.V = compat.vector_space(mesh, degree) if V is None else V
@@ -119,18 +138,25 @@ class FemSpace(NodalSpace):
         self.free_index: Indices = np.where(self.free, np.cumsum(self.free) - 1, -1)
         self.numbers: Indices = self._numbers(links)
         self._P = PetscMatrix(self._selection()) if tied else None
-        self.forms: Any = None  # the ElasticForms of the system made on it; stress output needs them
+        self.forms: Any = (
+            None  # the ElasticForms of the system made on it; stress output needs them
+        )
         self.quadrature_degree = quadrature_degree  # of all its forms; None: as UFL estimates it
-        self.stands: Array | None = None  # (k, d) where supports hold nodes that an earlier stage had moved [m]
+        self.stands: Array | None = (
+            None  # (k, d) where supports hold nodes that an earlier stage had moved [m]
+        )
 
     def compiled(self, form: Any) -> Any:
         """Return a form compiled, its integrals with the degree of the space, if any, unless they say their own."""
         degree = self.quadrature_degree
         if degree is None:
             return compat.compile_form(form)
-        integrals = [one if "quadrature_degree" in one.metadata()
-                     else one.reconstruct(metadata={**one.metadata(), "quadrature_degree": degree})
-                     for one in form.integrals()]
+        integrals = [
+            one
+            if "quadrature_degree" in one.metadata()
+            else one.reconstruct(metadata={**one.metadata(), "quadrature_degree": degree})
+            for one in form.integrals()
+        ]
         return compat.compile_form(ufl.Form(integrals))
 
     @property
@@ -152,8 +178,12 @@ class FemSpace(NodalSpace):
         """Return the numbers (k, n) of the nodes on each of these local facets, ghosts' too, that may have contact
         conditions: all, in a hierarchy the vertices. Collective."""
         if self.degree == 1:
-            return node_numbers(self.mesh)[compat.entities_to_geometry(self.mesh, self.mesh.topology.dim - 1, facets)]
-        return self.node_of_block[facet_rows(self.V, facets)][:, : None if self.hierarchy is None else self.dimension]
+            return node_numbers(self.mesh)[
+                compat.entities_to_geometry(self.mesh, self.mesh.topology.dim - 1, facets)
+            ]
+        return self.node_of_block[facet_rows(self.V, facets)][
+            :, : None if self.hierarchy is None else self.dimension
+        ]
 
     @cached_property
     def hierarchy(self) -> Hierarchy | None:
@@ -170,10 +200,15 @@ class FemSpace(NodalSpace):
 
     def _followers(self, links: Links) -> Mask:
         """Which owned components follow another node; InputError where some of those that move as one are held."""
-        held = [self._of_unknowns(numbers, self.held) > 0.0 for numbers in (links.followers, links.leaders)]
+        held = [
+            self._of_unknowns(numbers, self.held) > 0.0
+            for numbers in (links.followers, links.leaders)
+        ]
         for number in links.followers[held[0] != held[1]]:
-            raise InputError(f"component {number % self.dimension} of a tied node is prescribed on one side only: "
-                             "prescribe both sides alike, or tie the other components (components=)")
+            raise InputError(
+                f"component {number % self.dimension} of a tied node is prescribed on one side only: "
+                "prescribe both sides alike, or tie the other components (components=)"
+            )
         ids = self.nodes[:, None] * self.dimension + np.arange(self.dimension)
         return np.isin(ids, links.followers[~held[0]])
 
@@ -184,7 +219,11 @@ class FemSpace(NodalSpace):
 
     def leaders(self, nodes: Indices) -> Indices:
         """Return these node numbers, of nodes that follow another that of the other; -1 for those tied in part."""
-        return np.array([self._leader.get(n, n) for n in nodes.tolist()], dtype=np.int64) if self._leader else nodes
+        return (
+            np.array([self._leader.get(n, n) for n in nodes.tolist()], dtype=np.int64)
+            if self._leader
+            else nodes
+        )
 
     def _numbers(self, links: Links) -> Indices:
         """The unknown of every owned component, numbered over all ranks."""
@@ -201,7 +240,9 @@ class FemSpace(NodalSpace):
         """P as a PETSc matrix: one 1 per free component, and one for each that follows another."""
         rows, column = len(self.free), self.numbers.ravel()
         kept = np.flatnonzero(column >= 0)
-        ones = sp.csr_matrix((np.ones(len(kept)), (kept, column[kept])), shape=(rows, self.unknowns))
+        ones = sp.csr_matrix(
+            (np.ones(len(kept)), (kept, column[kept])), shape=(rows, self.unknowns)
+        )
         return aij_of(ones, self.comm.mpi, len(self.ids))
 
     @property
@@ -220,7 +261,9 @@ class FemSpace(NodalSpace):
     def body_of_node(self) -> Indices:
         """Return the body of every owned node: parts of the mesh that share no node, in the order of node numbers."""
         body = np.empty_like(self.node_of_block)
-        body[compat.cell_blocks(self.V)] = body_numbers(self.mesh)[compat.geometry_dofmap(self.mesh)[:, :1]]
+        body[compat.cell_blocks(self.V)] = body_numbers(self.mesh)[
+            compat.geometry_dofmap(self.mesh)[:, :1]
+        ]
         return body[: len(self.nodes)]
 
     @property
@@ -260,7 +303,11 @@ class FemSpace(NodalSpace):
 
     def reduced(self, full: Any) -> Any:
         """Reduce a PETSc matrix of all components to PᵀAP of the free ones. Collective."""
-        return triple_product(full, self._P.mat) if self._P is not None else self._columns(full, self.free, self.free)
+        return (
+            triple_product(full, self._P.mat)
+            if self._P is not None
+            else self._columns(full, self.free, self.free)
+        )
 
     def held_columns(self, full: Any) -> Any:
         """Return the columns of prescribed components of a PETSc matrix of all. Collective."""
@@ -269,7 +316,9 @@ class FemSpace(NodalSpace):
     def _columns(self, full: Any, *chosen: Mask) -> Any:
         first = full.getOwnershipRange()[0]
         numbers = [(first + np.flatnonzero(mask)).astype(PETSc.IntType) for mask in chosen]
-        return full.createSubMatrix(*(PETSc.IS().createGeneral(one, comm=full.comm) for one in numbers))
+        return full.createSubMatrix(
+            *(PETSc.IS().createGeneral(one, comm=full.comm) for one in numbers)
+        )
 
     def restrict(self, full: Array) -> Array:
         """Restrict nodal values (owned nodes, d) to the free vector."""

@@ -19,8 +19,12 @@ from ..meshes.rows import connected
 from .groups import components_given, components_of, facets_of
 from .mesh import Facets
 
-PLACE_TOLERANCE = 1e-6  # of the body's size: nodes farther from the place of their partner have none
-NodesOf = Callable[[Facets], tuple[Indices, Array]]  # original numbers, ascending, and points of nodes, on every rank
+PLACE_TOLERANCE = (
+    1e-6  # of the body's size: nodes farther from the place of their partner have none
+)
+NodesOf = Callable[
+    [Facets], tuple[Indices, Array]
+]  # original numbers, ascending, and points of nodes, on every rank
 
 
 @dataclass(frozen=True)
@@ -49,7 +53,11 @@ class Links:
         nodes = np.column_stack([self.followers, self.leaders]) // d
         found, count = np.unique(nodes, axis=0, return_counts=True)
         whole = found[count == d]
-        return dict.fromkeys(nodes.ravel().tolist(), -1) | dict(whole[:, [1, 1]].tolist()) | dict(whole.tolist())
+        return (
+            dict.fromkeys(nodes.ravel().tolist(), -1)
+            | dict(whole[:, [1, 1]].tolist())
+            | dict(whole.tolist())
+        )
 
 
 def linked(tied: Sequence[Tied], dimension: int, near: float, nodes: NodesOf) -> Links:
@@ -76,17 +84,26 @@ def _pairs(tie: Tied, dimension: int, near: float, nodes: NodesOf) -> tuple[Indi
     first, second = nodes(tie.first), nodes(tie.second)
     names = f"'{tie.first.name}' and '{tie.second.name}'"
     if len(first[0]) != len(second[0]) or not len(first[0]):
-        raise InputError(f"tied boundaries {names} have {len(first[0])} and {len(second[0])} nodes: mesh them alike")
+        raise InputError(
+            f"tied boundaries {names} have {len(first[0])} and {len(second[0])} nodes: mesh them alike"
+        )
     for shared in first[1][np.isin(first[0], second[0])]:
-        raise InputError(f"tied boundaries {names} share the node {at(shared)}: tie boundaries without common nodes")
+        raise InputError(
+            f"tied boundaries {names} share the node {at(shared)}: tie boundaries without common nodes"
+        )
     from scipy.spatial import cKDTree
 
     apart = second[1].mean(axis=0) - first[1].mean(axis=0)
     distance, partner = cKDTree(second[1]).query(first[1] + apart)
     worst = int(distance.argmax())
     if distance[worst] > near or len(set(partner)) < len(partner):
-        raise InputError(f"node {at(first[1][worst])} of tied boundaries {names} has no partner opposite it on the "
-                         "other: mesh both sides alike")
+        raise InputError(
+            f"node {at(first[1][worst])} of tied boundaries {names} has no partner opposite it on the "
+            "other: mesh both sides alike"
+        )
     components = np.array(components_of("tied", tie.components, dimension))
-    one, two = ((numbers[:, None] * dimension + components).ravel() for numbers in (first[0], second[0][partner]))
+    one, two = (
+        (numbers[:, None] * dimension + components).ravel()
+        for numbers in (first[0], second[0][partner])
+    )
     return one, two

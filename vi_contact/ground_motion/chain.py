@@ -6,7 +6,16 @@ from dataclasses import dataclass
 from ..core.checks import number
 from ..core.errors import InputError
 from .intensity import arias, pga, psa
-from .processing import baseline_corrected, filtered, padded, resampled, scaled, tapered, trimmed, without_mean
+from .processing import (
+    baseline_corrected,
+    filtered,
+    padded,
+    resampled,
+    scaled,
+    tapered,
+    trimmed,
+    without_mean,
+)
 from .record import Record
 
 
@@ -36,9 +45,13 @@ class Processing:
     psa: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        asked = [name for name in ("scale", "pga", "arias", "psa") if getattr(self, name) is not None]
+        asked = [
+            name for name in ("scale", "pga", "arias", "psa") if getattr(self, name) is not None
+        ]
         if len(asked) > 1:
-            raise InputError(f"Processing: {' and '.join(asked)} were both given; scale a record only once")
+            raise InputError(
+                f"Processing: {' and '.join(asked)} were both given; scale a record only once"
+            )
 
     def __call__(self, record: Record) -> Record:
         """Return the processed record; its notes tell every step taken."""
@@ -51,7 +64,9 @@ class Processing:
         if self.taper is not None:
             record = tapered(record, fraction=self.taper)
         if self.low is not None or self.high is not None:
-            record = filtered(record, low=self.low, high=self.high, order=self.order, causal=self.causal)
+            record = filtered(
+                record, low=self.low, high=self.high, order=self.order, causal=self.causal
+            )
         if self.resample is not None and self.resample != record.dt:
             record = resampled(record, self.resample)
         if self.baseline is not None:
@@ -78,14 +93,18 @@ def scaled_to_psa(record: Record, target: float, period: float, *, damping: floa
     """Scale a record so that its pseudo-acceleration at `period` [s] is `target` [m/s²], and keep its sign.
 
     Raises InputError unless target > 0 and the record is not all zero."""
-    return scaled(record, factor=_ratio(record, "scaled_to_psa", target, psa(record, period, damping=damping)))
+    return scaled(
+        record, factor=_ratio(record, "scaled_to_psa", target, psa(record, period, damping=damping))
+    )
 
 
 def scaled_to_arias(record: Record, target: float) -> Record:
     """Scale a record so that its Arias intensity is `target` [m/s], and keep its sign.
 
     Raises InputError unless target > 0 and the record is not all zero."""
-    return scaled(record, factor=math.sqrt(_ratio(record, "scaled_to_arias", target, arias(record))))
+    return scaled(
+        record, factor=math.sqrt(_ratio(record, "scaled_to_arias", target, arias(record)))
+    )
 
 
 def _ratio(record: Record, name: str, target: float, value: float) -> float:

@@ -38,14 +38,20 @@ class EC8Spectrum:
         if not self.tb <= self.tc <= real(self.td):
             raise InputError(f"{self!r}: give periods with tb <= tc <= td")
         if not 0.0 <= self.damping < 1.0:
-            raise InputError(f"EC8Spectrum: damping is {self.damping!r}; give a ratio from 0 to below 1, 0.05 for 5 %")
+            raise InputError(
+                f"EC8Spectrum: damping is {self.damping!r}; give a ratio from 0 to below 1, 0.05 for 5 %"
+            )
 
     @classmethod
     @checked
-    def on_ground(cls, ground: str, *, ag: float, kind: int = 1, damping: float = 0.05) -> "EC8Spectrum":
+    def on_ground(
+        cls, ground: str, *, ag: float, kind: int = 1, damping: float = 0.05
+    ) -> "EC8Spectrum":
         """Return the horizontal spectrum of type `kind` (1, or 2 for weak near earthquakes) on ground "A" to "E"."""
         if kind not in TYPES or ground not in TYPES[kind]["ground"]:
-            raise InputError(f"EC8Spectrum: ground {ground!r}, type {kind!r}; give A, B, C, D or E and type 1 or 2")
+            raise InputError(
+                f"EC8Spectrum: ground {ground!r}, type {kind!r}; give A, B, C, D or E and type 1 or 2"
+            )
         s, tb, tc, td = TYPES[kind]["ground"][ground]
         return cls(ag, s, tb, tc, td, damping=damping)
 
@@ -77,4 +83,6 @@ class EC8Spectrum:
 
     def displacement(self, periods: Array) -> Array:
         """Return S_De = S_e (T / 2 pi)² [m], eq. 3.7."""
-        return self.acceleration(periods) * (np.asarray(periods, dtype=float) / (2.0 * math.pi)) ** 2
+        return (
+            self.acceleration(periods) * (np.asarray(periods, dtype=float) / (2.0 * math.pi)) ** 2
+        )

@@ -20,7 +20,13 @@ class GroundMotion:
     scale: float = 1.0
 
     def __post_init__(self) -> None:
-        instance("GroundMotion", "record", self.record, Record, "pass a Record, such as read_record(path)")
+        instance(
+            "GroundMotion",
+            "record",
+            self.record,
+            Record,
+            "pass a Record, such as read_record(path)",
+        )
         check_excitation(self, finite=("scale",))
 
     @property
@@ -36,6 +42,8 @@ class GroundMotion:
         position = t / record.dt
         k = min(int(position), record.acceleration.size - 2)
         w = position - k
-        return self.scale * float((1.0 - w) * record.acceleration[k] + w * record.acceleration[k + 1])
+        return self.scale * float(
+            (1.0 - w) * record.acceleration[k] + w * record.acceleration[k + 1]
+        )
 
     __call__ = vector

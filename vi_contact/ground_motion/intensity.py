@@ -66,7 +66,9 @@ def husid(record: Record) -> Array:
 def significant_duration(record: Record, start: float, end: float) -> float:
     """Return the time between fractions `start` and `end` of the Arias intensity [s]; zero if all is zero."""
     if not 0.0 <= start < end <= 1.0:
-        raise InputError(f"significant_duration: {start!r} to {end!r}; give fractions with 0 <= start < end <= 1")
+        raise InputError(
+            f"significant_duration: {start!r} to {end!r}; give fractions with 0 <= start < end <= 1"
+        )
     curve = husid(record)
     if curve[-1] == 0.0:
         return 0.0
@@ -78,7 +80,9 @@ def significant_duration(record: Record, start: float, end: float) -> float:
 def cav(record: Record) -> float:
     """Return the cumulative absolute velocity, the integral of |a| [m/s], exact for straight lines between samples."""
     a, b = np.abs(record.acceleration[:-1]), np.abs(record.acceleration[1:])
-    change = record.acceleration[:-1] * record.acceleration[1:] < 0.0  # two triangles where the sign changes
+    change = (
+        record.acceleration[:-1] * record.acceleration[1:] < 0.0
+    )  # two triangles where the sign changes
     total = np.where(change, a + b, 1.0)
     return float(np.sum(0.5 * record.dt * np.where(change, (a**2 + b**2) / total, a + b)))
 
@@ -89,8 +93,12 @@ def rms(record: Record) -> float:
     return math.sqrt(2.0 * STANDARD_GRAVITY / math.pi * arias(record) / record.duration)
 
 
-HOUSNER_PERIODS = np.linspace(0.1, 2.5, 241)  # periods [s] of the trapezoidal rule in `housner_intensity`
-PREDOMINANT_PERIODS = np.geomspace(0.02, 10.0, 400)  # periods [s] among which `predominant_period` looks, 1.6 % apart
+HOUSNER_PERIODS = np.linspace(
+    0.1, 2.5, 241
+)  # periods [s] of the trapezoidal rule in `housner_intensity`
+PREDOMINANT_PERIODS = np.geomspace(
+    0.02, 10.0, 400
+)  # periods [s] among which `predominant_period` looks, 1.6 % apart
 
 
 @checked
@@ -111,7 +119,9 @@ def predominant_period(record: Record, *, damping: float = 0.05) -> float:
     """Return the period of the largest pseudo-acceleration from 0.02 (or ten steps of the record) to 10 s [s]."""
     periods = PREDOMINANT_PERIODS[PREDOMINANT_PERIODS / record.dt >= 10.0]
     if not periods.size:
-        raise InputError(f"predominant_period: a step of {record.dt:g} s resolves no period; use a smaller step")
+        raise InputError(
+            f"predominant_period: a step of {record.dt:g} s resolves no period; use a smaller step"
+        )
     return float(periods[np.argmax(response_spectrum(record, periods, damping=damping).psa)])
 
 
@@ -124,7 +134,9 @@ def mean_period(record: Record) -> float:
     inside = (frequencies >= 0.25) & (frequencies <= 20.0)
     power = amplitudes[inside] ** 2
     if not np.any(power > 0.0):
-        raise InputError("mean_period: the record has no motion from 0.25 to 20 Hz; use a longer or finer one")
+        raise InputError(
+            "mean_period: the record has no motion from 0.25 to 20 Hz; use a longer or finer one"
+        )
     return float(np.sum(power / frequencies[inside]) / np.sum(power))
 
 
@@ -137,10 +149,22 @@ def record_info(record: Record) -> str:
     for one in (predominant_period, mean_period):
         found[one.__name__] = _period_in_words(one, record) if found["pga"] > 0.0 else "(all zero)"
     velocity, displacement = (values[-1] for values in integrated(record))
-    text = Path(__file__).with_name("record_info.txt").read_text(encoding="utf-8").format(
-        **found, record=record, title=record.title or "(none)", station=record.station or "(not stated)",
-        component=record.component or "(not stated)", unit=UNITS[record.units], velocity=velocity,
-        displacement=displacement, in_g=found["pga"] / STANDARD_GRAVITY)
+    text = (
+        Path(__file__)
+        .with_name("record_info.txt")
+        .read_text(encoding="utf-8")
+        .format(
+            **found,
+            record=record,
+            title=record.title or "(none)",
+            station=record.station or "(not stated)",
+            component=record.component or "(not stated)",
+            unit=UNITS[record.units],
+            velocity=velocity,
+            displacement=displacement,
+            in_g=found["pga"] / STANDARD_GRAVITY,
+        )
+    )
     doubts = (f"{'doubt':<20}{doubt}" for doubt in record.doubts)
     return "\n".join([text, *doubts, *(f"{'note':<20}{note}" for note in record.notes)])
 

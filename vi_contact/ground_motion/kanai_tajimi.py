@@ -39,7 +39,9 @@ class KanaiTajimi:
         if self.omega_f == 0.0:
             return values
         corner = self.omega_f**2
-        return values * square**2 / ((corner - square) ** 2 + 4.0 * self.zeta_f**2 * corner * square)
+        return (
+            values * square**2 / ((corner - square) ** 2 + 4.0 * self.zeta_f**2 * corner * square)
+        )
 
 
 @dataclass(frozen=True)
@@ -65,8 +67,14 @@ class Envelope:
 
 
 @checked
-def synthetic(spectrum: KanaiTajimi, duration: float, dt: float, *, seed: int,
-              envelope: Envelope | None = None) -> Record:
+def synthetic(
+    spectrum: KanaiTajimi,
+    duration: float,
+    dt: float,
+    *,
+    seed: int,
+    envelope: Envelope | None = None,
+) -> Record:
     """Make a motion of this density: a = sum sqrt(4 S(w_k) dw) cos(w_k t + phi_k), phi_k uniform from `seed`.
 
     Spectral representation (Shinozuka and Deodatis, 1991) with w_k = k dw, dw = 2 pi / period; the period, the next
@@ -83,9 +91,16 @@ def synthetic(spectrum: KanaiTajimi, duration: float, dt: float, *, seed: int,
     omega = step * np.arange(1, size // 2)
     phases = np.random.Generator(np.random.PCG64(seed)).uniform(0.0, 2.0 * math.pi, omega.size)
     spectrum_line = np.zeros(size // 2 + 1, dtype=complex)
-    spectrum_line[1:-1] = np.sqrt(4.0 * spectrum.density(omega) * step) * np.exp(1j * phases) * size / 2.0
+    spectrum_line[1:-1] = (
+        np.sqrt(4.0 * spectrum.density(omega) * step) * np.exp(1j * phases) * size / 2.0
+    )
     samples = np.fft.irfft(spectrum_line, size)[:count]
     if envelope is not None:
         samples = samples * envelope(dt * np.arange(count))
-    return Record(acceleration=samples, dt=dt, title=f"{spectrum}, seed {seed}", format="synthetic",
-                  notes=(f"synthetic: {spectrum}", f"seed {seed}, envelope {envelope}"))
+    return Record(
+        acceleration=samples,
+        dt=dt,
+        title=f"{spectrum}, seed {seed}",
+        format="synthetic",
+        notes=(f"synthetic: {spectrum}", f"seed {seed}, envelope {envelope}"),
+    )

@@ -37,19 +37,25 @@ def resampled(record: Record, dt: float) -> Record:
     Raises InputError when dt is not positive, not such a ratio, or longer than the record."""
     dt = number("resampled", "dt", dt, positive=True, unit="seconds")
     counted("resampled", f"dt={dt!r} s", record.duration / dt)
-    from scipy.signal import resample_poly  # late: it takes longer to import than the rest of the package
+    from scipy.signal import (
+        resample_poly,
+    )  # late: it takes longer to import than the rest of the package
 
     ratio = Fraction(record.dt / dt).limit_denominator(LARGEST_RATIO)
     exact = math.isclose(ratio.numerator * dt, ratio.denominator * record.dt, rel_tol=1e-9)
     if ratio.numerator > LARGEST_RATIO or not exact:
         whole = min(round(max(record.dt / dt, dt / record.dt)), LARGEST_RATIO)
         near = record.dt / whole if dt < record.dt else record.dt * whole
-        raise InputError(f"resampled: {dt!r} s and the record's step {record.dt!r} s have no ratio of whole numbers "
-                         f"up to {LARGEST_RATIO}; choose a step such as {near!r} s")
+        raise InputError(
+            f"resampled: {dt!r} s and the record's step {record.dt!r} s have no ratio of whole numbers "
+            f"up to {LARGEST_RATIO}; choose a step such as {near!r} s"
+        )
     count = (record.acceleration.size - 1) * ratio.numerator // ratio.denominator + 1
     if count < 2:
-        raise InputError(f"resampled: a step of {dt!r} s leaves one sample of a record of {record.duration!r} s; "
-                         "choose a shorter step")
+        raise InputError(
+            f"resampled: a step of {dt!r} s leaves one sample of a record of {record.duration!r} s; "
+            "choose a shorter step"
+        )
     samples = resample_poly(record.acceleration, ratio.numerator, ratio.denominator)[:count]
     return record.changed(samples, f"resampled from {record.dt:g} s to {dt:g} s", dt=float(dt))
 
@@ -63,7 +69,9 @@ def integrated(record: Record) -> tuple[Array, Array]:
     Nothing is filtered and no baseline is corrected: what is left at the end is the drift of the record."""
     a, dt = record.acceleration, record.dt
     velocity = np.concatenate(([0.0], np.cumsum(0.5 * dt * (a[:-1] + a[1:]))))
-    displacement = np.concatenate(([0.0], np.cumsum(dt * velocity[:-1] + dt**2 / 6.0 * (2.0 * a[:-1] + a[1:]))))
+    displacement = np.concatenate(
+        ([0.0], np.cumsum(dt * velocity[:-1] + dt**2 / 6.0 * (2.0 * a[:-1] + a[1:])))
+    )
     return velocity, displacement
 
 
@@ -75,13 +83,19 @@ def trimmed(record: Record, start: float = 0.0, end: float | None = None) -> Rec
     last = record.duration if end is None else end
     slack = 1e-9 * record.dt
     if not -slack <= start < last <= record.duration + slack:
-        raise InputError(f"trimmed: start={start!r} and end={end!r} s; give 0 <= start < end <= {record.duration:g} s")
+        raise InputError(
+            f"trimmed: start={start!r} and end={end!r} s; give 0 <= start < end <= {record.duration:g} s"
+        )
     inside = (record.times >= start - slack) & (record.times <= last + slack)
     if np.count_nonzero(inside) < 2:
-        raise InputError(f"trimmed: fewer than two samples lie from {start:g} to {last:g} s; give a longer piece")
+        raise InputError(
+            f"trimmed: fewer than two samples lie from {start:g} to {last:g} s; give a longer piece"
+        )
     first = float(record.times[inside][0])
-    return record.changed(record.acceleration[inside],
-                          f"trimmed to {first:g} ... {float(record.times[inside][-1]):g} s")
+    return record.changed(
+        record.acceleration[inside],
+        f"trimmed to {first:g} ... {float(record.times[inside][-1]):g} s",
+    )
 
 
 @checked
@@ -90,9 +104,13 @@ def padded(record: Record, before: float = 0.0, after: float = 0.0) -> Record:
 
     Raises InputError unless both are zero or positive."""
     if not all(0.0 <= length < math.inf for length in (before, after)):
-        raise InputError(f"padded: before={before!r} and after={after!r} s; give zero or positive lengths")
+        raise InputError(
+            f"padded: before={before!r} and after={after!r} s; give zero or positive lengths"
+        )
     asked = [length / record.dt * (1.0 - 1e-9) for length in (before, after)]
-    counted("padded", f"before={before!r} and after={after!r} s", record.acceleration.size + sum(asked))
+    counted(
+        "padded", f"before={before!r} and after={after!r} s", record.acceleration.size + sum(asked)
+    )
     counts = [math.ceil(samples) for samples in asked]
     note = f"zeros added: {counts[0] * record.dt:g} s before, {counts[1] * record.dt:g} s after"
     return record.changed(np.pad(record.acceleration, counts), note)
@@ -105,7 +123,9 @@ def without_mean(record: Record, *, until: float | None = None) -> Record:
     Raises InputError when until is not within the record."""
     end = record.duration if until is None else until
     if not 0.0 <= end <= record.duration:
-        raise InputError(f"without_mean: until is {until!r} s; give a time within the record's {record.duration:g} s")
+        raise InputError(
+            f"without_mean: until is {until!r} s; give a time within the record's {record.duration:g} s"
+        )
     count = int(end / record.dt * (1.0 + 1e-12)) + 1
     mean = float(np.mean(record.acceleration[:count]))
     where = "" if until is None else f" of the first {until:g} s"
@@ -119,7 +139,9 @@ def tapered(record: Record, *, fraction: float = 0.05) -> Record:
     w(t) = (1 - cos(pi t / (fraction T))) / 2 at the start, mirrored at the end; InputError unless 0 < fraction <= 0.5.
     """
     if not 0.0 < fraction <= 0.5:
-        raise InputError(f"tapered: fraction is {fraction!r}; give more than 0 and at most 0.5 of the duration")
+        raise InputError(
+            f"tapered: fraction is {fraction!r}; give more than 0 and at most 0.5 of the duration"
+        )
     ramp = np.minimum(record.times / (fraction * record.duration), 1.0)
     window = 0.5 * (1.0 - np.cos(math.pi * ramp))
     note = f"cosine taper over {100 * fraction:g} % at start and end"
@@ -127,8 +149,14 @@ def tapered(record: Record, *, fraction: float = 0.05) -> Record:
 
 
 @checked
-def filtered(record: Record, *, low: float | None = None, high: float | None = None, order: int = 4,
-             causal: bool = False) -> Record:
+def filtered(
+    record: Record,
+    *,
+    low: float | None = None,
+    high: float | None = None,
+    order: int = 4,
+    causal: bool = False,
+) -> Record:
     """Apply a Butterworth high-pass above `low` [Hz], low-pass below `high` [Hz], or band-pass between them.
 
     One pass has the gain |H|² = 1 / (1 + (f/high)^(2 order)) and likewise (low/f) of the high-pass, each applied by
@@ -139,24 +167,42 @@ def filtered(record: Record, *, low: float | None = None, high: float | None = N
     Raises InputError for corners that are not 0 < low < high < Nyquist frequency, or an order outside 1 to 10."""
     nyquist = 0.5 / record.dt
     corners = [corner for corner in (low, high) if corner is not None]
-    if not corners or not all(0.0 < corner < nyquist for corner in corners) or sorted(set(corners)) != corners:
-        raise InputError(f"filtered: corners low={low!r} and high={high!r} Hz; give one or both, rising, between 0 and "
-                         f"the Nyquist frequency {nyquist:g} Hz")
+    if (
+        not corners
+        or not all(0.0 < corner < nyquist for corner in corners)
+        or sorted(set(corners)) != corners
+    ):
+        raise InputError(
+            f"filtered: corners low={low!r} and high={high!r} Hz; give one or both, rising, between 0 and "
+            f"the Nyquist frequency {nyquist:g} Hz"
+        )
     if order not in range(1, 11):
         raise InputError(f"filtered: order is {order!r}; give a whole number from 1 to 10")
-    from scipy.signal import butter, sosfilt  # late: it takes longer to import than the rest of the package
+    from scipy.signal import (
+        butter,
+        sosfilt,
+    )  # late: it takes longer to import than the rest of the package
 
-    stages = [butter(order, corner, kind, fs=1.0 / record.dt, output="sos")
-              for corner, kind in ((low, "highpass"), (high, "lowpass")) if corner is not None]
+    stages = [
+        butter(order, corner, kind, fs=1.0 / record.dt, output="sos")
+        for corner, kind in ((low, "highpass"), (high, "lowpass"))
+        if corner is not None
+    ]
     sections = np.concatenate(stages)
     if causal:
         samples = sosfilt(sections, record.acceleration)
     else:
-        ringing = 6.0 / (min(corners) * record.dt)  # samples in which the slowest filter dies away: six of its periods
-        counted("filtered", f"a corner of {min(corners):g} Hz", 3.0 * ringing + record.acceleration.size)
+        ringing = 6.0 / (
+            min(corners) * record.dt
+        )  # samples in which the slowest filter dies away: six of its periods
+        counted(
+            "filtered", f"a corner of {min(corners):g} Hz", 3.0 * ringing + record.acceleration.size
+        )
         tail = np.zeros(math.ceil(ringing))
         forward = sosfilt(sections, np.concatenate([tail, record.acceleration, tail]))
-        samples = sosfilt(sections, forward[::-1])[::-1][tail.size:tail.size + record.acceleration.size]
+        samples = sosfilt(sections, forward[::-1])[::-1][
+            tail.size : tail.size + record.acceleration.size
+        ]
     band = " to ".join(f"{corner:g}" for corner in corners)
     kind = "band-pass" if len(corners) == 2 else "high-pass" if low is not None else "low-pass"
     passes = "causal" if causal else "zero phase (two passes)"
@@ -172,8 +218,10 @@ def baseline_corrected(record: Record, *, degree: int = 2, displacement: bool = 
     changes nothing, and a record that is itself such a polynomial becomes zero.
     Raises InputError unless degree is a whole number from 1 to 6 and below the number of samples."""
     if degree not in range(1, min(HIGHEST, record.acceleration.size - 1) + 1):
-        raise InputError(f"baseline_corrected: degree is {degree!r}; give a whole number from 1 to {HIGHEST}, below "
-                         "the number of samples")
+        raise InputError(
+            f"baseline_corrected: degree is {degree!r}; give a whole number from 1 to {HIGHEST}, below "
+            "the number of samples"
+        )
     powers = (record.times / record.duration)[:, None] ** np.arange(degree + 1)
     motions = [integrated(replace(record, acceleration=column)) for column in powers.T]
     basis = np.array([motion[int(displacement)] for motion in motions]).T
@@ -181,8 +229,12 @@ def baseline_corrected(record: Record, *, degree: int = 2, displacement: bool = 
     ends = np.array([[motion[k][-1] for motion in motions] for k in (0, 1)])
     scale = np.array([[record.duration], [record.duration**2]])
     wanted = np.array([[part[-1]] for part in integrated(record)]) / scale
-    coefficients = np.linalg.lstsq(ends / scale, wanted, rcond=None)[0][:, 0]  # one that ends at rest, and
-    free = np.linalg.svd(ends / scale)[2][2:].T  # combinations of those that change nothing at the end
+    coefficients = np.linalg.lstsq(ends / scale, wanted, rcond=None)[0][
+        :, 0
+    ]  # one that ends at rest, and
+    free = np.linalg.svd(ends / scale)[2][
+        2:
+    ].T  # combinations of those that change nothing at the end
     if free.shape[1]:
         rest = np.linalg.lstsq(basis @ free, target - basis @ coefficients, rcond=None)[0]
         coefficients = coefficients + free @ rest

@@ -10,8 +10,16 @@ from ..core.checks import array, instance, number
 from ..core.errors import InputError
 from ..core.units import STANDARD_GRAVITY
 
-UNITS = {"m/s2": 1.0, "cm/s2": 0.01, "gal": 0.01, "g": STANDARD_GRAVITY, "g/10": 0.1 * STANDARD_GRAVITY, "mm/s2": 0.001,
-         "in/s2": 0.0254, "ft/s2": 0.3048}
+UNITS = {
+    "m/s2": 1.0,
+    "cm/s2": 0.01,
+    "gal": 0.01,
+    "g": STANDARD_GRAVITY,
+    "g/10": 0.1 * STANDARD_GRAVITY,
+    "mm/s2": 0.001,
+    "in/s2": 0.0254,
+    "ft/s2": 0.3048,
+}
 """Name the accepted units of acceleration, and give their size in m/s²."""
 
 LARGEST_PEAK = 10.0 * STANDARD_GRAVITY
@@ -59,10 +67,16 @@ class Record:
 
     def changed(self, acceleration: Array, note: str, *, dt: float | None = None) -> "Record":
         """Return a record with these samples, and a note of what was done."""
-        return replace(self, acceleration=acceleration, dt=dt or self.dt, notes=(*self.notes, note),
-                       dt_from="resampled" if dt else self.dt_from,
-                       samples_from="changed after reading" if acceleration.size != self.acceleration.size
-                       else self.samples_from)
+        return replace(
+            self,
+            acceleration=acceleration,
+            dt=dt or self.dt,
+            notes=(*self.notes, note),
+            dt_from="resampled" if dt else self.dt_from,
+            samples_from="changed after reading"
+            if acceleration.size != self.acceleration.size
+            else self.samples_from,
+        )
 
     @property
     def times(self) -> Array:
@@ -76,15 +90,32 @@ class Record:
 
 
 _SPELLINGS = {
-    "gals": "gal", "cms/s2": "cm/s2", "cm/ss": "cm/s2", "cms-2": "cm/s2", "ms-2": "m/s2", "mms-2": "mm/s2",
-    "m/s/s": "m/s2", "g's": "g", "gn": "g", "gal(cm/s2)": "gal", "gal=cm/s2": "gal", "cm/s2(gal)": "cm/s2",
+    "gals": "gal",
+    "cms/s2": "cm/s2",
+    "cm/ss": "cm/s2",
+    "cms-2": "cm/s2",
+    "ms-2": "m/s2",
+    "mms-2": "mm/s2",
+    "m/s/s": "m/s2",
+    "g's": "g",
+    "gn": "g",
+    "gal(cm/s2)": "gal",
+    "gal=cm/s2": "gal",
+    "cm/s2(gal)": "cm/s2",
 }
 """Other spellings of units, after blanks, dots, powers and "sec" have been unified."""
 
 
 def known_units(units: str) -> str | None:
     """Return the key of UNITS that `units` spells ("CM/SEC/SEC", "(g)", "cm/s^2"), or None."""
-    text = units.lower().strip(" ()[].,;:'\"").replace("²", "2").replace("^", "").replace("**", "").replace("*", "")
+    text = (
+        units.lower()
+        .strip(" ()[].,;:'\"")
+        .replace("²", "2")
+        .replace("^", "")
+        .replace("**", "")
+        .replace("*", "")
+    )
     text = "".join(text.split()).replace("sec", "s").replace("/s/s", "/s2")
     text = _SPELLINGS.get(text, text)
     return text if text in UNITS else None
@@ -95,6 +126,8 @@ def canonical_units(source: str, units: str) -> str:
     """Return the key of UNITS that `units` spells ("CM/SEC/SEC", "(g)", "cm/s^2"); InputError if there is none."""
     text = known_units(units) if isinstance(units, str) else None
     if text is None:
-        raise InputError(f"{source}: {units!r} is not a unit of acceleration known here; use a file of accelerations "
-                         f"in one of {', '.join(UNITS)}")
+        raise InputError(
+            f"{source}: {units!r} is not a unit of acceleration known here; use a file of accelerations "
+            f"in one of {', '.join(UNITS)}"
+        )
     return text

@@ -22,7 +22,10 @@ PER_PERIOD, PER_STEP = 64, 4
 SHORTEST, MOST = 1000, 10**10
 """Steps of the record in the shortest period that is looked at, at most; and samples times periods, at most."""
 
-_SMALL, _TERMS = 0.3, 14  # below this omega t the closed forms lose digits; the series of so many terms does not
+_SMALL, _TERMS = (
+    0.3,
+    14,
+)  # below this omega t the closed forms lose digits; the series of so many terms does not
 
 _BLOCK = 512  # samples marched before their peaks are taken: bounds the memory
 
@@ -61,9 +64,13 @@ def _factors(time: Array | float, length: Array | float, omega: Array, zeta: flo
     of_u = decay * np.array([cosine + zeta / root * sine, -omega / root * sine])
     of_v = decay * np.array([sine / (root * omega), cosine - zeta / root * sine])
     one, zero = np.ones_like(omega), np.zeros_like(omega)
-    constant = np.array([-one / omega**2, zero])  # particular motion under a = 1, at 0 and at `time`
+    constant = np.array(
+        [-one / omega**2, zero]
+    )  # particular motion under a = 1, at 0 and at `time`
     ramp0 = np.array([2.0 * zeta / omega**3, -one / omega**2])  # under a = t, at 0
-    ramp = np.array([2.0 * zeta / omega**3 - time / omega**2, -one / omega**2])  # under a = t, at `time`
+    ramp = np.array(
+        [2.0 * zeta / omega**3 - time / omega**2, -one / omega**2]
+    )  # under a = t, at `time`
     of_one = constant - of_u * constant[0] - of_v * constant[1]
     of_ramp = ramp - of_u * ramp0[0] - of_v * ramp0[1]
     small = omega * time < _SMALL
@@ -80,11 +87,13 @@ def _moved(factors: Array, u: Array, v: Array, a0: Array | float, a1: Array | fl
 def _series(time: Array | float, omega: Array, zeta: float, first: int) -> Array:
     """Return the motion at `time` under a = 1 (first = 2) or a = t (first = 3) from rest, a power series (2, m):
     u = sum c_k t^k with c_first = -1/first! and k (k-1) c_k = -2 zeta omega (k-1) c_{k-1} - omega² c_{k-2}."""
-    term = -np.asarray(time, dtype=float) ** first / math.factorial(first) * np.ones_like(omega)
+    term = -(np.asarray(time, dtype=float) ** first) / math.factorial(first) * np.ones_like(omega)
     before = np.zeros_like(term)
     total, rate = term, first * term / time
     for k in range(first + 1, first + _TERMS):
-        after = -(2.0 * zeta * omega * time * (k - 1) * term + (omega * time) ** 2 * before) / (k * (k - 1))
+        after = -(2.0 * zeta * omega * time * (k - 1) * term + (omega * time) ** 2 * before) / (
+            k * (k - 1)
+        )
         term, before = after, term
         total, rate = total + term, rate + k * term / time
     return np.array([total, rate])
@@ -98,16 +107,29 @@ def response_spectrum(record: Record, periods: Array, *, damping: float = 0.05) 
     line assumed here. Raises InputError unless every period is positive and 0 <= damping < 1."""
     row = np.atleast_1d(np.asarray(periods, dtype=float))
     if row.ndim != 1 or not row.size or not np.all(np.isfinite(row)) or np.any(row <= 0.0):
-        raise InputError(f"response_spectrum: periods are {periods!r}; give a row of positive numbers of seconds")
+        raise InputError(
+            f"response_spectrum: periods are {periods!r}; give a row of positive numbers of seconds"
+        )
     if not 0.0 <= damping < 1.0:
-        raise InputError(f"response_spectrum: damping is {damping!r}; give a ratio from 0 to below 1, 0.05 for 5 %")
+        raise InputError(
+            f"response_spectrum: damping is {damping!r}; give a ratio from 0 to below 1, 0.05 for 5 %"
+        )
     if record.dt > SHORTEST * row.min():
-        raise InputError(f"response_spectrum: a period of {row.min():g} s is below a {SHORTEST}th of the step "
-                         f"{record.dt:g} s and has the peak acceleration alone; begin with longer periods")
-    counted("response_spectrum", f"{row.size} periods", float(row.size) * record.acceleration.size, most=MOST)
+        raise InputError(
+            f"response_spectrum: a period of {row.min():g} s is below a {SHORTEST}th of the step "
+            f"{record.dt:g} s and has the peak acceleration alone; begin with longer periods"
+        )
+    counted(
+        "response_spectrum",
+        f"{row.size} periods",
+        float(row.size) * record.acceleration.size,
+        most=MOST,
+    )
     parts = np.maximum(PER_STEP, 2 ** np.ceil(np.log2(PER_PERIOD * record.dt / row))).astype(int)
     peaks = np.zeros((3, row.size))
-    for count in np.unique(parts):  # oscillators that need the same number of looks a step go together
+    for count in np.unique(
+        parts
+    ):  # oscillators that need the same number of looks a step go together
         same = parts == count
         peaks[:, same] = _peaks(record, 2.0 * math.pi / row[same], damping, int(count))
     return ResponseSpectrum(row, damping, *peaks)
@@ -129,7 +151,7 @@ def _peaks(record: Record, omega: Array, zeta: float, parts: int) -> Array:
     looks = [_factors(dt * part / parts, dt, omega, zeta) for part in range(1, parts + 1)]
     peaks, x = np.zeros((3, omega.size)), np.zeros((2, omega.size))
     for start in range(0, record.acceleration.size - 1, _BLOCK):
-        a = record.acceleration[start:start + _BLOCK + 1]
+        a = record.acceleration[start : start + _BLOCK + 1]
         states = np.empty((2, a.size - 1, omega.size))
         for k in range(a.size - 1):
             states[:, k] = x
@@ -139,7 +161,9 @@ def _peaks(record: Record, omega: Array, zeta: float, parts: int) -> Array:
             peaks = np.maximum(peaks, _sizes(seen, omega, zeta).max(axis=1))
     period = 2.0 * math.pi / omega
     for part in range(1, PER_PERIOD + 1):  # free vibration: its first period holds its peaks
-        free = _moved(_factors(period * part / PER_PERIOD, period, omega, zeta), x[0], x[1], 0.0, 0.0)
+        free = _moved(
+            _factors(period * part / PER_PERIOD, period, omega, zeta), x[0], x[1], 0.0, 0.0
+        )
         peaks = np.maximum(peaks, _sizes(free, omega, zeta))
     return peaks
 

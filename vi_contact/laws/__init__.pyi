@@ -30,4 +30,34 @@ from .materials import Solid as Solid
 from .orthotropic import Orthotropic as Orthotropic
 from .weight import with_weight as with_weight
 
-__all__: list[str] = ['ComponentReset', 'ConsistentMass', 'Coulomb', 'DampingRatio', 'Elastic', 'ExponentialDecay', 'FullSine', 'HalfSine', 'Harmonic', 'ImpulseUpdate', 'Inelastic', 'KelvinVoigt', 'LinearElastic', 'MassProportional', 'Newton', 'NoDamping', 'Orthotropic', 'PlaneStrain', 'PlaneStress', 'Rayleigh', 'Rectangular', 'Redistributed', 'Ricker', 'SlipRateCoulomb', 'Solid', 'StaticKinetic', 'Tabulated', 'Tresca', 'with_weight']
+__all__: list[str] = [
+    "ComponentReset",
+    "ConsistentMass",
+    "Coulomb",
+    "DampingRatio",
+    "Elastic",
+    "ExponentialDecay",
+    "FullSine",
+    "HalfSine",
+    "Harmonic",
+    "ImpulseUpdate",
+    "Inelastic",
+    "KelvinVoigt",
+    "LinearElastic",
+    "MassProportional",
+    "Newton",
+    "NoDamping",
+    "Orthotropic",
+    "PlaneStrain",
+    "PlaneStress",
+    "Rayleigh",
+    "Rectangular",
+    "Redistributed",
+    "Ricker",
+    "SlipRateCoulomb",
+    "Solid",
+    "StaticKinetic",
+    "Tabulated",
+    "Tresca",
+    "with_weight",
+]

@@ -132,12 +132,16 @@ class Tabulated:
         for name in ("times", "values"):
             object.__setattr__(self, name, finite_tuple("Tabulated", name, getattr(self, name)))
         if len(self.times) != len(self.values) or len(self.times) < 2:
-            raise InputError(f"Tabulated: there are {len(self.times)} times and {len(self.values)} values; "
-                             "give one value per time and at least two of each")
+            raise InputError(
+                f"Tabulated: there are {len(self.times)} times and {len(self.values)} values; "
+                "give one value per time and at least two of each"
+            )
         for k, (before, after) in enumerate(pairwise(self.times)):
             if after <= before:
-                raise InputError(f"Tabulated: times[{k + 1}] = {after!r} does not come after times[{k}] = {before!r}; "
-                                 "give strictly increasing times")
+                raise InputError(
+                    f"Tabulated: times[{k + 1}] = {after!r} does not come after times[{k}] = {before!r}; "
+                    "give strictly increasing times"
+                )
 
     @property
     def duration(self) -> float:

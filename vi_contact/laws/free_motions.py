@@ -9,7 +9,9 @@ from ..core.algebra import Array, Comm, Factor, Indices, Mask, largest
 from ..core.system import SemiDiscreteSystem
 from .mass_transfer import rigid_motions
 
-ROUNDED = 16.0 * float(np.finfo(float).eps)  # wᵀKw over Σ K_ii w_i² that is round-off: 1.1 eps at most on meshes
+ROUNDED = 16.0 * float(
+    np.finfo(float).eps
+)  # wᵀKw over Σ K_ii w_i² that is round-off: 1.1 eps at most on meshes
 NOWHERE = 1e300  # [m], where bodies are that are held everywhere
 SOFT = 1e-12  # of a diagonal entry: lets unknowns be solved for that nothing holds
 
@@ -39,7 +41,9 @@ def free_motions(system: SemiDiscreteSystem) -> Iterator[FreeMotions]:
     pulls = np.column_stack([system.K @ w for w in motions.T])
     for rows in bodies:
         w = motions[rows]
-        form, size, inertia = comm.sum(np.stack([w.T @ x for x in (pulls[rows], stiffness[rows] * w, mass[rows] * w)]))
+        form, size, inertia = comm.sum(
+            np.stack([w.T @ x for x in (pulls[rows], stiffness[rows] * w, mass[rows] * w)])
+        )
         kernel = _kernel(0.5 * (form + form.T), size.diagonal())
         basis = kernel @ _orthonormal(kernel.T @ inertia @ kernel)
         most = comm.max(np.max(np.abs(w @ basis), axis=0, initial=0.0))
@@ -58,7 +62,9 @@ def _rigid(system: SemiDiscreteSystem, bodies: list[Indices]) -> Array:
     another amount, so that what K ties to another body does not go with it."""
     comm, points = system.algebra.comm, system.space.coordinates
     place, amount = np.zeros_like(points), np.zeros((system.rows, 1))
-    for rows, factor in zip(bodies, np.random.default_rng(0).uniform(1.0, 2.0, len(bodies)), strict=True):
+    for rows, factor in zip(
+        bodies, np.random.default_rng(0).uniform(1.0, 2.0, len(bodies)), strict=True
+    ):
         high = comm.max(np.max(points[rows], axis=0, initial=-NOWHERE))
         low = -comm.max(np.max(-points[rows], axis=0, initial=-NOWHERE))
         place[rows] = (points[rows] - 0.5 * (low + high)) / max(float(np.max(high - low)), 1e-300)

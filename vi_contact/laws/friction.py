@@ -31,11 +31,17 @@ class Tresca:
     threshold: float | Array | tuple[float, ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "threshold", _checked("Tresca", "the threshold [Pa]", self.threshold))
+        object.__setattr__(
+            self, "threshold", _checked("Tresca", "the threshold [Pa]", self.threshold)
+        )
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
         """Return threshold · weights · scale, shape (n,)."""
-        return _nodal("Tresca", "threshold", self.threshold, len(weights)) * np.asarray(weights, dtype=float) * scale
+        return (
+            _nodal("Tresca", "threshold", self.threshold, len(weights))
+            * np.asarray(weights, dtype=float)
+            * scale
+        )
 
     def slope(self, weights: Array) -> Array:
         """Return zeros, shape (n,)."""
@@ -84,7 +90,9 @@ class SlipRateCoulomb:
     mu: "ExponentialDecay | StaticKinetic | Callable[[Array], Any]"
 
     def __post_init__(self) -> None:
-        function("SlipRateCoulomb", "mu", self.mu, "give a function of the slip rate, or use Coulomb()")
+        function(
+            "SlipRateCoulomb", "mu", self.mu, "give a function of the slip rate, or use Coulomb()"
+        )
 
     def at(self, speed: Array) -> Coulomb:
         """Return Coulomb's law with the coefficients of these speeds."""
@@ -93,13 +101,17 @@ class SlipRateCoulomb:
         values = self.mu(speed)
         found = np.asarray(values)
         if found.dtype.kind not in "iuf" or found.shape not in ((), speed.shape):
-            raise InputError(f"SlipRateCoulomb: mu returns {shown(values)}, of shape {found.shape} for {len(speed)} "
-                             "slip rates; return one real coefficient per rate")
+            raise InputError(
+                f"SlipRateCoulomb: mu returns {shown(values)}, of shape {found.shape} for {len(speed)} "
+                "slip rates; return one real coefficient per rate"
+            )
         found = np.broadcast_to(found.astype(float), speed.shape)
         wrong = np.flatnonzero(~(np.isfinite(found) & (found >= 0.0)))
         if len(wrong):
-            raise InputError(f"SlipRateCoulomb: mu({speed[wrong[0]]:.6g} m/s) is {found[wrong[0]]:.6g}; let it return "
-                             "zero or a positive finite number for every slip rate from 0 on")
+            raise InputError(
+                f"SlipRateCoulomb: mu({speed[wrong[0]]:.6g} m/s) is {found[wrong[0]]:.6g}; let it return "
+                "zero or a positive finite number for every slip rate from 0 on"
+            )
         return Coulomb(found)
 
     def limit(self, r_n: Array, weights: Array, scale: float) -> Array:
@@ -119,14 +131,28 @@ class TwoCoefficients:
     mu_k: float | Array | tuple[float, ...]
 
     def __post_init__(self) -> None:
-        for name, meaning in (("mu_s", "the static coefficient mu_s"), ("mu_k", "the kinetic coefficient mu_k")):
-            object.__setattr__(self, name, _checked(type(self).__name__, meaning, getattr(self, name)))
-        if isinstance(self.mu_s, tuple) and isinstance(self.mu_k, tuple) and len(self.mu_s) != len(self.mu_k):
-            raise InputError(f"{self}: there are {len(self.mu_s)} mu_s and {len(self.mu_k)} mu_k; give as many")
+        for name, meaning in (
+            ("mu_s", "the static coefficient mu_s"),
+            ("mu_k", "the kinetic coefficient mu_k"),
+        ):
+            object.__setattr__(
+                self, name, _checked(type(self).__name__, meaning, getattr(self, name))
+            )
+        if (
+            isinstance(self.mu_s, tuple)
+            and isinstance(self.mu_k, tuple)
+            and len(self.mu_s) != len(self.mu_k)
+        ):
+            raise InputError(
+                f"{self}: there are {len(self.mu_s)} mu_s and {len(self.mu_k)} mu_k; give as many"
+            )
 
     def _nodal(self, count: int) -> list[Array]:
         """mu_s and mu_k as arrays that broadcast over the nodes."""
-        return [_nodal(type(self).__name__, name, getattr(self, name), count) for name in ("mu_s", "mu_k")]
+        return [
+            _nodal(type(self).__name__, name, getattr(self, name), count)
+            for name in ("mu_s", "mu_k")
+        ]
 
 
 @dataclass(frozen=True)
@@ -140,8 +166,10 @@ class ExponentialDecay(TwoCoefficients):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not 0.0 < real(self.v_c) < math.inf:
-            raise InputError(f"ExponentialDecay: v_c [m/s] is {shown(self.v_c)}; give a positive speed, or "
-                             "StaticKinetic()")
+            raise InputError(
+                f"ExponentialDecay: v_c [m/s] is {shown(self.v_c)}; give a positive speed, or "
+                "StaticKinetic()"
+            )
 
     def __call__(self, speed: Array) -> Array:
         """mu of each speed."""
@@ -158,7 +186,9 @@ class StaticKinetic(TwoCoefficients):
     def __post_init__(self) -> None:
         super().__post_init__()
         if np.any(np.asarray(self.mu_s) < np.asarray(self.mu_k)):
-            raise InputError(f"{self}: friction that begins to grow with slip has no rate; give mu_s >= mu_k")
+            raise InputError(
+                f"{self}: friction that begins to grow with slip has no rate; give mu_s >= mu_k"
+            )
 
     def __call__(self, speed: Array) -> Array:
         """mu of each speed."""
@@ -172,8 +202,10 @@ def project(r_t: Array, limit: Array) -> Array:
     r_t: tangential reactions, shape (n, d - 1); limit: radii >= 0, shape (n,), infinite for a node that cannot slip.
     Returns a new array of the shape of r_t. Raises InputError when the shapes do not match."""
     if r_t.ndim != 2 or limit.shape != r_t.shape[:1]:
-        raise InputError(f"project: r_t has shape {r_t.shape} and limit {limit.shape}; "
-                         "give one row of tangential components and one limit per node")
+        raise InputError(
+            f"project: r_t has shape {r_t.shape} and limit {limit.shape}; "
+            "give one row of tangential components and one limit per node"
+        )
     size = np.abs(r_t[:, 0]) if r_t.shape[1] == 1 else np.linalg.norm(r_t, axis=1)
     factor = np.divide(limit, size, out=np.ones(len(size)), where=size > limit)
     return r_t * factor[:, np.newaxis]
@@ -184,14 +216,18 @@ def _checked(law: str, meaning: str, value: Any) -> Any:
     field = isinstance(value, (tuple, list, np.ndarray)) and np.ndim(value) == 1
     for one in value if field else [value]:
         if not 0.0 <= real(one) < math.inf:
-            raise InputError(f"{law}: {meaning} is {shown(one)}; give zero or a positive finite number, or one per "
-                             "point")
+            raise InputError(
+                f"{law}: {meaning} is {shown(one)}; give zero or a positive finite number, or one per "
+                "point"
+            )
     return tuple(float(one) for one in value) if field else value
 
 
 def _nodal(law: str, name: str, value: Any, count: int) -> Array:
     """The value as an array that broadcasts over the nodes."""
     if isinstance(value, tuple) and len(value) != count:
-        raise InputError(f"{law}: {name} has {len(value)} values but there are {count} contact points: give one "
-                         "number, or one per contact point in the order of surface.points")
+        raise InputError(
+            f"{law}: {name} has {len(value)} values but there are {count} contact points: give one "
+            "number, or one per contact point in the order of surface.points"
+        )
     return np.asarray(value, dtype=float)

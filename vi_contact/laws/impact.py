@@ -38,7 +38,9 @@ UPDATE = "give ComponentReset() or ImpulseUpdate()"
 class VelocityUpdate(Protocol):
     """Give a velocity vector prescribed normal velocities: how, is the update's own."""
 
-    def __call__(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
+    def __call__(
+        self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
+    ) -> Array:
         """Return v (n,) [m/s] changed so that its normal velocities are ``target`` (m,), where they are not NaN."""
 
 
@@ -51,7 +53,9 @@ class ComponentReset:
 
     by_rows: ClassVar[bool] = True
 
-    def __call__(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
+    def __call__(
+        self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
+    ) -> Array:
         target, after = with_open_faces(surface, v, target), v.copy()
         after.T[surface.owned] = np.where(np.isnan(target), surface.normal_values(v), target).T
         return after
@@ -66,31 +70,44 @@ class ImpulseUpdate:
     unknowns in space and 300 000 in the plane, are not factorised: M (v⁺ - v⁻) = 0 off the chosen unknowns, by
     conjugate gradients to round-off at every impact."""
 
-    def __call__(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
+    def __call__(
+        self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
+    ) -> Array:
         worth = IN_PLANE if surface.points.shape[1] == 2 else 1
-        is_small = system.cached("small impacts", lambda: small(surface.comm, system.rows, surface.count, worth=worth),
-                                 surface)
+        is_small = system.cached(
+            "small impacts",
+            lambda: small(surface.comm, system.rows, surface.count, worth=worth),
+            surface,
+        )
         return (self._condensed if is_small else self._iterative)(system, surface, v, target)
 
-    def _iterative(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
+    def _iterative(
+        self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
+    ) -> Array:
         chosen = ~np.isnan(target)
         held, jump = np.zeros(len(v), dtype=bool), np.zeros(len(v))
         held[surface.owned[chosen]] = True
         jump[surface.owned[chosen]] = (target - surface.normal_values(v))[chosen]
         return v + solve_free(system.algebra, system.M, np.zeros(len(v)), held, jump)
 
-    def _condensed(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
+    def _condensed(
+        self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
+    ) -> Array:
         jump = surface.everywhere(target - surface.normal_values(v))
         chosen: Indices = np.flatnonzero(~np.isnan(jump))
         if len(chosen) == 0:
             return v
-        flexibility, response = system.cached("impulse update", lambda: _prepared(system, surface), surface)
+        flexibility, response = system.cached(
+            "impulse update", lambda: _prepared(system, surface), surface
+        )
         impulse = np.zeros(surface.total)
         impulse[chosen] = np.linalg.solve(flexibility[np.ix_(chosen, chosen)], jump[chosen])
         return np.asarray(v + response(impulse))
 
 
-def _prepared(system: SemiDiscreteSystem, surface: ContactSurface) -> tuple[Array, Callable[[Array], Array]]:
+def _prepared(
+    system: SemiDiscreteSystem, surface: ContactSurface
+) -> tuple[Array, Callable[[Array], Array]]:
     """B M⁻¹Bᵀ, and what gives the owned rows of M⁻¹Bᵀ times impulses. Collective."""
     condensed = condense(EffectiveMatrix(system.M, system.algebra), surface)
     comm, columns, left = surface.comm, [], STORED * total(surface.comm, system.rows)
@@ -115,7 +132,9 @@ class ByUpdate:
         """Say whether velocities and impacts may be rows, those of several runs."""
         return getattr(self.update, "by_rows", False)
 
-    def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array) -> Array:
+    def apply(
+        self, system: SemiDiscreteSystem, surface: ContactSurface, v: Array, target: Array
+    ) -> Array:
         return self.update(system, surface, v, target)
 
 
@@ -142,7 +161,13 @@ class Newton(ByUpdate):
     update: VelocityUpdate = field(default_factory=ComponentReset)
 
     def __post_init__(self) -> None:
-        between("restitution coefficient e", self.e, 0.0, 1.0, "give a number from 0 (inelastic) to 1 (elastic)")
+        between(
+            "restitution coefficient e",
+            self.e,
+            0.0,
+            1.0,
+            "give a number from 0 (inelastic) to 1 (elastic)",
+        )
         function("Newton", "update", self.update, UPDATE)
 
     def target(self, impact: Impact) -> Array:

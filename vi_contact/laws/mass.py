@@ -19,14 +19,18 @@ from ..core.system import SemiDiscreteSystem
 from .mass_transfer import from_neighbours, named, rigid_motions
 
 LIGHT = 1e-9  # of the diagonal entry of M: a row sum that is none
-LARGEST_CORRECTION = 0.35  # of a node's lumped mass: beyond, the mesh is too coarse to move mass about
+LARGEST_CORRECTION = (
+    0.35  # of a node's lumped mass: beyond, the mesh is too coarse to move mass about
+)
 
 
 @dataclass(frozen=True)
 class ConsistentMass:
     """Keep M as assembled; impact laws need it, for without mass there is nothing to rebound."""
 
-    def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool) -> SemiDiscreteSystem:
+    def apply(
+        self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool
+    ) -> SemiDiscreteSystem:
         return system
 
 
@@ -55,23 +59,33 @@ class Redistributed:
     def __post_init__(self) -> None:
         between("lumping", self.lumping, 0.0, 1.0, "give a share from 0 (consistent) to 1 (lumped)")
 
-    def apply(self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool) -> SemiDiscreteSystem:
+    def apply(
+        self, system: SemiDiscreteSystem, surface: ContactSurface, *, tangential: bool
+    ) -> SemiDiscreteSystem:
         if surface.total == 0:
             return system
         massless, contact = _contact_unknowns(system, surface, tangential)
         algebra, own = system.algebra, system.M.diagonal()
-        nodal = np.asarray(sum(r * (system.M @ r) for r in system.influence.T))  # row sums, in any nodal frames
+        nodal = np.asarray(
+            sum(r * (system.M @ r) for r in system.influence.T)
+        )  # row sums, in any nodal frames
         still = (own > 0.0) & ~system.influence.any(axis=1)  # no translation moves them
         lumping = self.lumping
         if system.space.hierarchy is not None:
             lumping = 0.0
         elif largest(algebra.comm, still.any()):
-            raise InputError("redistributed mass is for displacements only, and M has the inertia of rotations or of "
-                             "other unknowns: give the problem mass=ConsistentMass()")
-        wrong = int(total(algebra.comm, np.sum(nodal < -LIGHT * own)))  # as of elements of higher order
+            raise InputError(
+                "redistributed mass is for displacements only, and M has the inertia of rotations or of "
+                "other unknowns: give the problem mass=ConsistentMass()"
+            )
+        wrong = int(
+            total(algebra.comm, np.sum(nodal < -LIGHT * own))
+        )  # as of elements of higher order
         if wrong and lumping:
-            raise InputError(f"redistributed mass cannot lump negative row sums of M and {wrong} unknowns have them: "
-                             "give the problem mass=Redistributed(lumping=0.0) or ConsistentMass()")
+            raise InputError(
+                f"redistributed mass cannot lump negative row sums of M and {wrong} unknowns have them: "
+                "give the problem mass=Redistributed(lumping=0.0) or ConsistentMass()"
+            )
         nodal = own if wrong else np.maximum(nodal, 0.0)
         inner = ~(contact | still)
         lumped = algebra.local(*lumped_entries(surface, nodal), system.rows)
@@ -81,7 +95,10 @@ class Redistributed:
         for P in levels:  # the last one is applied to velocities first
             moved, load = algebra.congruence(P, moved), load.handed_over(P)
             C = None if C is None else algebra.congruence(P, C)
-        corrections = [_inertia_correction(system, moved, body & inner, body, nodal) for body in _bodies(system, inner)]
+        corrections = [
+            _inertia_correction(system, moved, body & inner, body, nodal)
+            for body in _bodies(system, inner)
+        ]
         M = algebra.combine([(1.0, moved), *((1.0, correction) for correction in corrections)])
         massless = massless if system.massless is None else massless | system.massless
         return system.changed(M=M, C=C, load=load, massless=massless)
@@ -97,19 +114,27 @@ def _bodies(system: SemiDiscreteSystem, inner: Mask) -> Iterator[Mask]:
             yield body
 
 
-def _contact_unknowns(system: SemiDiscreteSystem, surface: ContactSurface, tangential: bool) -> tuple[Mask, Mask]:
+def _contact_unknowns(
+    system: SemiDiscreteSystem, surface: ContactSurface, tangential: bool
+) -> tuple[Mask, Mask]:
     """(massless unknowns, all unknowns of contact nodes)."""
     contact = np.zeros(system.rows, dtype=bool)
     contact[surface.owned] = True
     massless = contact.copy()
     contact[surface.tangents[surface.tangents >= 0]] = True
-    if surface.coupling is not None:  # relative unknowns: nodes of both sides lose their inertia as a whole
-        faced = system.algebra.entries(surface.coupling, np.flatnonzero(contact))  # side 2, which would ring with mass
+    if (
+        surface.coupling is not None
+    ):  # relative unknowns: nodes of both sides lose their inertia as a whole
+        faced = system.algebra.entries(
+            surface.coupling, np.flatnonzero(contact)
+        )  # side 2, which would ring with mass
         contact[named(system, faced.indices)] = True
     return (contact.copy() if tangential or surface.coupling is not None else massless), contact
 
 
-def _inertia_correction(system: SemiDiscreteSystem, moved: Matrix, inner: Mask, body: Mask, nodal: Array) -> Matrix:
+def _inertia_correction(
+    system: SemiDiscreteSystem, moved: Matrix, inner: Mask, body: Mask, nodal: Array
+) -> Matrix:
     """D of one body: smallest nodal masses m_i p(x_i) on its inner nodes, p a symmetric (d, d) matrix of polynomials of
     degree 2, such that Rᵀ(M* + D)R = RᵀMR for its rigid motions R."""
     comm, d = system.algebra.comm, system.influence.shape[1]
@@ -125,11 +150,16 @@ def _inertia_correction(system: SemiDiscreteSystem, moved: Matrix, inner: Mask, 
         R = R[:, :d]
     upper = np.triu_indices(R.shape[1])
     wanted = R.T @ np.column_stack([system.M @ mode - moved @ mode for mode in R.T])
-    powers = np.column_stack([np.ones(len(x)), *x.T] + [x[:, i] * x[:, j] for i in range(d) for j in range(i, d)])
+    powers = np.column_stack(
+        [np.ones(len(x)), *x.T] + [x[:, i] * x[:, j] for i in range(d) for j in range(i, d)]
+    )
     pairs = list(_pairs_of_components(system, inner))
     shapes = [powers[i] @ _orthonormal(comm, powers[i], nodal[i]) for i, _ in pairs]
     # an off-diagonal mass stands in two places: with this factor "smallest" does not depend on the axes
-    shapes = [shape * (1.0 if i is j else np.sqrt(2.0)) for shape, (i, j) in zip(shapes, pairs, strict=True)]
+    shapes = [
+        shape * (1.0 if i is j else np.sqrt(2.0))
+        for shape, (i, j) in zip(shapes, pairs, strict=True)
+    ]
     effects = []
     for (i, j), shape in zip(pairs, shapes, strict=True):
         for p in shape.T:
@@ -139,11 +169,15 @@ def _inertia_correction(system: SemiDiscreteSystem, moved: Matrix, inner: Mask, 
     coefficients = np.linalg.lstsq(packed[:, 1:], packed[:, 0], rcond=1e-10)[0]
     ends = np.cumsum([shape.shape[1] for shape in shapes])[:-1]
     shares = [shape @ c for shape, c in zip(shapes, np.split(coefficients, ends), strict=True)]
-    entries = [share if i is j else 0.5 * share for share, (i, j) in zip(shares, pairs, strict=True)]
+    entries = [
+        share if i is j else 0.5 * share for share, (i, j) in zip(shares, pairs, strict=True)
+    ]
     moved_most = largest(comm, max_abs(np.concatenate(entries)))
     if moved_most > LARGEST_CORRECTION:
-        raise InputError("the mesh is too coarse for redistributed mass, which would change nodal "
-                         f"masses by {100 * moved_most:.0f} %: refine it, or give the problem mass=ConsistentMass()")
+        raise InputError(
+            "the mesh is too coarse for redistributed mass, which would change nodal "
+            f"masses by {100 * moved_most:.0f} %: refine it, or give the problem mass=ConsistentMass()"
+        )
     i, j = (np.concatenate([pair[side] for pair in pairs]) for side in (0, 1))
     value = 0.5 * np.concatenate(shares) * nodal[i]
     both = np.concatenate([i, j]), np.concatenate([j, i])
@@ -158,7 +192,9 @@ def _orthonormal(comm: Comm, powers: Array, nodal: Array) -> Array:
     return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
 
 
-def _pairs_of_components(system: SemiDiscreteSystem, inner: Mask) -> Iterator[tuple[Indices, Indices]]:
+def _pairs_of_components(
+    system: SemiDiscreteSystem, inner: Mask
+) -> Iterator[tuple[Indices, Indices]]:
     """(unknowns of direction c, unknowns of direction e) of the inner nodes that have both, for c <= e."""
     d = system.influence.shape[1]
     mine = np.flatnonzero(inner)

@@ -22,7 +22,9 @@ KEPT = 1e-10  # of a rigid motion, in the units of the neighbourhood
 NOTHING = 1e-10  # of a node's own mass: neighbours with less cannot carry it
 
 
-def from_neighbours(system: SemiDiscreteSystem, massless: Mask, contact: Mask, nodal: Array) -> list[Matrix]:
+def from_neighbours(
+    system: SemiDiscreteSystem, massless: Mask, contact: Mask, nodal: Array
+) -> list[Matrix]:
     """Return the matrices P_k of v = P_0 P_1 … v that replace massless unknowns; contact: all those of contact nodes.
 
     Contact nodes with neighbours behind the surface come last in the product; those in corners, with contact nodes
@@ -40,15 +42,21 @@ def from_neighbours(system: SemiDiscreteSystem, massless: Mask, contact: Mask, n
             left[ready] = False
             donors |= contact & np.isin(node, node[ready])
         elif exact:
-            exact, donors = False, donors | (tied & ~contact)  # too few to tell a rotation: translations will do
+            exact, donors = (
+                False,
+                donors | (tied & ~contact),
+            )  # too few to tell a rotation: translations will do
         else:
-            raise InputError("the mass of some contact nodes cannot be moved, as no node behind them has mass: "
-                             "refine the mesh across the body, or give the problem mass=ConsistentMass()")
+            raise InputError(
+                "the mass of some contact nodes cannot be moved, as no node behind them has mass: "
+                "refine the mesh across the body, or give the problem mass=ConsistentMass()"
+            )
     return levels[::-1]
 
 
-def _rows(system: SemiDiscreteSystem, left: Mask, donors: Mask, nodal: Array, *,
-          exact: bool) -> tuple[Indices, sp.csr_matrix]:
+def _rows(
+    system: SemiDiscreteSystem, left: Mask, donors: Mask, nodal: Array, *, exact: bool
+) -> tuple[Indices, sp.csr_matrix]:
     """(numbers, rows of P) of those of the unknowns ``left`` that have neighbours among the donors; ``exact``: enough
     of them to keep every rigid motion. Collective."""
     asked = np.flatnonzero(left)
@@ -59,14 +67,23 @@ def _rows(system: SemiDiscreteSystem, left: Mask, donors: Mask, nodal: Array, *,
     fitted, fits = neighbours.of_unknowns(weights), np.zeros(len(asked), dtype=bool)
     directions, points = system.influence[asked], system.space.coordinates[asked]
     for rows in _alike(np.diff(fitted.indptr), enough):
-        places = fitted.indptr[rows][:, None] + np.arange(fitted.indptr[rows[0] + 1] - fitted.indptr[rows[0]])
-        row, error = neighbours.fit(fitted.indices[places], fitted.data[places], directions[rows], points[rows],
-                                    turning=exact)
+        places = fitted.indptr[rows][:, None] + np.arange(
+            fitted.indptr[rows[0] + 1] - fitted.indptr[rows[0]]
+        )
+        row, error = neighbours.fit(
+            fitted.indices[places],
+            fitted.data[places],
+            directions[rows],
+            points[rows],
+            turning=exact,
+        )
         fitted.data[places] = row
         fits[rows] = True if not exact else error <= KEPT
     node = np.asarray(system.space.ids)[asked] // system.influence.shape[1]
     fits &= ~np.isin(node, node[~fits])  # a node goes as a whole
-    columns = neighbours.columns[fitted.indices] if len(fitted.indices) else np.zeros(0, dtype=np.int64)
+    columns = (
+        neighbours.columns[fitted.indices] if len(fitted.indices) else np.zeros(0, dtype=np.int64)
+    )
     rows_of_p = sp.csr_matrix((fitted.data, columns, fitted.indptr), shape=entries.shape)
     return asked[fits], rows_of_p[fits]
 
@@ -91,12 +108,17 @@ class _Neighbours:
 
     def weights(self, entries: sp.csr_matrix) -> sp.csr_matrix:
         """Weight of every donor node in rows of M: the size of its entries there."""
-        rows, count = np.repeat(np.arange(entries.shape[0]), np.diff(entries.indptr)), len(self.columns)
+        rows, count = (
+            np.repeat(np.arange(entries.shape[0]), np.diff(entries.indptr)),
+            len(self.columns),
+        )
         place = np.minimum(np.searchsorted(self.columns, entries.indices), max(count - 1, 0))
         found = self.columns[place] == entries.indices if count else np.zeros(len(rows), dtype=bool)
         nodes = int(self.node.max(initial=-1)) + 1
         pairs, which = np.unique(rows[found] * nodes + self.node[place[found]], return_inverse=True)
-        sizes = np.sqrt(np.bincount(which.ravel(), weights=entries.data[found] ** 2, minlength=len(pairs)))
+        sizes = np.sqrt(
+            np.bincount(which.ravel(), weights=entries.data[found] ** 2, minlength=len(pairs))
+        )
         used = sizes > 0.0
         row, node = np.divmod(pairs[used], max(nodes, 1))
         return sp.csr_matrix((sizes[used], (row, node)), shape=(entries.shape[0], nodes))
@@ -104,13 +126,16 @@ class _Neighbours:
     def of_unknowns(self, weights: sp.csr_matrix) -> sp.csr_matrix:
         """Weights of nodes, told to every unknown of theirs, columns ascending."""
         count = len(self.columns)
-        spread = sp.csr_matrix((np.ones(count), (self.node, np.arange(count))), shape=(weights.shape[1], count))
+        spread = sp.csr_matrix(
+            (np.ones(count), (self.node, np.arange(count))), shape=(weights.shape[1], count)
+        )
         found = sp.csr_matrix(weights @ spread)
         found.sort_indices()
         return found
 
-    def fit(self, used: Indices, weights: Array, directions: Array, points: Array, *,
-            turning: bool) -> tuple[Array, Array]:
+    def fit(
+        self, used: Indices, weights: Array, directions: Array, points: Array, *, turning: bool
+    ) -> tuple[Array, Array]:
         """(rows R_i G⁻¹ w_J R_Jᵀ (n, k) on the ``used`` neighbours (n, k), how much of a rigid motion each loses); with
         ``turning`` False of translations only, which a single neighbour can tell."""
         offset = self.points[used] - points[:, None, :]
@@ -124,7 +149,9 @@ class _Neighbours:
         U, values, V = np.linalg.svd(root[:, :, None] * R, full_matrices=False)
         kept = values > 1e-8 * values[:, :1]
         share = np.where(kept, (V @ target[:, :, None])[:, :, 0] / np.where(kept, values, 1.0), 0.0)
-        by_columns = np.ascontiguousarray(U.swapaxes(1, 2)).swapaxes(1, 2)  # one order of sums, whatever the batch
+        by_columns = np.ascontiguousarray(U.swapaxes(1, 2)).swapaxes(
+            1, 2
+        )  # one order of sums, whatever the batch
         row = root * (by_columns @ share[:, :, None])[:, :, 0]
         return row, np.max(np.abs((row[:, None, :] @ R)[:, 0] - target), axis=1)
 
@@ -141,7 +168,9 @@ def _neighbours(system: SemiDiscreteSystem, donors: Mask, columns: Indices) -> _
     mine, foreign = _owned(system, columns)
     others = from_each(system.algebra.comm, told(foreign))
     others[system.algebra.comm.rank] = told(mine)
-    numbers, nodes, directions, points = (np.concatenate([part[i] for part in others]) for i in range(4))
+    numbers, nodes, directions, points = (
+        np.concatenate([part[i] for part in others]) for i in range(4)
+    )
     order = np.argsort(numbers)
     _, place = np.unique(nodes[order], return_inverse=True)
     return _Neighbours(numbers[order], place.ravel(), directions[order], points[order])
@@ -163,6 +192,11 @@ def named(system: SemiDiscreteSystem, columns: Indices) -> Indices:
 def rigid_motions(directions: Array, offset: Array) -> Array:
     """Return rows R of rigid motions (…, modes), d translations and the rotations, of directions (…, d) at offsets."""
     d = directions.shape[-1]
-    turns = [directions[..., j] * offset[..., i] - directions[..., i] * offset[..., j]
-             for i in range(d) for j in range(i + 1, d)]
-    return np.concatenate([directions, np.stack(turns, axis=-1)] if turns else [directions], axis=-1)
+    turns = [
+        directions[..., j] * offset[..., i] - directions[..., i] * offset[..., j]
+        for i in range(d)
+        for j in range(i + 1, d)
+    ]
+    return np.concatenate(
+        [directions, np.stack(turns, axis=-1)] if turns else [directions], axis=-1
+    )

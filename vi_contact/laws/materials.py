@@ -33,22 +33,33 @@ class LinearElastic:
     xi: float = 0.0
 
     def __post_init__(self) -> None:
-        if any(callable(one) or hasattr(one, "ufl_shape") for one in (self.E, self.nu, self.rho, self.xi)):
-            raise InputError("LinearElastic: E, nu, rho and xi are numbers; give fem.Heterogeneous(E, nu, rho, xi) "
-                             "where they change from place to place")
+        if any(
+            callable(one) or hasattr(one, "ufl_shape")
+            for one in (self.E, self.nu, self.rho, self.xi)
+        ):
+            raise InputError(
+                "LinearElastic: E, nu, rho and xi are numbers; give fem.Heterogeneous(E, nu, rho, xi) "
+                "where they change from place to place"
+            )
         number("LinearElastic", "Young's modulus E [Pa]", self.E, positive=True)
         number("LinearElastic", "Poisson's ratio nu", self.nu)
         number("LinearElastic", "the mass density rho [kg/m³]", self.rho, positive=True)
         if not (EXTREME**-1 <= self.E <= EXTREME and EXTREME**-1 <= self.rho <= EXTREME):
-            raise InputError(f"LinearElastic: no material has E = {self.E:g} Pa and rho = {self.rho:g} kg/m³; give "
-                             f"numbers between {1.0 / EXTREME:g} and {EXTREME:g}")
+            raise InputError(
+                f"LinearElastic: no material has E = {self.E:g} Pa and rho = {self.rho:g} kg/m³; give "
+                f"numbers between {1.0 / EXTREME:g} and {EXTREME:g}"
+            )
         if not -1.0 < self.nu < 0.5:
-            raise InputError(f"LinearElastic: Poisson's ratio nu is {self.nu!r}; give a number between -1 and 0.5, "
-                             "both excluded (nearly incompressible materials need a mixed method)")
+            raise InputError(
+                f"LinearElastic: Poisson's ratio nu is {self.nu!r}; give a number between -1 and 0.5, "
+                "both excluded (nearly incompressible materials need a mixed method)"
+            )
         check_ratio("LinearElastic", self.xi)
 
     @classmethod
-    def from_wave_speeds(cls, c_p: float, c_s: float, rho: float, xi: float = 0.0) -> "LinearElastic":
+    def from_wave_speeds(
+        cls, c_p: float, c_s: float, rho: float, xi: float = 0.0
+    ) -> "LinearElastic":
         """Return the material whose pressure and shear waves travel at c_p and c_s [m/s], with the damping ratio xi.
 
         nu = (c_p² - 2 c_s²) / (2 (c_p² - c_s²)), shear_modulus = rho c_s², E = 2 shear_modulus (1 + nu).
@@ -56,8 +67,10 @@ class LinearElastic:
         for name, speed in (("c_p [m/s]", c_p), ("c_s [m/s]", c_s), ("rho [kg/m³]", rho)):
             number("LinearElastic.from_wave_speeds", name, speed, positive=True)
         if 3.0 * c_p**2 <= 4.0 * c_s**2:
-            raise InputError(f"LinearElastic.from_wave_speeds: c_p = {c_p!r} is too slow for c_s = {c_s!r}; "
-                             "give c_p > sqrt(4/3) c_s, as an elastic solid has")
+            raise InputError(
+                f"LinearElastic.from_wave_speeds: c_p = {c_p!r} is too slow for c_s = {c_s!r}; "
+                "give c_p > sqrt(4/3) c_s, as an elastic solid has"
+            )
         nu = (c_p**2 - 2.0 * c_s**2) / (2.0 * (c_p**2 - c_s**2))
         return cls(E=2.0 * rho * c_s**2 * (1.0 + nu), nu=nu, rho=rho, xi=xi)
 
@@ -168,7 +181,9 @@ class MassProportional:
     c: float
 
     def __post_init__(self) -> None:
-        number("MassProportional", "the damping coefficient c [kg/(m³ s)]", self.c, not_negative=True)
+        number(
+            "MassProportional", "the damping coefficient c [kg/(m³ s)]", self.c, not_negative=True
+        )
 
     def coefficients(self, material: LinearElastic) -> tuple[float, float]:
         """Return (c / rho, 0): integrating c against the shape functions is c / rho times the consistent mass."""
@@ -201,14 +216,18 @@ class Rayleigh:
         for name, xi in (("xi1", xi1), ("xi2", xi2)):
             number("Rayleigh.from_frequencies", f"the damping ratio {name}", xi, not_negative=True)
         if f1 == f2:
-            raise InputError(f"Rayleigh.from_frequencies: f1 and f2 are both {f1!r} Hz; give two frequencies")
+            raise InputError(
+                f"Rayleigh.from_frequencies: f1 and f2 are both {f1!r} Hz; give two frequencies"
+            )
         w1, w2 = 2.0 * math.pi * min(f1, f2), 2.0 * math.pi * max(f1, f2)
         low, high = (xi1, xi2) if f1 < f2 else (xi2, xi1)
         mass, stiffness = w2 * low - w1 * high, w2 * high - w1 * low
         round_off = 1e-12 * (w1 + w2) * (low + high)
         if min(mass, stiffness) < -round_off:
-            raise InputError(f"Rayleigh.from_frequencies: ratios {xi1!r} at {f1!r} Hz and {xi2!r} at {f2!r} Hz would "
-                             "need a negative coefficient; keep xi2/xi1 between f1/f2 and f2/f1")
+            raise InputError(
+                f"Rayleigh.from_frequencies: ratios {xi1!r} at {f1!r} Hz and {xi2!r} at {f2!r} Hz would "
+                "need a negative coefficient; keep xi2/xi1 between f1/f2 and f2/f1"
+            )
         factor = 2.0 / (w2**2 - w1**2)
         return cls(alpha=factor * w1 * w2 * max(mass, 0.0), beta=factor * max(stiffness, 0.0))
 

@@ -57,13 +57,17 @@ class Orthotropic:
         check_ratio("Orthotropic", self.xi)
         root = np.sqrt([self.E1, self.E2, self.E3])
         if np.linalg.eigvalsh(root[:, None] * self._compliance * root)[0] < DEFINITE:
-            raise InputError(f"Orthotropic: with nu12 = {self.nu12:g}, nu13 = {self.nu13:g} and nu23 = {self.nu23:g} "
-                             "some strain has no positive energy at these moduli; give ratios nu_ij well below "
-                             "sqrt(E_i / E_j)")
+            raise InputError(
+                f"Orthotropic: with nu12 = {self.nu12:g}, nu13 = {self.nu13:g} and nu23 = {self.nu23:g} "
+                "some strain has no positive energy at these moduli; give ratios nu_ij well below "
+                "sqrt(E_i / E_j)"
+            )
         Q = self._rotation
         if not np.allclose(Q.T @ Q, np.eye(3), atol=1e-9) or np.linalg.det(Q) < 0.0:
-            raise InputError("Orthotropic: axes is not a rotation; give an angle [rad], or a matrix whose columns are "
-                             "right-handed unit vectors at right angles")
+            raise InputError(
+                "Orthotropic: axes is not a rotation; give an angle [rad], or a matrix whose columns are "
+                "right-handed unit vectors at right angles"
+            )
 
     @property
     def _compliance(self) -> Array:
@@ -76,7 +80,10 @@ class Orthotropic:
         """Return Q (3, 3), whose columns are the material axes."""
         if np.ndim(self.axes):
             return array("Orthotropic", "axes", self.axes, (3, 3))
-        c, s = (f(number("Orthotropic", "the angle [rad] of the axes", self.axes)) for f in (np.cos, np.sin))
+        c, s = (
+            f(number("Orthotropic", "the angle [rad] of the axes", self.axes))
+            for f in (np.cos, np.sin)
+        )
         return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
     @property
@@ -96,13 +103,19 @@ class Orthotropic:
 
         (4, 3) in the plane, (6, 6) in space; InputError for material axes that leave the plane, and on a line."""
         if dimension not in VOIGT:
-            raise InputError("Orthotropic is for bodies in the plane or in space: give a LinearElastic here")
+            raise InputError(
+                "Orthotropic is for bodies in the plane or in space: give a LinearElastic here"
+            )
         C = self.stiffness
         if dimension == 2:
-            out = np.abs(C[:, :, :2, 2])[[0, 1, 0, 2], [0, 1, 1, 2]]  # shear across the plane by strains in it
+            out = np.abs(C[:, :, :2, 2])[
+                [0, 1, 0, 2], [0, 1, 1, 2]
+            ]  # shear across the plane by strains in it
             if out.max() > ROUND_OFF * C.max():
-                raise InputError("Orthotropic: z is not one of the material axes, so the body would leave its plane; "
-                                 "give the angle of axis 1 in the plane")
+                raise InputError(
+                    "Orthotropic: z is not one of the material axes, so the body would leave its plane; "
+                    "give the angle of axis 1 in the plane"
+                )
             if isinstance(section, PlaneStress):
                 C = C - np.einsum("ij,kl->ijkl", C[:, :, 2, 2], C[2, 2]) / C[2, 2, 2, 2]
         rows = VOIGT[dimension] if dimension == 3 else (*VOIGT[2], (2, 2))

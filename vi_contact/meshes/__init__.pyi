@@ -9,4 +9,13 @@ from .two_blocks import Blocks as Blocks
 from .two_blocks import TwoBlocks as TwoBlocks
 from .wall import WallMesh as WallMesh
 
-__all__: list[str] = ['BlockMesh', 'Blocks', 'ChannelMesh', 'CutOpen', 'GeoFile', 'TwoBlocks', 'WallMesh', 'Welded']
+__all__: list[str] = [
+    "BlockMesh",
+    "Blocks",
+    "ChannelMesh",
+    "CutOpen",
+    "GeoFile",
+    "TwoBlocks",
+    "WallMesh",
+    "Welded",
+]

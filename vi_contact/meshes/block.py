@@ -36,9 +36,13 @@ class BlockMesh:
         check_fields(self)
         check_box(self.lengths, self.divisions)
         if self.corner is not None and len(self.corner) != len(self.lengths):
-            raise InputError(f"block corner is {self.corner}: give {len(self.lengths)} coordinates, one per length")
+            raise InputError(
+                f"block corner is {self.corner}: give {len(self.lengths)} coordinates, one per length"
+            )
         if self.angle and len(self.lengths) == 1:
-            raise InputError("a bar in one dimension cannot be turned: leave the angle out or give two lengths")
+            raise InputError(
+                "a bar in one dimension cannot be turned: leave the angle out or give two lengths"
+            )
 
     def points(self) -> Array:
         """Return all nodes, (n_1+1, ..., n_d+1, d) [m]."""
@@ -49,11 +53,15 @@ class BlockMesh:
             straight = nodes.reshape(-1, nodes.shape[-1])
             moved = np.asarray(self.deform(straight))
             if moved.shape != straight.shape:
-                raise InputError(f"deform returned shape {moved.shape} for points {straight.shape}: return that shape")
+                raise InputError(
+                    f"deform returned shape {moved.shape} for points {straight.shape}: return that shape"
+                )
             nodes = moved.reshape(nodes.shape)
         if self.angle:
             x, y, c, s = nodes[..., 0], nodes[..., 1], math.cos(self.angle), math.sin(self.angle)
-            nodes = np.concatenate([np.stack([c * x - s * y, s * x + c * y], axis=-1), nodes[..., 2:]], axis=-1)
+            nodes = np.concatenate(
+                [np.stack([c * x - s * y, s * x + c * y], axis=-1), nodes[..., 2:]], axis=-1
+            )
         return nodes
 
     def build(self, gmsh: Any) -> None:
@@ -68,9 +76,13 @@ class BlockMesh:
 def check_box(lengths: Sequence[float], divisions: Sequence[int]) -> None:
     """Raise InputError unless there are 1 to 3 positive lengths [m], each with a positive number of divisions."""
     if not 1 <= len(lengths) <= 3 or len(divisions) != len(lengths):
-        raise InputError(f"lengths {tuple(lengths)} and divisions {tuple(divisions)}: give 1, 2 or 3 numbers of both")
+        raise InputError(
+            f"lengths {tuple(lengths)} and divisions {tuple(divisions)}: give 1, 2 or 3 numbers of both"
+        )
     if not all(math.isfinite(length) and length > 0.0 for length in lengths):
         raise InputError(f"lengths is {tuple(lengths)}: give positive numbers of metres")
     if not all(n == n // 1 and n >= 1 for n in divisions):
-        raise InputError(f"divisions is {tuple(divisions)}: give whole numbers of cells, at least 1")
+        raise InputError(
+            f"divisions is {tuple(divisions)}: give whole numbers of cells, at least 1"
+        )
     counted("mesh", f"divisions {tuple(divisions)}", math.prod(divisions), "cells", most=MOST_CELLS)

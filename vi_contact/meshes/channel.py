@@ -44,19 +44,34 @@ class ChannelMesh:
     def __post_init__(self) -> None:
         check_fields(self)
         given = () if self.far is None else ("far",)
-        attributes(self, positive=("width", "depth", "outer_width", "height", "wall", "slab", "size", *given))
+        attributes(
+            self,
+            positive=("width", "depth", "outer_width", "height", "wall", "slab", "size", *given),
+        )
         if not (2.0 * self.wall < self.outer_width and self.slab < self.height < self.depth):
-            raise InputError(f"channel {self.outer_width} x {self.height} m with walls of {self.wall} m and a slab of "
-                             f"{self.slab} m does not fit a layer {self.depth} m deep: leave room inside it, and soil "
-                             "below it")
+            raise InputError(
+                f"channel {self.outer_width} x {self.height} m with walls of {self.wall} m and a slab of "
+                f"{self.slab} m does not fit a layer {self.depth} m deep: leave room inside it, and soil "
+                "below it"
+            )
         if not 0.0 < self.x[1] < self.x[4] < self.width:
             ends = f"from x = {self.x[1]} to {self.x[4]} m"
-            raise InputError(f"channel {ends} needs soil on both sides: keep it between 0 and {self.width} m")
+            raise InputError(
+                f"channel {ends} needs soil on both sides: keep it between 0 and {self.width} m"
+            )
         if self.far is not None and self.far < self.size:
-            raise InputError(f"far is {self.far} m: give at least the cell size at the channel, {self.size} m")
+            raise InputError(
+                f"far is {self.far} m: give at least the cell size at the channel, {self.size} m"
+            )
         grid = self.width / self.size * (self.depth / self.size)
-        around = (self.outer_width + 2.0 * self.height) / self.size + self.width / (self.far or self.size)
-        cells = grid if self.far is None else max(around, self.width / self.far * (self.depth / self.far))
+        around = (self.outer_width + 2.0 * self.height) / self.size + self.width / (
+            self.far or self.size
+        )
+        cells = (
+            grid
+            if self.far is None
+            else max(around, self.width / self.far * (self.depth / self.far))
+        )
         counted("channel", f"a cell size of {self.size} m", cells, "cells", most=MOST_CELLS)
 
     @property
@@ -80,16 +95,32 @@ class ChannelMesh:
         sides = ("left", "base", "right")
         u = [(x[1], y[3]), (x[1], y[1]), (x[4], y[1]), (x[4], y[3])]  # what both bodies share
         inside = [(x[3], y[3]), (x[3], y[2]), (x[2], y[2]), (x[2], y[3])]
-        names = [*(f"channel_{side}" for side in sides), "channel_top", *["channel_inside"] * 3, "channel_top"]
-        shared = [max(round(math.dist(one, two) / size), 1) for one, two in pairwise(u)]  # on both bodies
+        names = [
+            *(f"channel_{side}" for side in sides),
+            "channel_top",
+            *["channel_inside"] * 3,
+            "channel_top",
+        ]
+        shared = [
+            max(round(math.dist(one, two) / size), 1) for one, two in pairwise(u)
+        ]  # on both bodies
         add_outline(gmsh.model, "channel", u + inside, names, [size] * 8, shared)
         layer = [(x[5], y[3]), (x[5], 0.0), (0.0, 0.0), (0.0, y[3])]
-        names = [*(f"soil_{side}" for side in sides), "surface", "right_side", "bedrock", "left_side", "surface"]
+        names = [
+            *(f"soil_{side}" for side in sides),
+            "surface",
+            "right_side",
+            "bedrock",
+            "left_side",
+            "surface",
+        ]
         add_outline(gmsh.model, "soil", u + layer, names, [size] * 4 + [self.far] * 4, shared)
         gmsh.model.mesh.generate(2)
 
 
-def channel_grid(x: Sequence[float], y: Sequence[float], size: float, *, triangles: bool = False) -> MeshArrays:
+def channel_grid(
+    x: Sequence[float], y: Sequence[float], size: float, *, triangles: bool = False
+) -> MeshArrays:
     """Divide channel and soil between the lines x (6,) and y (4,) of `ChannelMesh` into cells of about `size` [m].
 
     Diagonals of triangles run upwards to the middle of the channel on both sides of it: symmetric layers stay so."""
@@ -98,36 +129,57 @@ def channel_grid(x: Sequence[float], y: Sequence[float], size: float, *, triangl
     right, up = np.meshgrid(middle_x, middle_y, indexing="ij")
     notch = (x[1] < right) & (right < x[4]) & (up > y[1])
     inside = (x[2] < right) & (right < x[3]) & (up > y[2])
-    bodies = [_body(xs, ys, kept, 0.5 * (x[1] + x[4]), triangles) for kept in (notch & ~inside, ~notch)]
+    bodies = [
+        _body(xs, ys, kept, 0.5 * (x[1] + x[4]), triangles) for kept in (notch & ~inside, ~notch)
+    ]
     (points, cells, corner), (soil_points, soil_cells, soil_corner) = bodies
     interface = {"left": [(x[1:2], y[1:])], "base": [(x[1:5], y[1:2])], "right": [(x[4:5], y[1:])]}
     channel_lines = {f"channel_{side}": line for side, line in interface.items()} | {
         "channel_top": [(x[1:3], y[3:]), (x[3:5], y[3:])],
-        "channel_inside": [(x[2:3], y[2:]), (x[2:4], y[2:3]), (x[3:4], y[2:])]}
+        "channel_inside": [(x[2:3], y[2:]), (x[2:4], y[2:3]), (x[3:4], y[2:])],
+    }
     soil_lines = {f"soil_{side}": line for side, line in interface.items()} | {
-        "bedrock": [(x, y[:1])], "left_side": [(x[:1], y)], "right_side": [(x[5:], y)],
-        "surface": [(x[:2], y[3:]), (x[4:], y[3:])]}
+        "bedrock": [(x, y[:1])],
+        "left_side": [(x[:1], y)],
+        "right_side": [(x[5:], y)],
+        "surface": [(x[:2], y[3:]), (x[4:], y[3:])],
+    }
     soil_corner = np.where(soil_corner < 0, -1, soil_corner + len(points))
-    facets = {name: np.concatenate([_along(xs, ys, number, *line) for line in lines])
-              for number, table in ((corner, channel_lines), (soil_corner, soil_lines))
-              for name, lines in table.items()}
+    facets = {
+        name: np.concatenate([_along(xs, ys, number, *line) for line in lines])
+        for number, table in ((corner, channel_lines), (soil_corner, soil_lines))
+        for name, lines in table.items()
+    }
     channel = np.arange(len(cells) + len(soil_cells)) < len(cells)
     cells = np.concatenate([cells, soil_cells + len(points)])
-    return MeshArrays("triangle" if triangles else "quadrilateral", np.concatenate([points, soil_points]), cells,
-                      {"channel": channel, "soil": ~channel}, facets)
+    return MeshArrays(
+        "triangle" if triangles else "quadrilateral",
+        np.concatenate([points, soil_points]),
+        cells,
+        {"channel": channel, "soil": ~channel},
+        facets,
+    )
 
 
 def _divided(places: Sequence[float], size: float) -> Array:
     """Divide every part between two places evenly into cells of about `size`."""
-    parts = [low + (high - low) * np.arange(n) / n for low, high in pairwise(places)
-             for n in [max(round((high - low) / size), 1)]]
+    parts = [
+        low + (high - low) * np.arange(n) / n
+        for low, high in pairwise(places)
+        for n in [max(round((high - low) / size), 1)]
+    ]
     return np.append(np.concatenate(parts), places[-1])
 
 
-def _body(xs: Array, ys: Array, kept: Mask, middle: float, triangles: bool) -> tuple[Array, Rows, Rows]:
+def _body(
+    xs: Array, ys: Array, kept: Mask, middle: float, triangles: bool
+) -> tuple[Array, Rows, Rows]:
     """Return (points, cells, number of the point at every node of the grid, -1 for none) of the kept boxes."""
     column, row = np.nonzero(kept)
-    around = np.stack([column, column + 1, column + 1, column]), np.stack([row, row, row + 1, row + 1])
+    around = (
+        np.stack([column, column + 1, column + 1, column]),
+        np.stack([row, row, row + 1, row + 1]),
+    )
     used = np.zeros((len(xs), len(ys)), dtype=bool)
     used[around] = True
     number = np.where(used, np.cumsum(used).reshape(used.shape) - 1, -1)
@@ -137,11 +189,17 @@ def _body(xs: Array, ys: Array, kept: Mask, middle: float, triangles: bool) -> t
         rising, falling = [[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]]
         on_left = 0.5 * (xs[column] + xs[column + 1]) < middle
         boxes = np.where(on_left[:, None, None], boxes[:, rising], boxes[:, falling]).reshape(-1, 3)
-    return np.column_stack([xs[place[:, 0]], ys[place[:, 1]]]), boxes.astype(np.int64), number.astype(np.int64)
+    return (
+        np.column_stack([xs[place[:, 0]], ys[place[:, 1]]]),
+        boxes.astype(np.int64),
+        number.astype(np.int64),
+    )
 
 
 def _along(xs: Array, ys: Array, number: Rows, x: Sequence[float], y: Sequence[float]) -> Rows:
     """Return the facets of a body on a straight line: from x[0] to x[-1] at one y, or from y[0] to y[-1] at one x."""
-    i, j = (np.flatnonzero((line >= ends[0]) & (line <= ends[-1])) for line, ends in ((xs, x), (ys, y)))
+    i, j = (
+        np.flatnonzero((line >= ends[0]) & (line <= ends[-1])) for line, ends in ((xs, x), (ys, y))
+    )
     nodes = number[np.ix_(i, j)].reshape(-1)
     return np.column_stack([nodes[:-1], nodes[1:]])

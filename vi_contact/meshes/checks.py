@@ -20,7 +20,9 @@ def check_cells(points: Array, cells: Rows, cell: str, source: str) -> None:
     det = np.linalg.det(edges)
     d = points.shape[1]
     longest = np.sqrt((edges**2).sum(axis=-1)).max(axis=(1, 2))
-    noise = _ROUND_OFF * np.abs(points).max() * longest ** (d - 1)  # error of det from the rounding of coordinates
+    noise = (
+        _ROUND_OFF * np.abs(points).max() * longest ** (d - 1)
+    )  # error of det from the rounding of coordinates
     flat = np.abs(det).min(axis=1) <= noise
     twisted = ~flat & (det.min(axis=1) < 0.0) & (det.max(axis=1) > 0.0)
     refuse_cells(flat, "no volume", points, cells, source)
@@ -46,8 +48,10 @@ def check_sides(groups: dict[str, Rows], cells: Rows, cell: str, source: str) ->
     for name, numbers in zip(groups, named, strict=True):
         if missing := int(np.sum(~found_in(numbers, sides))):
             facets = "1 facet that is" if missing == 1 else f"{missing} facets that are"
-            raise InputError(f"boundary group '{name}' of {source} has {facets} no side of a cell: remove duplicate "
-                             "nodes, and curves or surfaces that do not bound the named cells")
+            raise InputError(
+                f"boundary group '{name}' of {source} has {facets} no side of a cell: remove duplicate "
+                "nodes, and curves or surfaces that do not bound the named cells"
+            )
 
 
 def _normals(x: Array) -> Array:

@@ -16,7 +16,14 @@ from vi_contact.meshes.checks import Array, check_cells, check_folds, check_side
 from vi_contact.meshes.gmsh_session import MeshScript, session
 from vi_contact.meshes.grid import Grid
 from vi_contact.meshes.mesh_file import safe_copy
-from vi_contact.meshes.rows import GMSH_NUMBERS, SECOND_ORDER, Mask, Rows, number_alike, vertex_count
+from vi_contact.meshes.rows import (
+    GMSH_NUMBERS,
+    SECOND_ORDER,
+    Mask,
+    Rows,
+    number_alike,
+    vertex_count,
+)
 
 Source = MeshScript | str | Path
 _Elements = dict[int, tuple[Rows, Rows]]
@@ -69,18 +76,26 @@ def _of_grids(grids: Sequence[Grid], source: str) -> MeshArrays:
     body = np.repeat(np.arange(len(grids)), [len(cells) for _, cells, _ in parts])
     points = np.concatenate([points for points, _, _ in parts])
     cells = np.concatenate([first[i] + cells for i, (_, cells, _) in enumerate(parts)])
-    facets = {name: first[i] + rows for i, (_, _, sides) in enumerate(parts) for name, rows in sides.items()}
+    facets = {
+        name: first[i] + rows
+        for i, (_, _, sides) in enumerate(parts)
+        for name, rows in sides.items()
+    }
     cell = next(name for name, (number, _) in GMSH_NUMBERS.items() if number == grids[0].kinds[-1])
     _check_finite(points, source)
     check_cells(points, cells, cell, source)
     check_folds(points, cells, cell, source)
     check_sides(facets, cells, cell, source)
-    return MeshArrays(cell, points, cells, {grid.body: body == i for i, grid in enumerate(grids)}, facets)
+    return MeshArrays(
+        cell, points, cells, {grid.body: body == i for i, grid in enumerate(grids)}, facets
+    )
 
 
 def _check_finite(points: Array, source: str) -> None:
     if not np.isfinite(points).all():
-        raise InputError(f"{source} has nodes whose coordinates are not numbers: write it again from Gmsh")
+        raise InputError(
+            f"{source} has nodes whose coordinates are not numbers: write it again from Gmsh"
+        )
 
 
 def extract(gmsh: Any, source: str) -> MeshArrays:
@@ -92,10 +107,15 @@ def extract(gmsh: Any, source: str) -> MeshArrays:
     over a neighbour; a mesh of triangles or quadrilaterals outside the plane z = 0; named facets that are no sides of
     cells."""
     model = gmsh.model
-    d = max((model.mesh.getElementProperties(kind)[1] for kind in model.mesh.getElements()[0]), default=0)
+    d = max(
+        (model.mesh.getElementProperties(kind)[1] for kind in model.mesh.getElements()[0]),
+        default=0,
+    )
     body, sides = _named_entities(model, d), _named_entities(model, d - 1)
     if both := body.keys() & sides.keys():
-        raise InputError(f"{source} calls both cells and facets '{min(both)}': give one of the groups another name")
+        raise InputError(
+            f"{source} calls both cells and facets '{min(both)}': give one of the groups another name"
+        )
     named = sorted({entity for entities in body.values() for entity in entities})
     elements = _elements(model, d, named or [entity for _, entity in model.getEntities(d)])
     cell, number, side = _kind(model, elements, d, source)
@@ -109,7 +129,13 @@ def extract(gmsh: Any, source: str) -> MeshArrays:
     check_cells(points, corners, cell, source)
     check_folds(points, corners, cell, source)
     if cells.shape[1] > corners.shape[1]:
-        refuse_cells(_folded(model, number, entity, d)[kept], "a fold between its curved sides", points, cells, source)
+        refuse_cells(
+            _folded(model, number, entity, d)[kept],
+            "a fold between its curved sides",
+            points,
+            cells,
+            source,
+        )
     cell_groups = {} if body else {"all": np.ones(len(cells), dtype=bool)}
     for name, entities in body.items():
         cell_groups[name] = np.zeros(len(cells), dtype=bool)
@@ -129,7 +155,9 @@ def _named_entities(model: Any, dim: int) -> dict[str, list[int]]:
     groups: dict[str, list[int]] = {}
     for _, tag in model.getPhysicalGroups(dim) if dim >= 0 else ():
         name = model.getPhysicalName(dim, tag) or str(tag)
-        groups.setdefault(name, []).extend(int(entity) for entity in model.getEntitiesForPhysicalGroup(dim, tag))
+        groups.setdefault(name, []).extend(
+            int(entity) for entity in model.getEntitiesForPhysicalGroup(dim, tag)
+        )
     return groups
 
 
@@ -139,9 +167,16 @@ def _elements(model: Any, dim: int, entities: Iterable[int]) -> _Elements:
     for entity in entities:
         kinds, tags, nodes = model.mesh.getElements(dim, entity)
         for kind, tag, node in zip(kinds, tags, nodes, strict=True):
-            parts.setdefault(int(kind), []).append((np.asarray(node, dtype=np.int64).reshape(len(tag), -1), entity))
-    return {kind: (np.concatenate([r for r, _ in found]), np.repeat([e for _, e in found], [len(r) for r, _ in found]))
-            for kind, found in parts.items()}
+            parts.setdefault(int(kind), []).append(
+                (np.asarray(node, dtype=np.int64).reshape(len(tag), -1), entity)
+            )
+    return {
+        kind: (
+            np.concatenate([r for r, _ in found]),
+            np.repeat([e for _, e in found], [len(r) for r, _ in found]),
+        )
+        for kind, found in parts.items()
+    }
 
 
 def _kind(model: Any, elements: _Elements, dim: int, source: str) -> tuple[str, int, int]:
@@ -149,15 +184,29 @@ def _kind(model: Any, elements: _Elements, dim: int, source: str) -> tuple[str, 
     if dim == 0 or not elements:
         raise InputError(f"{source} has no cells: mesh the geometry in Gmsh before saving it")
     names = {kind: model.mesh.getElementProperties(kind)[0] for kind in elements}
-    known = {number: (cell, side) for kinds in (GMSH_NUMBERS, SECOND_ORDER) for cell, (number, side) in kinds.items()}
-    high = [kind for kind in elements if model.mesh.getElementProperties(kind)[2] > 1 and kind not in known]
+    known = {
+        number: (cell, side)
+        for kinds in (GMSH_NUMBERS, SECOND_ORDER)
+        for cell, (number, side) in kinds.items()
+    }
+    high = [
+        kind
+        for kind in elements
+        if model.mesh.getElementProperties(kind)[2] > 1 and kind not in known
+    ]
     if high:
-        raise InputError(f"{source} has cells of an order above 2, or without all mid-points ({names[high[0]]}): mesh "
-                         "it with Mesh.ElementOrder = 1, or with 2 and Mesh.SecondOrderIncomplete = 0")
+        raise InputError(
+            f"{source} has cells of an order above 2, or without all mid-points ({names[high[0]]}): mesh "
+            "it with Mesh.ElementOrder = 1, or with 2 and Mesh.SecondOrderIncomplete = 0"
+        )
     if len(elements) > 1:
-        raise InputError(f"{source} mixes cells ({', '.join(sorted(names.values()))}): mesh it with cells of one type")
+        raise InputError(
+            f"{source} mixes cells ({', '.join(sorted(names.values()))}): mesh it with cells of one type"
+        )
     if (only := next(iter(elements))) not in known:
-        raise InputError(f"{source} has cells of type {names[only]}: use {', '.join(GMSH_NUMBERS)} cells")
+        raise InputError(
+            f"{source} has cells of type {names[only]}: use {', '.join(GMSH_NUMBERS)} cells"
+        )
     return known[only][0], only, known[only][1]
 
 
@@ -166,7 +215,9 @@ def _folded(model: Any, kind: int, entity: Rows, dim: int) -> Mask:
     places, _ = model.mesh.getIntegrationPoints(kind, "Gauss4")
     bad = []
     for one in dict.fromkeys(entity.tolist()):
-        jacobians = np.reshape(model.mesh.getJacobians(kind, places, one)[0], (-1, len(places) // 3, 3, 3))
+        jacobians = np.reshape(
+            model.mesh.getJacobians(kind, places, one)[0], (-1, len(places) // 3, 3, 3)
+        )
         det = np.linalg.det(jacobians[:, :, :dim, :dim])
         bad.append((det.min(axis=1) <= 0.0) & (det.max(axis=1) >= 0.0))
     return np.concatenate(bad)
@@ -178,7 +229,9 @@ def _coordinates(model: Any, tags: Rows, source: str) -> Array:
     order = np.argsort(known)
     place = order[np.minimum(np.searchsorted(known, tags, sorter=order), len(known) - 1)]
     if not np.array_equal(known[place], tags):
-        raise InputError(f"{source} has cells on nodes it does not define: write it again from Gmsh")
+        raise InputError(
+            f"{source} has cells on nodes it does not define: write it again from Gmsh"
+        )
     points: Array = np.asarray(coordinates, dtype=np.float64).reshape(-1, 3)[place]
     _check_finite(points, source)
     return points
@@ -189,8 +242,10 @@ def _flat(points: Array, d: int, source: str) -> Array:
     away = np.abs(points[:, d:]).max(initial=0.0)
     if away > 1e-9 * np.ptp(points, axis=0).max():
         plane, missing = ("plane z = 0", "volume") if d == 2 else ("axis y = z = 0", "surface")
-        raise InputError(f"{source} has no cells of dimension {d + 1} and leaves the {plane} by {away:.3g} m: move it "
-                         f"there, or name the {missing} as a physical group so that Gmsh saves its cells")
+        raise InputError(
+            f"{source} has no cells of dimension {d + 1} and leaves the {plane} by {away:.3g} m: move it "
+            f"there, or name the {missing} as a physical group so that Gmsh saves its cells"
+        )
     return np.ascontiguousarray(points[:, :d])
 
 
@@ -203,7 +258,9 @@ def _without_repeats(rows: Rows) -> tuple[Rows, Rows]:
     return first[order], rank[place]
 
 
-def _facets(model: Any, entities: list[int], kind: int, tags: Rows, points: Array, what: str) -> Rows:
+def _facets(
+    model: Any, entities: list[int], kind: int, tags: Rows, points: Array, what: str
+) -> Rows:
     """Return the facets of a group as rows of points at their vertices, each once; -1 for nodes that are at no point.
 
     OpenCASCADE may copy a curve or surface when it bounds a body with it, and the named original is then meshed by
@@ -212,12 +269,16 @@ def _facets(model: Any, entities: list[int], kind: int, tags: Rows, points: Arra
     if not found:
         return np.empty((0, 1), dtype=np.int64)
     if list(found) != [kind]:
-        raise InputError(f"{what} is not of the shapes of the cells' sides: mesh body and boundary together")
+        raise InputError(
+            f"{what} is not of the shapes of the cells' sides: mesh body and boundary together"
+        )
     nodes = found[kind][0][:, : model.mesh.getElementProperties(kind)[5]]
     place = np.minimum(np.searchsorted(tags, nodes), len(tags) - 1)
     rows = np.where(tags[place] == nodes, place, -1)
     if (rows < 0).any():
-        rows[rows < 0] = _at_same_place(_coordinates(model, nodes[rows < 0], what)[:, : points.shape[1]], points)
+        rows[rows < 0] = _at_same_place(
+            _coordinates(model, nodes[rows < 0], what)[:, : points.shape[1]], points
+        )
     return rows[_without_repeats(rows)[0]]
 
 
@@ -232,7 +293,9 @@ def _at_same_place(places: Array, points: Array) -> Rows:
 
 def arrays_of(source: Source) -> MeshArrays:
     """Return the arrays of a mesh file or of a script; InputError like `extract`."""
-    return arrays_from_file(source) if isinstance(source, str | Path) else arrays_from_script(source)
+    return (
+        arrays_from_file(source) if isinstance(source, str | Path) else arrays_from_script(source)
+    )
 
 
 def add_arrays(gmsh: Any, arrays: MeshArrays) -> None:
@@ -269,6 +332,10 @@ def _add_groups(gmsh: Any, dim: int, kind: int, rows: Rows, groups: dict[str, Ma
         own = rows[place.reshape(-1) == number]
         gmsh.model.mesh.addElementsByType(entities[-1], kind, [], 1 + own.reshape(-1))
     for column, name in enumerate(groups):
-        held = [entity for entity, signature in zip(entities, signatures, strict=True) if signature[column]]
+        held = [
+            entity
+            for entity, signature in zip(entities, signatures, strict=True)
+            if signature[column]
+        ]
         if held:
             gmsh.model.setPhysicalName(dim, gmsh.model.addPhysicalGroup(dim, held), name)

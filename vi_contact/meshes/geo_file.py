@@ -58,10 +58,14 @@ class GeoFile:
         whole("GeoFile", "refine", self.refine, most=MOST)
         number("GeoFile", "time_limit", self.time_limit, positive=True, unit="seconds")
         if not isinstance(self.numbers, Mapping):
-            raise InputError(f"GeoFile: numbers is {shown(self.numbers)}; give names and their values")
+            raise InputError(
+                f"GeoFile: numbers is {shown(self.numbers)}; give names and their values"
+            )
         for name, value in self.numbers.items():
             if not (isinstance(name, str) and name.isascii() and name.isidentifier()):
-                raise InputError(f"GeoFile: numbers has the name {shown(name)}; give a name of the script")
+                raise InputError(
+                    f"GeoFile: numbers has the name {shown(name)}; give a name of the script"
+                )
             number("GeoFile", f"numbers of '{name}'", value)
 
     def build(self, gmsh: Any) -> None:
@@ -72,19 +76,38 @@ class GeoFile:
                 places = ", ".join(f"line {line} {words}" for line, words in script.left_out)
                 log.warning("%s: left out, as it changes no mesh: %s", self.path, places)
             Path(folder, "script.geo").write_text(script.text, encoding="utf-8")
-            code = ("import sys; sys.path = sys.argv[1:]; from vi_contact.meshes.geo_file import mesh_here; "
-                    f"mesh_here({self.refine}, {self.time_limit})")
+            code = (
+                "import sys; sys.path = sys.argv[1:]; from vi_contact.meshes.geo_file import mesh_here; "
+                f"mesh_here({self.refine}, {self.time_limit})"
+            )
             command = [sys.executable, "-c", code, *map(os.path.abspath, sys.path)]
             try:
-                done = subprocess.run(command, cwd=folder, text=True, errors="replace", stdin=subprocess.DEVNULL,
-                                      capture_output=True, timeout=self.time_limit)
+                done = subprocess.run(
+                    command,
+                    cwd=folder,
+                    text=True,
+                    errors="replace",
+                    stdin=subprocess.DEVNULL,
+                    capture_output=True,
+                    timeout=self.time_limit,
+                )
             except subprocess.TimeoutExpired:
-                raise InputError(f"{self.path}: Gmsh did not end within {self.time_limit:g} s: ask for larger cells, "
-                                 "or give a longer time_limit") from None
+                raise InputError(
+                    f"{self.path}: Gmsh did not end within {self.time_limit:g} s: ask for larger cells, "
+                    "or give a longer time_limit"
+                ) from None
             if done.returncode:
-                how = f"signal {-done.returncode}" if done.returncode < 0 else f"status {done.returncode}"
-                said = (done.stderr.strip().splitlines() or [f"it ended without a word, with {how}"])[-1]
-                if said.strip().startswith(("terminate called", "what()")):  # for a text that Gmsh throws
+                how = (
+                    f"signal {-done.returncode}"
+                    if done.returncode < 0
+                    else f"status {done.returncode}"
+                )
+                said = (
+                    done.stderr.strip().splitlines() or [f"it ended without a word, with {how}"]
+                )[-1]
+                if said.strip().startswith(
+                    ("terminate called", "what()")
+                ):  # for a text that Gmsh throws
                     said = "it stopped at a formula or size: check Field[…].F, and that Mesh.MeshSize… is positive"
                 raise InputError(f"{self.path}: Gmsh cannot mesh it: {said.replace(PREFIX, '')}")
             for note in done.stdout.splitlines():
@@ -99,13 +122,18 @@ def mesh_here(refine: int, time_limit: float) -> None:
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
     for limit in (resource.RLIMIT_AS, resource.RLIMIT_FSIZE):
         resource.setrlimit(limit, (memory, memory))
-    with session() as gmsh, options(gmsh, {"General.AbortOnError": 0}):  # errors are read from Gmsh's log
+    with (
+        session() as gmsh,
+        options(gmsh, {"General.AbortOnError": 0}),
+    ):  # errors are read from Gmsh's log
         gmsh.logger.start()
         try:
             gmsh.merge("script.geo")
             groups = gmsh.model.getPhysicalGroups()
             if not groups:
-                sys.exit("it has no cells in a group: name the body by a Physical Surface or Physical Volume")
+                sys.exit(
+                    "it has no cells in a group: name the body by a Physical Surface or Physical Volume"
+                )
             gmsh.model.mesh.generate(max(d for d, _ in groups))
             for _ in range(refine):
                 gmsh.model.mesh.refine()
@@ -119,7 +147,9 @@ def mesh_here(refine: int, time_limit: float) -> None:
 def _tell_errors(lines: Sequence[str]) -> None:
     """Print a note where Gmsh left a transfinite mesh out, and end the process at any other error of its log."""
     for before, line in pairwise(["", *lines]):
-        if match := _NOT_TRANSFINITE.match(line):  # Gmsh itself goes on with a free mesh; from 4.14 on it only warns
+        if match := _NOT_TRANSFINITE.match(
+            line
+        ):  # Gmsh itself goes on with a free mesh; from 4.14 on it only warns
             print(f"{match[1]} is meshed freely, not transfinite: {match[2]}")
             continue
         if not line.startswith("Error"):

@@ -33,7 +33,9 @@ _UNSEEN_OF_MESH = frozenset(_LISTS["unseen_of_mesh"].split())
 _UNSEEN_OF_GEOMETRY = frozenset(_LISTS["unseen_of_geometry"].split())
 _UNSEEN_OPTIONS = frozenset(("General", "Print", "PostProcessing", "View"))  # all options of these
 _UNSEEN_COMMANDS = frozenset(("Printf", "Print", "Save", "Draw"))  # up to their semicolon
-_UNSEEN_BRACES = frozenset(("Color", "Show", "Hide"))  # up to their semicolon, or the brace that ends them
+_UNSEEN_BRACES = frozenset(
+    ("Color", "Show", "Hide")
+)  # up to their semicolon, or the brace that ends them
 _PARAMETERS = frozenset(_LISTS["parameters"].split())
 
 _TOKEN = re.compile(
@@ -47,9 +49,7 @@ _TOKEN = re.compile(
     re.ASCII | re.DOTALL,
 )
 # Names that a script sets: h = …, list[] = …, list() = …, For i In …
-_SET = re.compile(
-    r"(?<![\w.])([A-Za-z_]\w*)\s*(?:=(?!=)|\[\s*\]\s*=|\(\s*\)\s*=|In\b)", re.ASCII
-)
+_SET = re.compile(r"(?<![\w.])([A-Za-z_]\w*)\s*(?:=(?!=)|\[\s*\]\s*=|\(\s*\)\s*=|In\b)", re.ASCII)
 _ARITHMETIC = re.compile(r'"[\w\s.,+*/^()-]*"', re.ASCII)
 # Gmsh leaves out of a group what is not there, without a word. What is written in the place of a group asks for it.
 _GROUP = re.compile(

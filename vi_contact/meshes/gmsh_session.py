@@ -34,11 +34,15 @@ def session(name: str = "vi_contact") -> Iterator[Any]:
     try:
         import gmsh
     except (ImportError, OSError) as error:  # OSError: the module is there, its library is not
-        raise InputError(f"Gmsh's Python module is missing ({error}): install python3-gmsh") from error
+        raise InputError(
+            f"Gmsh's Python module is missing ({error}): install python3-gmsh"
+        ) from error
     borrowed = _is_initialised(gmsh)
     if not borrowed:
         known = inspect.signature(gmsh.initialize).parameters
-        keep_signals = {"interruptible": False} if "interruptible" in known else {}  # or newer Gmsh takes over SIGINT
+        keep_signals = (
+            {"interruptible": False} if "interruptible" in known else {}
+        )  # or newer Gmsh takes over SIGINT
         gmsh.initialize([], readConfigFiles=False, **keep_signals)
     current = gmsh.model.getCurrent()
     try:
@@ -70,7 +74,9 @@ def write(mesh: MeshScript, path: str | Path) -> None:
     """Build the mesh and write it to a file in the format Gmsh gives to that suffix (.msh: format 4.1, text)."""
     target = Path(path)
     if not target.parent.is_dir():
-        raise InputError(f"cannot write {target}: the folder {target.parent} does not exist: create it first")
+        raise InputError(
+            f"cannot write {target}: the folder {target.parent} does not exist: create it first"
+        )
     with session(target.stem) as gmsh:
         mesh.build(gmsh)
         gmsh.write(str(target))
@@ -83,7 +89,9 @@ def _is_initialised(gmsh: Any) -> bool:
     an option that it has not set yet, and ends the process if that is 4: new memory is zeroed so that it is not."""
     if hasattr(gmsh, "isInitialized"):
         return bool(gmsh.isInitialized())
-    perturb = getattr(ctypes.CDLL(None), "mallopt", lambda option, value: 0)  # of glibc: 0xFF fills with about 0
+    perturb = getattr(
+        ctypes.CDLL(None), "mallopt", lambda option, value: 0
+    )  # of glibc: 0xFF fills with about 0
     kept, sink = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     os.dup2(sink, 2)
     perturb(M_PERTURB, 0xFF)

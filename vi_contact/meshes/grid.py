@@ -45,8 +45,11 @@ class Grid:
         number = np.arange(np.prod(shape)).reshape(shape, order="F")
         points = np.empty((number.size, d))
         points[number.reshape(-1)] = self.nodes.reshape(-1, d)
-        faces = {name: _cells(np.asarray(np.take(number, end, axis=axis)), self.simplices)
-                 for axis, pair in enumerate(self.sides) for name, end in zip(pair, (0, -1), strict=True)}
+        faces = {
+            name: _cells(np.asarray(np.take(number, end, axis=axis)), self.simplices)
+            for axis, pair in enumerate(self.sides)
+            for name, end in zip(pair, (0, -1), strict=True)
+        }
         return points, _cells(number, self.simplices), faces
 
 
@@ -67,13 +70,24 @@ def add_grids(gmsh: Any, grids: Sequence[Grid]) -> None:
         first += n
 
 
-def add_outline(model: Any, name: str, outline: Sequence[tuple[float, float]], names: Sequence[str],
-                sizes: Sequence[float], cells: Sequence[int] = ()) -> int:
+def add_outline(
+    model: Any,
+    name: str,
+    outline: Sequence[tuple[float, float]],
+    names: Sequence[str],
+    sizes: Sequence[float],
+    cells: Sequence[int] = (),
+) -> int:
     """Add a surface within an outline, its curves in the groups ``names``; return its tag, to be meshed irregularly.
 
     ``sizes``: of the cells at the corners [m]; ``cells``: exact numbers of them on the first curves."""
-    points = [model.geo.addPoint(*place, 0.0, size) for place, size in zip(outline, sizes, strict=True)]
-    curves = [model.geo.addLine(one, two) for one, two in zip(points, [*points[1:], points[0]], strict=True)]
+    points = [
+        model.geo.addPoint(*place, 0.0, size) for place, size in zip(outline, sizes, strict=True)
+    ]
+    curves = [
+        model.geo.addLine(one, two)
+        for one, two in zip(points, [*points[1:], points[0]], strict=True)
+    ]
     for curve, count in zip(curves, cells, strict=False):
         model.geo.mesh.setTransfiniteCurve(curve, count + 1)
     surface: int = model.geo.addPlaneSurface([model.geo.addCurveLoop(curves)])
@@ -96,14 +110,22 @@ def _cells(tags: npt.NDArray[np.int_], simplices: bool) -> npt.NDArray[np.int_]:
     d = tags.ndim
     shapes = _kuhn_simplices(d) if simplices else [_box_corners(d)]
     count = [n - 1 for n in tags.shape]
-    corner = {o: tags[tuple(slice(i, i + n) for i, n in zip(o, count, strict=True))] for o in np.ndindex(*(2,) * d)}
+    corner = {
+        o: tags[tuple(slice(i, i + n) for i, n in zip(o, count, strict=True))]
+        for o in np.ndindex(*(2,) * d)
+    }
     cells = np.stack([corner[o].reshape(-1) for shape in shapes for o in shape], axis=-1)
     return cells.reshape(-1, len(shapes[0]))
 
 
 def _box_corners(d: int) -> list[tuple[int, ...]]:
     loop = [(0, 0), (1, 0), (1, 1), (0, 1)]
-    corners: list[list[tuple[int, ...]]] = [[()], [(0,), (1,)], [*loop], [(x, y, z) for z in (0, 1) for x, y in loop]]
+    corners: list[list[tuple[int, ...]]] = [
+        [()],
+        [(0,), (1,)],
+        [*loop],
+        [(x, y, z) for z in (0, 1) for x, y in loop],
+    ]
     return corners[d]
 
 
@@ -112,7 +134,10 @@ def _kuhn_simplices(d: int) -> list[list[tuple[int, ...]]]:
     simplices = []
     for order in permutations(range(d)):
         steps = np.eye(d, dtype=int)[list(order)]
-        walk = [tuple(int(c) for c in corner) for corner in np.vstack([np.zeros((1, d), int), steps.cumsum(axis=0)])]
+        walk = [
+            tuple(int(c) for c in corner)
+            for corner in np.vstack([np.zeros((1, d), int), steps.cumsum(axis=0)])
+        ]
         if d and np.linalg.det(steps) < 0.0:
             walk[-1], walk[-2] = walk[-2], walk[-1]
         simplices.append(walk)

@@ -32,7 +32,9 @@ def safe_copy(file: Path, folder: Path) -> Path:
         raise InputError(f"mesh file {shown(str(file))} cannot be read ({why}") from None
     if not there:
         what = str(file) if "\0" not in str(file) else shown(str(file))
-        raise InputError(f"mesh file {what} does not exist: check the path, or write one (python3 meshes --help)")
+        raise InputError(
+            f"mesh file {what} does not exist: check the path, or write one (python3 meshes --help)"
+        )
     if copy.stat().st_size == 0:
         raise InputError(f"mesh file {file} is empty: write it again")
     with open(copy, "rb") as opened, mmap.mmap(opened.fileno(), 0, access=mmap.ACCESS_READ) as data:
@@ -43,9 +45,11 @@ def safe_copy(file: Path, folder: Path) -> Path:
 
 def _check_magic(data: mmap.mmap, file: Path) -> None:
     if data[: len(MAGIC)] != MAGIC:
-        raise InputError(f"mesh file {file} does not begin with $MeshFormat, so it is not in Gmsh's mesh format and "
-                         "may be a script, which runs commands: write it from Gmsh as .msh, or give a .geo of geometry "
-                         "alone as meshes.GeoFile")
+        raise InputError(
+            f"mesh file {file} does not begin with $MeshFormat, so it is not in Gmsh's mesh format and "
+            "may be a script, which runs commands: write it from Gmsh as .msh, or give a .geo of geometry "
+            "alone as meshes.GeoFile"
+        )
 
 
 def _check_sections(data: mmap.mmap, file: Path) -> None:
@@ -58,15 +62,21 @@ def _check_sections(data: mmap.mmap, file: Path) -> None:
             break
         if not closes:
             ahead = data[section.end() : section.end() + SHORT]
-            counts = _packed(ahead) if binary == b"1" and name != b"PhysicalNames" else _written(ahead)
+            counts = (
+                _packed(ahead) if binary == b"1" and name != b"PhysicalNames" else _written(ahead)
+            )
             if max(counts[:1] if version.startswith(b"2") else counts) > len(data):
                 what = name.decode().lower()
-                raise InputError(f"mesh file {file} announces more {what} than it can hold: write it again from Gmsh")
+                raise InputError(
+                    f"mesh file {file} announces more {what} than it can hold: write it again from Gmsh"
+                )
         opened = b"" if closes else name
     else:
         if not opened:
             return
-    raise InputError(f"mesh file {file} is cut short or damaged near {name.decode()}: write it again from Gmsh")
+    raise InputError(
+        f"mesh file {file} is cut short or damaged near {name.decode()}: write it again from Gmsh"
+    )
 
 
 def _written(ahead: bytes) -> tuple[int, ...]:

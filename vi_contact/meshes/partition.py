@@ -41,7 +41,9 @@ def destinations(points: Array, cells: Rows, cell: str, n: int) -> tuple[Ranks, 
     shared = np.diff(number[order]) == 0
     one, other = at[order[:-1][shared]], at[order[1:][shared]]
     apart = owner[one] != owner[other]
-    pairs = np.stack([np.append(one, other), np.append(owner[other], owner[one])], axis=1)[np.append(apart, apart)]
+    pairs = np.stack([np.append(one, other), np.append(owner[other], owner[one])], axis=1)[
+        np.append(apart, apart)
+    ]
     ghosts = np.unique(pairs, axis=0)
     where = np.append(np.arange(len(cells)), ghosts[:, 0])
     ranks = np.append(owner, ghosts[:, 1])[np.argsort(where, kind="stable")]

@@ -23,7 +23,9 @@ class Blocks:
         check_fields(self)
         kinds = {(len(block.lengths), block.simplices) for block in self.blocks.values()}
         if len(kinds) != 1:
-            raise InputError("give the blocks of one mesh the same number of lengths and the same kind of cells")
+            raise InputError(
+                "give the blocks of one mesh the same number of lengths and the same kind of cells"
+            )
 
     def build(self, gmsh: Any) -> None:
         """Add the blocks to Gmsh's current model."""
@@ -31,8 +33,16 @@ class Blocks:
 
     def grids(self) -> list[Grid]:
         """Return the grids of all bodies."""
-        return [Grid(one.points(), one.simplices, name, [(f"{name}_{low}", f"{name}_{high}") for low, high in sides])
-                for name, one in self.blocks.items() for sides in [SIDES[: len(one.lengths)]]]
+        return [
+            Grid(
+                one.points(),
+                one.simplices,
+                name,
+                [(f"{name}_{low}", f"{name}_{high}") for low, high in sides],
+            )
+            for name, one in self.blocks.items()
+            for sides in [SIDES[: len(one.lengths)]]
+        ]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +63,11 @@ class TwoBlocks:
     @property
     def interface(self) -> tuple[str, str]:
         """Return the names of the side of the upper block and of that of the lower one."""
-        return ("upper_left", "lower_right") if len(self.lower.lengths) == 1 else ("upper_bottom", "lower_top")
+        return (
+            ("upper_left", "lower_right")
+            if len(self.lower.lengths) == 1
+            else ("upper_bottom", "lower_top")
+        )
 
     def blocks(self) -> Blocks:
         """Return both blocks where they are."""

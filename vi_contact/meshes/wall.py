@@ -36,7 +36,9 @@ class WallMesh:
         check_box((self.width, self.height), self.divisions or _PUBLISHED)
         if self.size is not None:
             if not 0.0 < self.size <= min(self.width, self.height):
-                raise InputError(f"the cell size is {self.size} m: give one above 0 and up to the wall's sides")
+                raise InputError(
+                    f"the cell size is {self.size} m: give one above 0 and up to the wall's sides"
+                )
             cells = self.width / self.size * (self.height / self.size)
             counted("wall", f"a cell size of {self.size} m", cells, "cells", most=MOST_CELLS)
 
@@ -46,7 +48,9 @@ class WallMesh:
             add_grids(gmsh, self.grids())
             return
         corners = ((0.0, 0.0), (self.width, 0.0), (self.width, self.height), (0.0, self.height))
-        surface = add_outline(gmsh.model, "wall", corners, ("base", "face", "top", "back"), [self.size] * 4)
+        surface = add_outline(
+            gmsh.model, "wall", corners, ("base", "face", "top", "back"), [self.size] * 4
+        )
         if not self.triangles:
             gmsh.model.mesh.setRecombine(2, surface)
         gmsh.model.mesh.generate(2)

@@ -12,4 +12,16 @@ from .records import plot_spectra as plot_spectra
 from .records import plot_transfer as plot_transfer
 from .studies import plot_ida as plot_ida
 
-__all__: list[str] = ['draw_run', 'film', 'plot_deformed', 'plot_faces', 'plot_ida', 'plot_loop', 'plot_motion', 'plot_overview', 'plot_spectra', 'plot_transfer', 'read_frames']
+__all__: list[str] = [
+    "draw_run",
+    "film",
+    "plot_deformed",
+    "plot_faces",
+    "plot_ida",
+    "plot_loop",
+    "plot_motion",
+    "plot_overview",
+    "plot_spectra",
+    "plot_transfer",
+    "read_frames",
+]

@@ -17,13 +17,25 @@ from ..core.errors import InputError
 from ..core.files import frames_of, write_output
 from ..run.files.reading import ContactGeometry, RunFolder
 from .deformed import contact_states, nearest, plane_normals, read_frames
-from .faces import Painter, add_polygons, faces_of, leading, limit, moments, name_states, plot_faces, sheet
+from .faces import (
+    Painter,
+    add_polygons,
+    faces_of,
+    leading,
+    limit,
+    moments,
+    name_states,
+    plot_faces,
+    sheet,
+)
 from .histories import STYLE, plain, require_matplotlib, save, scale, scaled, shaken
 
 DRAWN = 0.1  # of the size of the bodies: how large their largest displacement is drawn, if it is not larger
 FILM_FRAMES = 48  # at most: a film of two megabytes
 BODIES = ("0.35", "tab:blue", "tab:green", "tab:purple")  # edges of their elements
-LIGHT = np.array([0.3, -0.5, 0.81])  # from where it comes; sides along it have 0.6 of their brightness
+LIGHT = np.array(
+    [0.3, -0.5, 0.81]
+)  # from where it comes; sides along it have 0.6 of their brightness
 INWARDS = 0.015  # of the size of the bodies: how far inside the dots are that show the contact in the plane
 
 
@@ -54,7 +66,9 @@ class Scene:
         """Read the frames next to ``times``; ``magnified``: a round number that shows the displacements when None."""
         frames, history = read_frames(run), run.history
         if frames.cells.shape[1] < 3:
-            raise InputError(f"the run in '{run.folder}' has bars or points only: draw runs in the plane or in space")
+            raise InputError(
+                f"the run in '{run.folder}' has bars or points only: draw runs in the plane or in space"
+            )
         optional(number, "pictures of a run", "magnified", magnified, positive=True)
         found = frames.t[np.unique(nearest(frames.t, times))]
         plane = frames.points.shape[1] == 2
@@ -62,15 +76,31 @@ class Scene:
         contact = run.contact if "pressure" in history else None
         sides, nodes = (corners[:0], corners[:0, 0]) if contact is None else frames.facing(contact)
         seen = np.union1d(corners, nodes)  # of degree 2 contact is at mid-points too
-        u, stress = map(np.array, zip(*((u[seen], s[cells]) for _, u, s in map(frames.at, found)), strict=True))
-        size, largest = float(np.ptp(frames.points[seen], axis=0).max()), float(np.linalg.norm(u, axis=2).max())
+        u, stress = map(
+            np.array, zip(*((u[seen], s[cells]) for _, u, s in map(frames.at, found)), strict=True)
+        )
+        size, largest = (
+            float(np.ptp(frames.points[seen], axis=0).max()),
+            float(np.linalg.norm(u, axis=2).max()),
+        )
         rows, pressure = nearest(history["t"], found), np.zeros((len(found), 0))
         states = pressure
         if contact is not None:
             pressure, states = history["pressure"][rows], contact_states(history)[rows]
-        return cls(found, frames.points[seen], np.searchsorted(seen, corners), frames.bodies[cells], u, stress,
-                   magnified or _round_down(DRAWN * size / (largest or np.inf)), contact, sides,
-                   np.searchsorted(seen, nodes), pressure, states)
+        return cls(
+            found,
+            frames.points[seen],
+            np.searchsorted(seen, corners),
+            frames.bodies[cells],
+            u,
+            stress,
+            magnified or _round_down(DRAWN * size / (largest or np.inf)),
+            contact,
+            sides,
+            np.searchsorted(seen, nodes),
+            pressure,
+            states,
+        )
 
     @property
     def up(self) -> str:
@@ -90,7 +120,9 @@ class Scene:
 
         most = float(np.nan_to_num(np.percentile(self.stress, 99.0))) or 1.0
         factor, unit = scale(most, "Pa")
-        return Painter(Normalize(0.0, factor * most), colormaps["YlGnBu"], f"von Mises stress [{unit}]", factor)
+        return Painter(
+            Normalize(0.0, factor * most), colormaps["YlGnBu"], f"von Mises stress [{unit}]", factor
+        )
 
     @cached_property
     def pressures(self) -> Painter:
@@ -112,7 +144,9 @@ class Scene:
         limit(axis, every.min(axis=0), every.max(axis=0), margin=0.03, up=self.up)
         if flat and self.contact is not None:
             inwards = INWARDS * float(np.ptp(self.points, axis=0).max()) * self.contact.normals
-            painter, values = (Painter.of_states(), self.states) if states else (self.pressures, self.pressure)
+            painter, values = (
+                (Painter.of_states(), self.states) if states else (self.pressures, self.pressure)
+            )
             painter.dots(axis, moved[self.nodes] - inwards, values[k])
 
 
@@ -123,8 +157,14 @@ def _round_down(factor: float) -> float:
 
 
 @checked
-def plot_deformed(run: RunFolder, path: str | Path, *, times: Sequence[float] | None = None,
-                  magnified: float | None = None, title: str = "Deformed bodies") -> Path:
+def plot_deformed(
+    run: RunFolder,
+    path: str | Path,
+    *,
+    times: Sequence[float] | None = None,
+    magnified: float | None = None,
+    title: str = "Deformed bodies",
+) -> Path:
     """Draw the deformed bodies of a run, coloured by von Mises stress, in the frames next to ``times`` [s].
 
     None: the first, the last, and when most happens. The edges of elements have the colour of their body. In the plane
@@ -153,8 +193,16 @@ def _headed(title: str, scene: Scene) -> str:
 
 
 @checked
-def film(run: RunFolder, path: str | Path, *, times: Sequence[float] | None = None, magnified: float | None = None,
-         column: str | None = None, title: str = "", fps: int = 10) -> Path:
+def film(
+    run: RunFolder,
+    path: str | Path,
+    *,
+    times: Sequence[float] | None = None,
+    magnified: float | None = None,
+    column: str | None = None,
+    title: str = "",
+    fps: int = 10,
+) -> Path:
     """Write a film of the bodies of a run, a GIF or with ffmpeg an MP4, of the frames next to ``times`` [s].
 
     None: up to 48 frames around the one in which most happens. In space the pressure on each contact face is beside
@@ -167,9 +215,13 @@ def film(run: RunFolder, path: str | Path, *, times: Sequence[float] | None = No
     from matplotlib.figure import Figure
 
     if Path(path).suffix not in (".gif", ".mp4"):
-        raise InputError(f"'{Path(path).name}' is not a .gif or .mp4: give such a name, or use plot_deformed")
+        raise InputError(
+            f"'{Path(path).name}' is not a .gif or .mp4: give such a name, or use plot_deformed"
+        )
     if Path(path).suffix == ".mp4" and not FFMpegWriter.isAvailable():
-        raise InputError("an .mp4 needs ffmpeg, which is not found: install it, or name the film .gif")
+        raise InputError(
+            "an .mp4 needs ffmpeg, which is not found: install it, or name the film .gif"
+        )
     scene = Scene.of(run, _around(run) if times is None else times, magnified)
     flat, contact = scene.points.shape[1] == 2, scene.contact
     faces = [] if flat or contact is None else faces_of(contact, scene.sides)
@@ -179,8 +231,13 @@ def film(run: RunFolder, path: str | Path, *, times: Sequence[float] | None = No
         wide = [1.6, *[1.0] * len(faces)]
         grid = figure.add_gridspec(2, len(wide), height_ratios=(3.6, 1.0), width_ratios=wide)
         planes = [flat, *(face.axes is not None for face in faces)]
-        axes = [figure.add_subplot(grid[0, i], projection=None if plane else "3d") for i, plane in enumerate(planes)]
-        marker = _trace(figure.add_subplot(grid[1, :]), run, column or leading(run.history)[0], scene.times)
+        axes = [
+            figure.add_subplot(grid[0, i], projection=None if plane else "3d")
+            for i, plane in enumerate(planes)
+        ]
+        marker = _trace(
+            figure.add_subplot(grid[1, :]), run, column or leading(run.history)[0], scene.times
+        )
         scene.stresses.bar(figure, axes[0], extend="max", shrink=0.85)
         if contact is not None:
             scene.pressures.bar(figure, axes[-1], shrink=0.85)
@@ -195,10 +252,14 @@ def film(run: RunFolder, path: str | Path, *, times: Sequence[float] | None = No
                         scene.pressures.draw(axis, face, scene.pressure[k])
                         axis.set_title(face.name, fontsize=9)
                     marker.set_xdata([t, t])
-                    figure.suptitle(_headed(f"{title}, t = {t:.4g} s".removeprefix(", "), scene), fontsize=10)
+                    figure.suptitle(
+                        _headed(f"{title}, t = {t:.4g} s".removeprefix(", "), scene), fontsize=10
+                    )
                     if k == 0:
                         figure.draw_without_rendering()
-                        figure.set_layout_engine("none")  # the same places in every frame, laid out once
+                        figure.set_layout_engine(
+                            "none"
+                        )  # the same places in every frame, laid out once
                     writer.grab_frame()
             write_output(path, draft.read_bytes())
     return Path(path)
@@ -231,15 +292,25 @@ def _trace(axis: Any, run: RunFolder, column: str, times: Array) -> Any:
 
 
 @checked
-def draw_run(run: RunFolder, out: str | Path, *, title: str, times: Sequence[float] | None = None,
-             magnified: float | None = None) -> list[Path]:
+def draw_run(
+    run: RunFolder,
+    out: str | Path,
+    *,
+    title: str,
+    times: Sequence[float] | None = None,
+    magnified: float | None = None,
+) -> list[Path]:
     """Draw the bodies of a run with fields as deformed.png and, in space with ``Contact()``, its contact faces as
     faces.png, into the folder ``out``, next to the ``times`` [s]. None: the first, the last, and when most happens.
 
     ``magnified``: how many times larger displacements are drawn, None: so that they are seen."""
     drawn, contact, history = [], run.contact, run.history
     if frames_of(run.folder) and read_frames(run).cells.shape[1] > 2:  # no bars
-        drawn.append(plot_deformed(run, Path(out) / "deformed.png", times=times, magnified=magnified, title=title))
+        drawn.append(
+            plot_deformed(
+                run, Path(out) / "deformed.png", times=times, magnified=magnified, title=title
+            )
+        )
     if contact is not None and contact.points.shape[1] == 3 and "active" in history:
         drawn.append(plot_faces(run, Path(out) / "faces.png", times=times, title=title))
     return drawn

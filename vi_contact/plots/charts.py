@@ -71,7 +71,9 @@ def history_charts(run: Run, groups: Mapping[str, Sequence[str]]) -> list[Chart]
         found = next(filter(None, (varying(run, prefix) for prefix in prefixes)), [])
         if found:
             unit = run.columns[found[0]][0]
-            charts.append(of_columns(run, [name for name in found if run.columns[name][0] == unit], title))
+            charts.append(
+                of_columns(run, [name for name in found if run.columns[name][0] == unit], title)
+            )
     return charts
 
 
@@ -89,7 +91,9 @@ def chosen_charts(run: Run, columns: Sequence[Sequence[str]]) -> list[Chart]:
             if name not in run.columns or np.ndim(run.history.get(name, 0)) != 1:
                 raise InputError(f"the run has no column '{name}': see columns.json in its folder")
         if len({run.columns[name][0] for name in group}) > 1:
-            raise InputError(f"columns {', '.join(group)} have different units: draw one chart for each unit")
+            raise InputError(
+                f"columns {', '.join(group)} have different units: draw one chart for each unit"
+            )
     return [of_columns(run, group, ", ".join(group)) for group in columns]
 
 
@@ -147,34 +151,61 @@ def acceleration_chart(run: Run, name: str, raw: Record, smooth: Record, corner:
 
 def energy_chart(run: Run) -> Chart | None:
     """Return the terms of the ledger; None where there is no energy."""
-    if "energy_defect" not in run.history or not np.any(run.history["energy_kinetic"] + run.history["energy_strain"]):
+    if "energy_defect" not in run.history or not np.any(
+        run.history["energy_kinetic"] + run.history["energy_strain"]
+    ):
         return None
-    sizes = {name: float(np.max(np.abs(run.history[name]))) for name, *_ in LEDGER if name in run.history}
-    present = [entry for entry in LEDGER if sizes.get(entry[0], 0.0) > NOTHING * max(sizes.values())]
+    sizes = {
+        name: float(np.max(np.abs(run.history[name]))) for name, *_ in LEDGER if name in run.history
+    }
+    present = [
+        entry for entry in LEDGER if sizes.get(entry[0], 0.0) > NOTHING * max(sizes.values())
+    ]
     values, unit = scaled(np.array([run.history[name] for name, *_ in present]), "J")
-    lines = [Line(label, run.history["t"], one, colour=colour, style=style)
-             for one, (_, label, colour, style) in zip(values, present, strict=True)]
+    lines = [
+        Line(label, run.history["t"], one, colour=colour, style=style)
+        for one, (_, label, colour, style) in zip(values, present, strict=True)
+    ]
     return Chart("energy", "time [s]", f"[{unit}]", tuple(lines))
 
 
 def certificate_chart(run: Run) -> Chart:
     """Return the worst residual of every step, and the tolerance; exact zeros are drawn at the bottom, at 1e-18."""
-    worst = Line("worst residual", run.history["t"][1:], np.maximum(run.history["certificate"][1:], 1e-18), style=".")
+    worst = Line(
+        "worst residual",
+        run.history["t"][1:],
+        np.maximum(run.history["certificate"][1:], 1e-18),
+        style=".",
+    )
     bound = run.facts.get("tolerance") or None
-    return Chart("certificate of every step", "time [s]", "worst residual [-]", (worst,), log_y=True, bound=bound)
+    return Chart(
+        "certificate of every step",
+        "time [s]",
+        "worst residual [-]",
+        (worst,),
+        log_y=True,
+        bound=bound,
+    )
 
 
 def draw_chart(axis: Any, chart: Chart) -> None:
     """Draw a chart with its title on the left and the legend beside it."""
     colours: dict[str, Any] = {}
     for line in chart.lines:
-        look: dict[str, Any] = {"lw": 0.8, "ls": line.style, "label": line.name, "color": line.colour}
+        look: dict[str, Any] = {
+            "lw": 0.8,
+            "ls": line.style,
+            "label": line.name,
+            "color": line.colour,
+        }
         if line.style == ".":
             look = {"ls": "none", "marker": ".", "ms": 2, "color": "black"}
         if line.pale:
             look |= {"alpha": 0.35, "zorder": 1.5, "color": colours.get(line.name), "label": None}
             look |= {} if chart.log_x else {"label": line.name, "color": "0.3"}
-        (drawn,) = axis.plot(line.x, line.y, **{name: value for name, value in look.items() if value is not None})
+        (drawn,) = axis.plot(
+            line.x, line.y, **{name: value for name, value in look.items() if value is not None}
+        )
         colours[line.name] = drawn.get_color()
     if chart.log_x:
         axis.set_xscale("log")
@@ -182,15 +213,28 @@ def draw_chart(axis: Any, chart: Chart) -> None:
         axis.set_ylim(bottom=0.0)
     if chart.log_y and any(np.any(line.y > 0.0) for line in chart.lines):
         axis.set_yscale("log")
-        axis.yaxis.set_major_formatter("{x:.0e}")  # powers of ten are formulas, which the page does not read
+        axis.yaxis.set_major_formatter(
+            "{x:.0e}"
+        )  # powers of ten are formulas, which the page does not read
     if chart.bound is not None:
-        axis.axhline(chart.bound, color="tab:red", ls="--", lw=0.8, label=f"tolerance {chart.bound:g}")
+        axis.axhline(
+            chart.bound, color="tab:red", ls="--", lw=0.8, label=f"tolerance {chart.bound:g}"
+        )
     axis.set_title(chart.title, loc="left")
     labels = len(axis.get_legend_handles_labels()[1])
     if labels:
         columns = -(-labels // (1 if labels < 6 else 2))
-        axis.legend(fontsize=6 if columns < 4 else 5.5, ncol=columns, loc="lower right", bbox_to_anchor=(1.0, 0.99),
-                    frameon=False, handlelength=0.8, handletextpad=0.4, columnspacing=0.7, borderpad=0.1)
+        axis.legend(
+            fontsize=6 if columns < 4 else 5.5,
+            ncol=columns,
+            loc="lower right",
+            bbox_to_anchor=(1.0, 0.99),
+            frameon=False,
+            handlelength=0.8,
+            handletextpad=0.4,
+            columnspacing=0.7,
+            borderpad=0.1,
+        )
     if not chart.log_x:
         axis.margins(x=0.0)
     axis.set(xlabel=chart.x, ylabel=chart.y)
@@ -199,10 +243,20 @@ def draw_chart(axis: Any, chart: Chart) -> None:
 def plot_overview(run: Run) -> Any:
     """Return a matplotlib Figure of a Solution or RunFolder. It has the displacements of the first 8 probes, the
     contact force, the energy ledger, as far as they were recorded, and the certificate of every step."""
-    provides("plot_overview", "run", run, ("history", "columns", "facts"), "give a Solution, or what read_run returns")
+    provides(
+        "plot_overview",
+        "run",
+        run,
+        ("history", "columns", "facts"),
+        "give a Solution, or what read_run returns",
+    )
     probes = [name for name in run.history if name.startswith("u_")][:CURVES]
     charts = [of_columns(run, probes, "displacement")] if probes else []
-    charts += [of_columns(run, ["contact_resultant"], "contact force")] if "contact_resultant" in run.history else []
+    charts += (
+        [of_columns(run, ["contact_resultant"], "contact force")]
+        if "contact_resultant" in run.history
+        else []
+    )
     charts += [*filter(None, [energy_chart(run)]), certificate_chart(run)]
     figure, axes = panels(len(charts), (9.0, 2.0 * len(charts)))
     for axis, chart in zip(axes, charts, strict=True):

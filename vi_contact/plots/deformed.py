@@ -25,7 +25,12 @@ from ..run.files.reading import RunFolder, read_run
 OPEN, STICK, SLIP = 1, 2, 3  # as contact_status in fields.xdmf
 SAME = 1e-6  # of the size of what is drawn: what lies at one place or in one plane
 FACING = 0.5  # least cosine between the contact direction of a node and the normals of its facets
-CELLS = {(2, 3): "triangle", (2, 4): "quadrilateral", (3, 4): "tetrahedron", (3, 8): "hexahedron"}  # dimension, corners
+CELLS = {
+    (2, 3): "triangle",
+    (2, 4): "quadrilateral",
+    (3, 4): "tetrahedron",
+    (3, 8): "hexahedron",
+}  # dimension, corners
 
 
 @dataclass(frozen=True)
@@ -54,7 +59,10 @@ class StoredFrames:
     def bodies(self) -> Indices:
         """Return the number (c,) of the body of each cell: cells that share nodes are of one body."""
         count, corners = self.cells.shape
-        links = np.repeat(np.arange(count), corners), count + self.cells.ravel()  # from cells to their nodes
+        links = (
+            np.repeat(np.arange(count), corners),
+            count + self.cells.ravel(),
+        )  # from cells to their nodes
         return connected(count + len(self.points), *links)[:count]
 
     @cached_property
@@ -74,7 +82,9 @@ class StoredFrames:
         reach = SAME * float(np.ptp(self.points, axis=0).max())
         tree = cKDTree(contact.points)
         _, near = tree.query(self.points[nodes], k=[1, 2, 3, 4], distance_upper_bound=reach)
-        candidates = near[place.ravel()].reshape(*sides.shape, 4)  # those of all faces at this place; m: none
+        candidates = near[place.ravel()].reshape(
+            *sides.shape, 4
+        )  # those of all faces at this place; m: none
         corners = self.points[sides]
         away = corners.mean(axis=1) - self.points[self.cells[cell]].mean(axis=1)
         outwards = plane_normals(corners)
@@ -102,7 +112,9 @@ def nearest(t: Array, times: Sequence[float] | Array) -> Indices:
     """Return the rows of ``t`` next to each of ``times`` [s]. InputError for no times, or what is none."""
     wanted = array("pictures of a run", "times", times, (None,), unit="seconds")
     if not len(wanted):
-        raise InputError("pictures of a run: times is empty; give moments in seconds, or leave it out")
+        raise InputError(
+            "pictures of a run: times is empty; give moments in seconds, or leave it out"
+        )
     return np.abs(t - wanted[:, None]).argmin(axis=1)
 
 
@@ -114,14 +126,18 @@ def contact_states(history: Mapping[str, Array]) -> Array:
     active = np.reshape(history["active"], (rows, -1)).astype(bool)
     change = np.zeros(active.shape)
     if "slip" in history:
-        change[1:] = np.linalg.norm(np.diff(np.reshape(history["slip"], (*active.shape, -1)), axis=0), axis=2)
+        change[1:] = np.linalg.norm(
+            np.diff(np.reshape(history["slip"], (*active.shape, -1)), axis=0), axis=2
+        )
     moved = change > 1e-9 * np.max(change, initial=0.0)
     return np.where(active, np.where(moved, SLIP, STICK), OPEN)
 
 
 def stored_tangents(contact: Geometry) -> Array:
     """Return the tangents (m, d, d - 1) of slip and traction_t in a history; what is at one place is one node."""
-    return tangent_vectors(contact.normals, np.unique(contact.points, axis=0, return_inverse=True)[1].ravel())
+    return tangent_vectors(
+        contact.normals, np.unique(contact.points, axis=0, return_inverse=True)[1].ravel()
+    )
 
 
 @checked
@@ -132,18 +148,36 @@ def read_frames(run: RunFolder | str | Path) -> StoredFrames:
     if places:
         history = run.history if isinstance(run, RunFolder) else read_run(folder).history
         times = dict(zip(history["k"].astype(int).tolist(), history["t"].tolist(), strict=True))
-        places = {k: places[k] for k in sorted(places) if k in times}  # not those whose rows a killed run has lost
+        places = {
+            k: places[k] for k in sorted(places) if k in times
+        }  # not those whose rows a killed run has lost
     if not places:
-        raise InputError(f"no frames in {folder / FIELDS}: run it with out and fields=fem.XDMF(every=...)")
+        raise InputError(
+            f"no frames in {folder / FIELDS}: run it with out and fields=fem.XDMF(every=...)"
+        )
     with _opened(inner_folder(folder, FIELDS) / "mesh.h5") as file:
         points, cells = file["points"][:], file["cells"][:]
-        if points.ndim != 2 or points.shape[1] != 3 or cells.ndim != 2 or cells.dtype.kind not in "iu":
+        if (
+            points.ndim != 2
+            or points.shape[1] != 3
+            or cells.ndim != 2
+            or cells.dtype.kind not in "iu"
+        ):
             raise ValueError("points and cells are no arrays of a mesh")
-        if not np.all(np.isfinite(points)) or not cells.size or cells.min() < 0 or cells.max() >= len(points):
+        if (
+            not np.all(np.isfinite(points))
+            or not cells.size
+            or cells.min() < 0
+            or cells.max() >= len(points)
+        ):
             raise ValueError("a cell has a point that is not there")
-    cells = cells[:, : {6: 3, 9: 4, 10: 4, 27: 8}.get(cells.shape[1])]  # of second order: the vertices
+    cells = cells[
+        :, : {6: 3, 9: 4, 10: 4, 27: 8}.get(cells.shape[1])
+    ]  # of second order: the vertices
     d = 3 if np.any(points[:, 2]) else 2  # a mesh of the plane is stored with z = 0
-    return StoredFrames(points[:, :d], cells, np.array([times[k] for k in places]), tuple(places.values()))
+    return StoredFrames(
+        points[:, :d], cells, np.array([times[k] for k in places]), tuple(places.values())
+    )
 
 
 @contextmanager
@@ -154,8 +188,18 @@ def _opened(path: Path) -> Iterator[Any]:
             yield file
     except InputError:
         raise
-    except (OSError, KeyError, ValueError, IndexError, TypeError, AttributeError, RuntimeError) as error:
+    except (
+        OSError,
+        KeyError,
+        ValueError,
+        IndexError,
+        TypeError,
+        AttributeError,
+        RuntimeError,
+    ) as error:
         if of_machine(error):
             raise
         reason = " ".join(str(error).split())[:200]
-        raise InputError(f"'{path}' is missing or damaged ({reason}): restore it, or draw without fields") from error
+        raise InputError(
+            f"'{path}' is missing or damaged ({reason}): restore it, or draw without fields"
+        ) from error

@@ -56,7 +56,9 @@ def faces_of(contact: Geometry, sides: Indices) -> list[Face]:
         normal = normals[own[0]]
         level = points[own] @ normal / size
         flat = max(float(np.ptp(level)), float(np.abs(normals[own] - normal).max())) <= SAME
-        planes.setdefault((*np.round(normal / SAME), round(level[0] / SAME)) if flat else own[0], []).append(own)
+        planes.setdefault(
+            (*np.round(normal / SAME), round(level[0] / SAME)) if flat else own[0], []
+        ).append(own)
     found = []
     for key, pieces in planes.items():
         own, flat = np.sort(np.concatenate(pieces)), isinstance(key, tuple)
@@ -102,17 +104,24 @@ class Painter:
         factor, unit = scale(size, "Pa")
         label, size = f"contact pressure [{unit}]", factor * size
         if np.any(pressure < 0.0):
-            return cls(Normalize(-size, size), colormaps["RdBu_r"], f"{label}, negative: pull", factor)
+            return cls(
+                Normalize(-size, size), colormaps["RdBu_r"], f"{label}, negative: pull", factor
+            )
         palette = colormaps["YlOrRd"](np.linspace(0.0, 1.0, 256))
         palette[0] = 1.0  # zero, and on this scale less than 2e-5 of the largest
-        return cls(PowerNorm(0.5, 0.0, size), ListedColormap(palette), f"{label}, white: open", factor)
+        return cls(
+            PowerNorm(0.5, 0.0, size), ListedColormap(palette), f"{label}, white: open", factor
+        )
 
     @classmethod
     def of_states(cls) -> "Painter":
         """Make the colours of open, sticking and slipping points."""
         from matplotlib.colors import BoundaryNorm, ListedColormap
 
-        return cls(BoundaryNorm([0.5, 1.5, 2.5, 3.5], 3), ListedColormap([colour for _, colour in STATES.values()]))
+        return cls(
+            BoundaryNorm([0.5, 1.5, 2.5, 3.5], 3),
+            ListedColormap([colour for _, colour in STATES.values()]),
+        )
 
     def colours(self, values: Array) -> Array:
         """Return the colours (…, 4) of values (…)."""
@@ -135,11 +144,19 @@ class Painter:
             self.dots(axis, face.seen(face.points), values[face.conditions])
         names = AXES if face.axes is None else [direction(way) for way in face.axes.T]
         seen = face.seen(face.points)
-        limit(axis, seen.min(axis=0), seen.max(axis=0), names, margin=1.2 * ARROW)  # with room for arrows
+        limit(
+            axis, seen.min(axis=0), seen.max(axis=0), names, margin=1.2 * ARROW
+        )  # with room for arrows
 
     def dots(self, axis: Any, places: Array, values: Array) -> None:
         """Draw values (k,) as dots at places (k, d)."""
-        look = {"norm": self.norm, "cmap": self.cmap, "edgecolors": "0.3", "linewidths": 0.4, "zorder": 4}
+        look = {
+            "norm": self.norm,
+            "cmap": self.cmap,
+            "edgecolors": "0.3",
+            "linewidths": 0.4,
+            "zorder": 4,
+        }
         axis.scatter(*places.T, c=self.factor * values, s=24, **look)
 
 
@@ -153,16 +170,32 @@ def add_polygons(axis: Any, polygons: Array, **look: Any) -> Any:
     return axis.add_collection(PolyCollection(polygons, **look))
 
 
-def limit(axis: Any, low: Array, high: Array, names: Sequence[str] = AXES, *, margin: float = 0.0,
-          up: str = "z") -> None:
+def limit(
+    axis: Any,
+    low: Array,
+    high: Array,
+    names: Sequence[str] = AXES,
+    *,
+    margin: float = 0.0,
+    up: str = "z",
+) -> None:
     """Set limits (d,) [m], one scale along all axes, and their names; ``margin``: part of the largest size; ``up``: the
     axis that points upwards in projection."""
     room = margin * (float((high - low).max()) or 1.0)
     axis.grid(False)
     for letter, name, a, b in zip(AXES, names, low - room, high + room, strict=False):
-        axis.set(**{f"{letter}lim": (a, b), f"{letter}label": f"{name if len(name) == 1 else f'along {name}'} [m]"})
-        share = (b - a) / (float((high - low).max() + 2.0 * room) or 1.0)  # narrow panels have room for few numbers
-        axis.locator_params(letter, nbins=5 if len(low) == 3 else int(np.clip(6.0 * share, 1.0, 5.0)), min_n_ticks=1)
+        axis.set(
+            **{
+                f"{letter}lim": (a, b),
+                f"{letter}label": f"{name if len(name) == 1 else f'along {name}'} [m]",
+            }
+        )
+        share = (b - a) / (
+            float((high - low).max() + 2.0 * room) or 1.0
+        )  # narrow panels have room for few numbers
+        axis.locator_params(
+            letter, nbins=5 if len(low) == 3 else int(np.clip(6.0 * share, 1.0, 5.0)), min_n_ticks=1
+        )
     if len(low) == 3:
         axis.set_box_aspect(high - low + 2.0 * room, zoom=0.85)  # with room for names
         axis.view_init(25.0, -60.0, vertical_axis=up)
@@ -174,8 +207,16 @@ def limit(axis: Any, low: Array, high: Array, names: Sequence[str] = AXES, *, ma
 def leading(history: History) -> tuple[str, int]:
     """Return the column and the row that tell when most happens: of uplift, largest pressure and displacements the
     first one that is not largest in size at the start."""
-    names = ("contact_uplift", "contact_max_pressure", *(name for name in history if name.startswith("u_")))
-    most = ((name, int(np.argmax(np.abs(np.nan_to_num(history[name]))))) for name in names if name in history)
+    names = (
+        "contact_uplift",
+        "contact_max_pressure",
+        *(name for name in history if name.startswith("u_")),
+    )
+    most = (
+        (name, int(np.argmax(np.abs(np.nan_to_num(history[name])))))
+        for name in names
+        if name in history
+    )
     return next((found for found in most if found[1] > 0), ("iterations", 0))
 
 
@@ -185,8 +226,13 @@ def moments(history: History) -> list[float]:
 
 
 @checked
-def plot_faces(run: RunFolder, path: str | Path, *, times: Sequence[float] | None = None,
-               title: str = "Contact faces") -> Path:
+def plot_faces(
+    run: RunFolder,
+    path: str | Path,
+    *,
+    times: Sequence[float] | None = None,
+    title: str = "Contact faces",
+) -> Path:
     """Draw the contact faces of a run in space, a column for each of ``times`` [s].
 
     Every face has a row with its pressure, and one with its open, sticking and slipping points and its slip. Flat
@@ -195,18 +241,28 @@ def plot_faces(run: RunFolder, path: str | Path, *, times: Sequence[float] | Non
     points. InputError for a run in the plane or without arrays of ``Contact()``."""
     contact, history = run.contact, run.history
     if contact is None or "active" not in history or contact.points.shape[1] != 3:
-        raise InputError(f"'{run.folder}' is not a finished run in space with Contact(): finish one that has it")
-    sides = read_frames(run).facing(contact)[0] if frames_of(run.folder) else np.zeros((0, 3), dtype=np.int64)
+        raise InputError(
+            f"'{run.folder}' is not a finished run in space with Contact(): finish one that has it"
+        )
+    sides = (
+        read_frames(run).facing(contact)[0]
+        if frames_of(run.folder)
+        else np.zeros((0, 3), dtype=np.int64)
+    )
     faces = faces_of(contact, sides)
     rows = nearest(history["t"], sorted({*moments(history)}) if times is None else times)
     states, slip = contact_states(history)[rows], np.zeros((len(rows), *contact.points.shape))
     if "slip" in history:
         slip += np.einsum("rmj,mij->rmi", history["slip"][rows], stored_tangents(contact))
     slip[states == OPEN] = 0.0
-    figure, axes = sheet([face.axes is not None for face in faces for _ in "ab"], len(rows), (3.4, 2.8))
+    figure, axes = sheet(
+        [face.axes is not None for face in faces for _ in "ab"], len(rows), (3.4, 2.8)
+    )
     pressure, painter = history["pressure"][rows], Painter.of_pressure(history["pressure"][rows])
     longest = float(np.linalg.norm(slip, axis=2).max())
-    drawn = ARROW * max(float(np.ptp(face.points, axis=0).max()) for face in faces) / (longest or 1.0)
+    drawn = (
+        ARROW * max(float(np.ptp(face.points, axis=0).max()) for face in faces) / (longest or 1.0)
+    )
     for place, face in enumerate(faces):
         for column, row in enumerate(rows):
             over, under = axes[2 * place : 2 * place + 2, column]
@@ -226,16 +282,25 @@ def sheet(flat: Sequence[bool], columns: int, size: tuple[float, float]) -> tupl
     from matplotlib.figure import Figure
 
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(size[0] * columns + 1.4, size[1] * len(flat) + 0.9), layout="constrained")
+        figure = Figure(
+            figsize=(size[0] * columns + 1.4, size[1] * len(flat) + 0.9), layout="constrained"
+        )
         grid = figure.add_gridspec(len(flat), columns)
-        axes = [[figure.add_subplot(grid[row, column], projection=None if plane else "3d") for column in range(columns)]
-                for row, plane in enumerate(flat)]
+        axes = [
+            [
+                figure.add_subplot(grid[row, column], projection=None if plane else "3d")
+                for column in range(columns)
+            ]
+            for row, plane in enumerate(flat)
+        ]
     return figure, np.array(axes, dtype=object)
 
 
 def _arrows(axis: Any, face: Face, slip: Array) -> None:
     """The slips (m, 3) of a face as long as they are to be drawn; specks are left out."""
-    own = np.linalg.norm(slip[face.conditions], axis=1) > SAME * float(np.ptp(face.points, axis=0).max())
+    own = np.linalg.norm(slip[face.conditions], axis=1) > SAME * float(
+        np.ptp(face.points, axis=0).max()
+    )
     if own.any():
         flat = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.006, "zorder": 3}
         ends, ways = face.seen(face.points[own]).T, face.seen(slip[face.conditions[own]]).T
@@ -248,10 +313,23 @@ def name_states(figure: Any, frictional: bool, longest: float = 0.0) -> None:
     from matplotlib.patches import Patch
 
     shown = STATES if frictional else {OPEN: STATES[OPEN], STICK: ("closed", STATES[STICK][1])}
-    handles = [Patch(facecolor=colour, edgecolor="0.5", label=name) for name, colour in shown.values()]
+    handles = [
+        Patch(facecolor=colour, edgecolor="0.5", label=name) for name, colour in shown.values()
+    ]
     if longest > 0.0:
         metres, unit = length_unit(longest)
-        handles.append(Line2D([], [], color="black", marker=r"$\rightarrow$", ms=14, ls="none",
-                              label=f"slip of the body, the longest {longest / metres:.3g} {unit}"))
-    figure.supxlabel(" ", fontsize=16)  # keeps room for the legend, which the layout of matplotlib 3.6 does not
+        handles.append(
+            Line2D(
+                [],
+                [],
+                color="black",
+                marker=r"$\rightarrow$",
+                ms=14,
+                ls="none",
+                label=f"slip of the body, the longest {longest / metres:.3g} {unit}",
+            )
+        )
+    figure.supxlabel(
+        " ", fontsize=16
+    )  # keeps room for the legend, which the layout of matplotlib 3.6 does not
     figure.legend(handles=handles, loc="lower center", ncol=len(handles), fontsize=9, frameon=False)

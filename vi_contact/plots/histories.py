@@ -20,7 +20,9 @@ _UNITS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
 STYLE = {"axes.grid": True, "grid.alpha": 0.3, "axes.spines.top": False, "axes.spines.right": False}
 
 
-def canvas(rows: int, columns: int, size: tuple[float, float], lattice: bool = True, **more: Any) -> tuple[Any, Any]:
+def canvas(
+    rows: int, columns: int, size: tuple[float, float], lattice: bool = True, **more: Any
+) -> tuple[Any, Any]:
     """Make (figure, its axes (rows, columns)); ``lattice``: whether grid lines are drawn behind the curves."""
     require_matplotlib()
     import matplotlib
@@ -63,7 +65,15 @@ def length_unit(size: float) -> tuple[float, str]:
 def scaled(values: Array, unit: str) -> tuple[Array, str]:
     """Return the values over the power of 1000 that fits their size, and the unit with its prefix; "-" has none."""
     size = 0.0 if unit == "-" else float(np.nanmax(np.abs(values), initial=0.0))
-    for factor, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n")):
+    for factor, prefix in (
+        (1e9, "G"),
+        (1e6, "M"),
+        (1e3, "k"),
+        (1.0, ""),
+        (1e-3, "m"),
+        (1e-6, "µ"),
+        (1e-9, "n"),
+    ):
         if size >= factor:
             return values / factor, prefix + unit
     return values, unit
@@ -95,7 +105,9 @@ def write_picture(figure: Any, path: str | Path, **more: Any) -> Path:
     known = sorted(figure.canvas.get_supported_filetypes())
     if path.suffix.lower()[1:] not in known:
         endings = ", .".join(known)
-        raise InputError(f"'{path}' is no picture that matplotlib writes: give a name that ends in .{endings}")
+        raise InputError(
+            f"'{path}' is no picture that matplotlib writes: give a name that ends in .{endings}"
+        )
     write_output(path, image_of(figure, path.suffix.lower()[1:], **more))
     return path
 
@@ -111,13 +123,21 @@ def require_matplotlib() -> None:
     """Raise InputError when the settings of matplotlib keep it from being imported, though it is there."""
     try:
         import matplotlib  # noqa: F401
-    except ValueError as error:  # of MPLBACKEND, which it checks although nothing here needs a backend
+    except (
+        ValueError
+    ) as error:  # of MPLBACKEND, which it checks although nothing here needs a backend
         reason = " ".join(str(error).split())[:120]
-        place = "the environment variable MPLBACKEND" if "MPLBACKEND" in os.environ else "the settings of matplotlib"
+        place = (
+            "the environment variable MPLBACKEND"
+            if "MPLBACKEND" in os.environ
+            else "the settings of matplotlib"
+        )
         raise InputError(f"matplotlib cannot be imported ({reason}): correct {place}") from error
 
 
-LEDGER = tuple((name, *look) for name, look in WORDS["curves"].items())  # column, label, colour, line
+LEDGER = tuple(
+    (name, *look) for name, look in WORDS["curves"].items()
+)  # column, label, colour, line
 
 
 def cell_edges(centres: Array) -> Array:
@@ -126,4 +146,6 @@ def cell_edges(centres: Array) -> Array:
         half = 0.5 * (abs(float(centres[0])) or 1.0)
         return np.array([centres[0] - half, centres[0] + half])
     middle = 0.5 * (centres[:-1] + centres[1:])
-    return np.concatenate([[2.0 * centres[0] - middle[0]], middle, [2.0 * centres[-1] - middle[-1]]])
+    return np.concatenate(
+        [[2.0 * centres[0] - middle[0]], middle, [2.0 * centres[-1] - middle[-1]]]
+    )

@@ -34,7 +34,9 @@ def arc_position(points: Array, normals: Array | None = None) -> tuple[Array, st
     if normals is not None:
         points = np.column_stack([points, STRAIGHT * float(np.ptp(points, axis=0).max()) * normals])
     order = chain(points)
-    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[order], axis=0), axis=1))])
+    lengths = np.concatenate(
+        [[0.0], np.cumsum(np.linalg.norm(np.diff(points[order], axis=0), axis=1))]
+    )
     place = np.empty(len(points))
     place[order] = lengths
     return place, "arc length [m]"
@@ -57,12 +59,24 @@ def thinned(t: Array, values: Array, rows: int = ROWS) -> tuple[Array, Array]:
     if len(t) <= rows:
         return t, values
     starts = np.linspace(0, len(t), rows, endpoint=False).astype(int)
-    high, low = np.maximum.reduceat(values, starts, axis=0), np.minimum.reduceat(values, starts, axis=0)
+    high, low = (
+        np.maximum.reduceat(values, starts, axis=0),
+        np.minimum.reduceat(values, starts, axis=0),
+    )
     return t[starts], np.where(high >= -low, high, low)
 
 
-def draw_map(axis: Any, t: Array, position: Array, values: Array, unit: str, *, title: str, axis_label: str,
-             colours: str) -> None:
+def draw_map(
+    axis: Any,
+    t: Array,
+    position: Array,
+    values: Array,
+    unit: str,
+    *,
+    title: str,
+    axis_label: str,
+    colours: str,
+) -> None:
     """Draw values (rows, m) as colours, zero white; points at the same place (corners) side by side in their order."""
     image, prefixed, _ = coloured(axis, t, position, values, unit, colours)
     axis.figure.colorbar(image, ax=axis, pad=0.02, fraction=0.06)
@@ -70,7 +84,9 @@ def draw_map(axis: Any, t: Array, position: Array, values: Array, unit: str, *, 
     axis.set_title(f"{title} [{prefixed}] (white: none)", loc="left")
 
 
-def coloured(axis: Any, t: Array, position: Array, values: Array, unit: str, colours: str) -> tuple[Any, str, bool]:
+def coloured(
+    axis: Any, t: Array, position: Array, values: Array, unit: str, colours: str
+) -> tuple[Any, str, bool]:
     """Draw values in colours: return (image, unit with its prefix, whether some are negative), from white upwards or to
     both sides of it."""
     from matplotlib import colormaps
@@ -82,15 +98,27 @@ def coloured(axis: Any, t: Array, position: Array, values: Array, unit: str, col
     palette = colormaps["RdBu_r" if pulling else colours].with_extremes(under="white")
     low = -size if pulling else 1e-9 * size
     axis.grid(False)
-    image = axis.pcolormesh(cell_edges(t), cell_edges(position[order]), shown.T, cmap=palette, vmin=low, vmax=size,
-                            rasterized=True)
+    image = axis.pcolormesh(
+        cell_edges(t),
+        cell_edges(position[order]),
+        shown.T,
+        cmap=palette,
+        vmin=low,
+        vmax=size,
+        rasterized=True,
+    )
     return image, prefixed, pulling
 
 
 def maps_of(run: Any) -> list[Drawing]:
     """Return what draws the maps of the contact line of a run, of its pressure and, if it opens, of its opening."""
     contact, history = run.contact, run.history
-    if contact is None or "pressure" not in history or contact.points.shape[1] != 2 or len(contact.points) < 3:
+    if (
+        contact is None
+        or "pressure" not in history
+        or contact.points.shape[1] != 2
+        or len(contact.points) < 3
+    ):
         return []
     shown = [("pressure", "Pa")] if np.any(history["pressure"]) else []
     size = float(np.ptp(contact.points, axis=0).max())
@@ -104,5 +132,13 @@ def _map(axis: Any, run: Any, column: str, unit: str) -> None:
     values = np.reshape(run.history[column], (len(run.history["t"]), -1))
     open_gap = column == "gap"
     t, shown = thinned(run.history["t"], np.maximum(values, 0.0) if open_gap else values)
-    draw_map(axis, t, position, shown, unit, title="opening" if open_gap else "contact pressure", axis_label=label,
-             colours="Blues" if open_gap else "magma_r")
+    draw_map(
+        axis,
+        t,
+        position,
+        shown,
+        unit,
+        title="opening" if open_gap else "contact pressure",
+        axis_label=label,
+        colours="Blues" if open_gap else "magma_r",
+    )

@@ -65,11 +65,23 @@ class _Pages:
             height, x = LINE * max(1, *map(len, cells)) + 0.03, SIDE
             self.room(height)
             for cell, width in zip(cells, widths, strict=True):
-                self._text(x, self.y, "\n".join(cell), 6.8, weight="normal" if number else "bold", linespacing=1.1)
+                self._text(
+                    x,
+                    self.y,
+                    "\n".join(cell),
+                    6.8,
+                    weight="normal" if number else "bold",
+                    linespacing=1.1,
+                )
                 x += LETTER * width
             self.y += height
-            across, level = [SIDE / PAGE[0], min(x, SIDE + WIDE) / PAGE[0]], 1.0 - (self.y - 0.025) / PAGE[1]
-            self.figure.add_artist(Line2D(across, [level, level], lw=0.3 if number else 0.8, color="0.6"))
+            across, level = (
+                [SIDE / PAGE[0], min(x, SIDE + WIDE) / PAGE[0]],
+                1.0 - (self.y - 0.025) / PAGE[1],
+            )
+            self.figure.add_artist(
+                Line2D(across, [level, level], lw=0.3 if number else 0.8, color="0.6")
+            )
         self.y += 0.12
 
     def panels(self, panels: Sequence[Chart | Drawing], height: float, beside: int) -> None:
@@ -78,9 +90,16 @@ class _Pages:
             self.room(height + 0.75)
             for place, panel in enumerate(panels[first : first + beside]):
                 wide = WIDE / beside
-                box = (SIDE + place * wide + 0.5, PAGE[1] - self.y - height - 0.25, wide - 0.65, height)
+                box = (
+                    SIDE + place * wide + 0.5,
+                    PAGE[1] - self.y - height - 0.25,
+                    wide - 0.65,
+                    height,
+                )
                 axis = self.figure.add_axes([one / PAGE[k % 2] for k, one in enumerate(box)])
-                draw_chart(axis, panel.shortened(CURVES)) if isinstance(panel, Chart) else panel(axis)
+                draw_chart(axis, panel.shortened(CURVES)) if isinstance(panel, Chart) else panel(
+                    axis
+                )
             self.y += height + 0.75
 
     def picture(self, path: Path) -> None:
@@ -91,14 +110,17 @@ class _Pages:
         wide = min(WIDE, 0.5 * PAGE[1] * image.shape[1] / image.shape[0])
         high = wide * image.shape[0] / image.shape[1]
         self.room(high)
-        axis = self.figure.add_axes((SIDE / PAGE[0], 1.0 - (self.y + high) / PAGE[1], wide / PAGE[0], high / PAGE[1]))
+        axis = self.figure.add_axes(
+            (SIDE / PAGE[0], 1.0 - (self.y + high) / PAGE[1], wide / PAGE[0], high / PAGE[1])
+        )
         axis.set_axis_off()
         axis.imshow(image)
         self.y += high + 0.15
 
 
-def write_pages(path: Path, title: str, facts: Sequence[tuple[str, str]], sections: Sequence[Section],
-                foot: str) -> Path:
+def write_pages(
+    path: Path, title: str, facts: Sequence[tuple[str, str]], sections: Sequence[Section], foot: str
+) -> Path:
     """Write a PDF: the title, (name, value) of facts, the sections, and a line at the foot of every page."""
     require_matplotlib()
     import matplotlib
@@ -112,7 +134,12 @@ def write_pages(path: Path, title: str, facts: Sequence[tuple[str, str]], sectio
         pages.table(Table(("", ""), facts))
         for section in sections:
             pages.y += 0.12
-            pages.words(section.title, 11.0, keep=1.2 if section.sentences or section.tables else 4.0, weight="bold")
+            pages.words(
+                section.title,
+                11.0,
+                keep=1.2 if section.sentences or section.tables else 4.0,
+                weight="bold",
+            )
             for sentence in section.sentences:
                 pages.words(sentence)
             for table in section.tables:

@@ -19,46 +19,73 @@ from ..ground_motion.record import UNITS, Record, canonical_units
 from ..ground_motion.spectra import ResponseSpectrum
 from .histories import canvas, length_unit, panels, plain, plain_numbers, save, scaled
 
-SAMPLES_A_PERIOD = 10  # a spectrum is drawn pale at periods with fewer samples of the record than this
+SAMPLES_A_PERIOD = (
+    10  # a spectrum is drawn pale at periods with fewer samples of the record than this
+)
 
 
 @checked
-def plot_motion(record: Record, path: str | Path, *, title: str | None = None, units: str = "m/s2") -> Path:
+def plot_motion(
+    record: Record, path: str | Path, *, title: str | None = None, units: str = "m/s2"
+) -> Path:
     """Draw acceleration in `units`, velocity, displacement and the Husid curve, with peaks marked and D5-95 shaded.
 
     title: default the record's. Nothing is corrected: a drift of the record shows."""
     units = canonical_units("plot_motion: units", units)
     figure, axes = panels(4, (9.0, 8.0))
     velocity, displacement = integrated(record)
-    _line(axes[0], record.times, record.acceleration / UNITS[units], f"acceleration [{_pretty(units)}]")
+    _line(
+        axes[0],
+        record.times,
+        record.acceleration / UNITS[units],
+        f"acceleration [{_pretty(units)}]",
+    )
     quantities = (velocity, "velocity", "/s"), (displacement, "displacement", "")
     for axis, (values, quantity, per_second) in zip(axes[1:3], quantities, strict=True):
         metres, unit = _size(values)
         _line(axis, record.times, values / metres, f"{quantity} [{unit}{per_second}]")
     _husid(axes[3], record)
-    axes[0].set_title(plain(title if title is not None else record.title or record.source), fontsize=10)
+    axes[0].set_title(
+        plain(title if title is not None else record.title or record.source), fontsize=10
+    )
     axes[-1].set_xlim(0.0, record.duration)
     return save(figure, path)
 
 
 @checked
-def plot_spectra(spectra: Mapping[str, ResponseSpectrum], path: str | Path, *, target: EC8Spectrum | None = None,
-                 steps: Mapping[str, float] | None = None, title: str = "Response spectra", units: str = "g") -> Path:
+def plot_spectra(
+    spectra: Mapping[str, ResponseSpectrum],
+    path: str | Path,
+    *,
+    target: EC8Spectrum | None = None,
+    steps: Mapping[str, float] | None = None,
+    title: str = "Response spectra",
+    units: str = "g",
+) -> Path:
     """Draw pseudo-acceleration in `units` and displacement over the period, one line for each label, the target dashed.
 
     steps: time step [s] of the record behind each label; below ten of them its line is pale."""
     units = canonical_units("plot_spectra: units", units)
     if not spectra:
-        raise InputError("plot_spectra: spectra is empty; give one response spectrum or more, each with its label")
+        raise InputError(
+            "plot_spectra: spectra is empty; give one response spectrum or more, each with its label"
+        )
     figure, ((top,), (bottom,)) = canvas(2, 1, (8.0, 7.5), sharex=True)
     bottom.set_xscale("log")
     plain_numbers(bottom.xaxis)
     shown = np.concatenate([spectrum.periods for spectrum in spectra.values()])
-    metres, unit = length_unit(max(float(np.max(spectrum.displacement)) for spectrum in spectra.values()))
-    first = {label: SAMPLES_A_PERIOD * (steps or {}).get(label, 0.0) for label in spectra}  # period that is trusted
+    metres, unit = length_unit(
+        max(float(np.max(spectrum.displacement)) for spectrum in spectra.values())
+    )
+    first = {
+        label: SAMPLES_A_PERIOD * (steps or {}).get(label, 0.0) for label in spectra
+    }  # period that is trusted
     for label, spectrum in spectra.items():
         colour = None
-        for axis, values in ((top, spectrum.psa / UNITS[units]), (bottom, spectrum.displacement / metres)):
+        for axis, values in (
+            (top, spectrum.psa / UNITS[units]),
+            (bottom, spectrum.displacement / metres),
+        ):
             known = np.where(spectrum.periods >= first[label], values, np.nan)
             (line,) = axis.plot(spectrum.periods, known, lw=1.2, color=colour, label=plain(label))
             colour = line.get_color()
@@ -68,20 +95,37 @@ def plot_spectra(spectra: Mapping[str, ResponseSpectrum], path: str | Path, *, t
         name = f"EC8 target, {100.0 * target.damping:g} %"
         top.plot(periods, target.acceleration(periods) / UNITS[units], "k--", lw=1.2, label=name)
         code = periods <= 4.0  # beyond, the code gives another displacement spectrum
-        bottom.plot(periods[code], target.displacement(periods[code]) / metres, "k--", lw=1.2, label=name)
+        bottom.plot(
+            periods[code], target.displacement(periods[code]) / metres, "k--", lw=1.2, label=name
+        )
     if any(np.min(spectrum.periods) < first[label] for label, spectrum in spectra.items()):
-        top.plot([], [], color="0.5", lw=0.8, alpha=0.5, label=f"pale: under {SAMPLES_A_PERIOD} samples a period")
+        top.plot(
+            [],
+            [],
+            color="0.5",
+            lw=0.8,
+            alpha=0.5,
+            label=f"pale: under {SAMPLES_A_PERIOD} samples a period",
+        )
     top.legend(fontsize=8)
     for axis in (top, bottom):
         axis.set_ylim(bottom=0.0)
     top.set(ylabel=f"pseudo-acceleration [{_pretty(units)}]", title=plain(title))
-    bottom.set(ylabel=f"displacement [{unit}]", xlabel="period [s]", xlim=(shown.min(), shown.max()))
+    bottom.set(
+        ylabel=f"displacement [{unit}]", xlabel="period [s]", xlim=(shown.min(), shown.max())
+    )
     return save(figure, path)
 
 
 @checked
-def plot_loop(loop: Loop, path: str | Path, *, x: tuple[str, str], y: tuple[str, str],
-              title: str | None = None) -> Path:
+def plot_loop(
+    loop: Loop,
+    path: str | Path,
+    *,
+    x: tuple[str, str],
+    y: tuple[str, str],
+    title: str | None = None,
+) -> Path:
     """Draw force over deformation; ``x``, ``y``: (name, SI unit) of the two. The title says the work at the end."""
     figure, ((axis,),) = canvas(1, 1, (6.4, 4.8))
     across, x_unit = scaled(loop.deformation, x[1])
@@ -94,7 +138,9 @@ def plot_loop(loop: Loop, path: str | Path, *, x: tuple[str, str], y: tuple[str,
     axis.legend(fontsize=8)
     work, unit = scaled(loop.work[-1:], "J")
     title = title or f"work {work[0]:.3g} {unit}"
-    axis.set(xlabel=plain(f"{x[0]} [{x_unit}]"), ylabel=plain(f"{y[0]} [{y_unit}]"), title=plain(title))
+    axis.set(
+        xlabel=plain(f"{x[0]} [{x_unit}]"), ylabel=plain(f"{y[0]} [{y_unit}]"), title=plain(title)
+    )
     return save(figure, path)
 
 
@@ -107,8 +153,13 @@ def plot_transfer(found: TransferFunction, path: str | Path, *, title: str) -> P
     axis.axhline(1.0, color="0.6", lw=0.6)
     frequency, amplitude = found.peak
     axis.plot(frequency, amplitude, "o", color="tab:blue", ms=4)
-    axis.annotate(f"{amplitude:.3g} at {frequency:.3g} Hz", (frequency, amplitude), xytext=(6, 4),
-                  textcoords="offset points", fontsize=8)
+    axis.annotate(
+        f"{amplitude:.3g} at {frequency:.3g} Hz",
+        (frequency, amplitude),
+        xytext=(6, 4),
+        textcoords="offset points",
+        fontsize=8,
+    )
     finite = found.amplitude[np.isfinite(found.amplitude) & (found.amplitude > 0.0)]
     axis.set_ylim(0.5 * float(finite.min()), 2.0 * float(finite.max()))
     axis.set(xlabel="frequency [Hz]", ylabel="|surface / base| [-]", title=plain(title))
@@ -121,9 +172,16 @@ def _line(axis: Any, times: Array, values: Array, label: str) -> None:
     peak = int(np.argmax(np.abs(values)))
     axis.plot(times[peak], values[peak], "o", ms=4, color="tab:red", clip_on=False)
     side, outwards = -1 if times[peak] > 0.75 * times[-1] else 1, -1 if values[peak] < 0.0 else 1
-    axis.annotate(f"{values[peak]:.3g} at {times[peak]:g} s", (times[peak], values[peak]),
-                  xytext=(6 * side, 4 * outwards), textcoords="offset points", fontsize=8, color="tab:red", va="center",
-                  ha="left" if side > 0 else "right")
+    axis.annotate(
+        f"{values[peak]:.3g} at {times[peak]:g} s",
+        (times[peak], values[peak]),
+        xytext=(6 * side, 4 * outwards),
+        textcoords="offset points",
+        fontsize=8,
+        color="tab:red",
+        va="center",
+        ha="left" if side > 0 else "right",
+    )
     axis.axhline(0.0, color="0.6", lw=0.6)
     axis.margins(y=0.12)
     axis.set_ylabel(label)

@@ -46,15 +46,29 @@ class Section:
     pictures: Sequence[Path] = ()
 
 
-def sections_of(run: RunFolder, model: Mapping[str, Any],
-                columns: Sequence[Sequence[str]] | None = None) -> list[Section]:
+def sections_of(
+    run: RunFolder, model: Mapping[str, Any], columns: Sequence[Sequence[str]] | None = None
+) -> list[Section]:
     """Return the sections that a run has data for; ``model``: model.json, empty where there is none; ``columns``:
     groups of columns for the histories, in place of those that move."""
     if len(run.history["t"]) < 2:
-        raise InputError(f"the run in '{run.folder}' has no steps yet: report on it when it has some")
-    histories = charts.history_charts(run, WORDS["groups"]) if columns is None else charts.chosen_charts(run, columns)
-    found = [_model(model), _motion(run, model), _results(run), _accelerations(run),
-             Section("Histories", charts=histories, drawings=maps_of(run)), _certificate(run), _peaks(run)]
+        raise InputError(
+            f"the run in '{run.folder}' has no steps yet: report on it when it has some"
+        )
+    histories = (
+        charts.history_charts(run, WORDS["groups"])
+        if columns is None
+        else charts.chosen_charts(run, columns)
+    )
+    found = [
+        _model(model),
+        _motion(run, model),
+        _results(run),
+        _accelerations(run),
+        Section("Histories", charts=histories, drawings=maps_of(run)),
+        _certificate(run),
+        _peaks(run),
+    ]
     return [one for one in found if one.sentences or one.tables or one.charts or one.drawings]
 
 
@@ -79,14 +93,24 @@ def words(value: Any, depth: int = 9) -> str:
 
 def table_of(title: str, rows: Any) -> list[Table]:
     """Return the table of objects that a file lists, a column for each of their keys; none for anything else."""
-    given = [one for one in rows if isinstance(one, Mapping)] if isinstance(rows, list | tuple) else []
+    given = (
+        [one for one in rows if isinstance(one, Mapping)] if isinstance(rows, list | tuple) else []
+    )
     header = list(dict.fromkeys(key for one in given for key in one if key not in NOT_SHOWN))
-    return [Table(header, [[words(one.get(key)) for key in header] for one in given], title)] if given else []
+    return (
+        [Table(header, [[words(one.get(key)) for key in header] for one in given], title)]
+        if given
+        else []
+    )
 
 
 def _model(model: Mapping[str, Any]) -> Section:
-    tables = [table for title, key in WORDS["tables"].items() for table in table_of(title, model.get(key))]
-    said = [text.format(words(model[key])) for text, key in WORDS["facts"].items() if model.get(key)]
+    tables = [
+        table for title, key in WORDS["tables"].items() for table in table_of(title, model.get(key))
+    ]
+    said = [
+        text.format(words(model[key])) for text, key in WORDS["facts"].items() if model.get(key)
+    ]
     warnings = model.get("warnings")
     said += [f"Warning: {words(one)}." for one in (warnings if isinstance(warnings, list) else ())]
     return Section("Model and contact", said, tables)
@@ -96,18 +120,28 @@ def _motion(run: RunFolder, model: Mapping[str, Any]) -> Section:
     records, shown = table_of("records (SI units)", model.get("records")), charts.motion_charts(run)
     said = []
     if shown:
-        peaks = {line.name: np.max(np.abs(run.history[line.name])) / STANDARD_GRAVITY for line in shown[0].lines}
+        peaks = {
+            line.name: np.max(np.abs(run.history[line.name])) / STANDARD_GRAVITY
+            for line in shown[0].lines
+        }
         told = " and ".join(f"{peak:.3g} g along {name[-1]}" for name, peak in peaks.items())
         said = [SAY["shaken"].format(peaks=told), SAY["spectrum"]]
     return Section("Ground motion", said, records, shown)
 
 
 def _results(run: RunFolder) -> Section:
-    rows = [row for title, starts in WORDS["results"].items() for row in _result_rows(run, title, tuple(starts))]
+    rows = [
+        row
+        for title, starts in WORDS["results"].items()
+        for row in _result_rows(run, title, tuple(starts))
+    ]
     safe = list(_safety(run))
     tables = [Table(HEADERS["results"], rows), Table(HEADERS["safety"], safe)]
-    return Section("Base shear, thrust, uplift and sliding", [SAY["safety"]] if safe else [],
-                   [one for one in tables if one.rows])
+    return Section(
+        "Base shear, thrust, uplift and sliding",
+        [SAY["safety"]] if safe else [],
+        [one for one in tables if one.rows],
+    )
 
 
 def _result_rows(run: RunFolder, title: str, prefixes: tuple[str, ...]) -> Iterable[list[str]]:
@@ -116,12 +150,25 @@ def _result_rows(run: RunFolder, title: str, prefixes: tuple[str, ...]) -> Itera
     for name in (name for name in run.columns if name.startswith(prefixes)):
         values = run.history.get(name, np.zeros((0, 0)))
         kind, _, part = name.partition("_")
-        if values.ndim != 1 or np.isnan(values).all() or kind == "height" and not np.nan_to_num(values).any():
+        if (
+            values.ndim != 1
+            or np.isnan(values).all()
+            or kind == "height"
+            and not np.nan_to_num(values).any()
+        ):
             continue  # the thrust on a level part has no height
         thrust = run.history.get(f"N_{part}") if kind in ("height", "level") else None
         row = int(np.nanargmax(np.abs(values) if thrust is None else thrust + 0.0 * values))
         shown, unit = scaled(values, run.columns[name][0])
-        yield [title, name, unit, number(shown[row]), number(t[row]), number(shown[0]), number(shown[-1])]
+        yield [
+            title,
+            name,
+            unit,
+            number(shown[row]),
+            number(t[row]),
+            number(shown[0]),
+            number(shown[-1]),
+        ]
 
 
 def _safety(run: RunFolder) -> Iterable[list[str]]:
@@ -136,14 +183,30 @@ def _safety(run: RunFolder) -> Iterable[list[str]]:
 
 def _accelerations(run: RunFolder) -> Section:
     """Accelerations of probes, low-passed beside raw."""
-    names = [name for axis in "xyz" for name in charts.varying(run, f"a_{axis}_")] if len(run.history["t"]) > 20 else []
-    title, rows, found = "Accelerations, low-passed and raw", [], {name: charts.smoothed(run, name) for name in names}
-    corner = max((corner for _, _, corner in found.values()), default=0.0)  # the same for all: they have the run's step
+    names = (
+        [name for axis in "xyz" for name in charts.varying(run, f"a_{axis}_")]
+        if len(run.history["t"]) > 20
+        else []
+    )
+    title, rows, found = (
+        "Accelerations, low-passed and raw",
+        [],
+        {name: charts.smoothed(run, name) for name in names},
+    )
+    corner = max(
+        (corner for _, _, corner in found.values()), default=0.0
+    )  # the same for all: they have the run's step
     for name, (raw, smooth, _) in found.items():
         low, high = (float(np.max(np.abs(one.acceleration))) for one in (smooth, raw))
-        rows.append([name, *map(number, (low, low / STANDARD_GRAVITY, high, high / STANDARD_GRAVITY))])
+        rows.append(
+            [name, *map(number, (low, low / STANDARD_GRAVITY, high, high / STANDARD_GRAVITY))]
+        )
     said, below = SAY["accelerations"].format(corner=corner), f"peak below {corner:.3g} Hz [m/s²]"
-    table = Table(("column", below, "[g]", "raw peak, not convergent at impacts [m/s²]", "[g]"), rows, sortable=True)
+    table = Table(
+        ("column", below, "[g]", "raw peak, not convergent at impacts [m/s²]", "[g]"),
+        rows,
+        sortable=True,
+    )
     shown = [charts.acceleration_chart(run, name, *found[name]) for name in names[:2]]
     return Section(title, [said], [table], shown) if rows else Section(title)
 
@@ -155,13 +218,21 @@ def _certificate(run: RunFolder) -> Section:
     asked = f", {facts['tolerance']:.0e} was asked for" if facts.get("tolerance") else ""
     said = [SAY["certificate"].format(steps=steps, worst=worst, asked=asked), SAY["limits"]]
     if facts.get("status") != "finished":
-        said.append(SAY["unfinished"].format(why=facts.get("reason") or facts.get("status") or "killed, or going on"))
+        said.append(
+            SAY["unfinished"].format(
+                why=facts.get("reason") or facts.get("status") or "killed, or going on"
+            )
+        )
     energy = charts.energy_chart(run)
     tables = []
     if energy is not None:
         ends = {name: float(history[name][-1]) for name, *_ in LEDGER if name in history}
         most = float(np.max(history["energy_kinetic"] + history["energy_strain"]))
-        rows = [[label, number(ends[name]), number(ends[name] / most)] for name, label, *_ in LEDGER if ends.get(name)]
+        rows = [
+            [label, number(ends[name]), number(ends[name] / most)]
+            for name, label, *_ in LEDGER
+            if ends.get(name)
+        ]
         tables.append(Table(HEADERS["energies"], rows))
         defect = float(np.max(np.abs(history["energy_defect"]))) / most
         said.append(SAY["ledger"].format(defect=defect, most=most))
@@ -171,17 +242,30 @@ def _certificate(run: RunFolder) -> Section:
 
 
 def _peaks(run: RunFolder) -> Section:
-    rows = [[one.name, one.quantity, one.unit, *map(number, (one.max, one.t_max, one.min, one.t_min))]
-            for one in peaks(run.history, run.columns)]
-    return Section("Peak values of all columns", tables=[Table(HEADERS["peaks"], rows, sortable=True)])
+    rows = [
+        [one.name, one.quantity, one.unit, *map(number, (one.max, one.t_max, one.min, one.t_min))]
+        for one in peaks(run.history, run.columns)
+    ]
+    return Section(
+        "Peak values of all columns", tables=[Table(HEADERS["peaks"], rows, sortable=True)]
+    )
 
 
 def header_facts(run: RunFolder) -> list[tuple[str, str]]:
     """Return (name, value) of what the report says first: of the method, and of the outcome; a dash for unknown."""
     t, facts = run.history["t"], {key: one for key, one in run.facts.items() if one is not None}
-    facts |= {"count": len(t) - 1, "first": t[0], "last": t[-1], "worst": np.max(run.history["certificate"]),
-              "own": facts.get("versions", {}).get("vi_contact", "-"), "status": facts.get("status", "not ended"),
-              "mean": facts.get("iterations_per_step", {}).get("mean", np.nan)}
+    facts |= {
+        "count": len(t) - 1,
+        "first": t[0],
+        "last": t[-1],
+        "worst": np.max(run.history["certificate"]),
+        "own": facts.get("versions", {}).get("vi_contact", "-"),
+        "status": facts.get("status", "not ended"),
+        "mean": facts.get("iterations_per_step", {}).get("mean", np.nan),
+    }
     known: dict[str, Any] = defaultdict(lambda: "-")
     known |= {key: number(one) if isinstance(one, float) else one for key, one in facts.items()}
-    return [(name, shorten(text.format_map(known), 78, placeholder=" …")) for name, text in WORDS["header"].items()]
+    return [
+        (name, shorten(text.format_map(known), 78, placeholder=" …"))
+        for name, text in WORDS["header"].items()
+    ]

@@ -9,7 +9,14 @@ from ..core.algebra import Array
 from .faces import add_polygons, limit, sheet
 from .histories import plain
 
-LINES = ("tab:green", "tab:blue", "tab:purple", "tab:brown", "tab:olive", "tab:cyan")  # what holds the bodies
+LINES = (
+    "tab:green",
+    "tab:blue",
+    "tab:purple",
+    "tab:brown",
+    "tab:olive",
+    "tab:cyan",
+)  # what holds the bodies
 MARKS = {  # kind of node of a contact boundary -> how it is marked
     "shared by both sides": ("s", "black"),
     "clamped": ("^", "black"),
@@ -32,18 +39,35 @@ def sketch(model: Mapping[str, Any]) -> Any:
     axis = axes[0, 0]
     for k, one in enumerate(model["supports"]):
         words = f"{one['kind']} {', '.join(one['components'])}: {', '.join(one['groups'])}"
-        axis.plot(*np.full((max(d, 2), 1), np.nan), lw=3.0, color=LINES[k % len(LINES)], label=plain(words))
+        axis.plot(
+            *np.full((max(d, 2), 1), np.nan),
+            lw=3.0,
+            color=LINES[k % len(LINES)],
+            label=plain(words),
+        )
         colours |= dict.fromkeys(one["groups"], LINES[k % len(LINES)])
     for one in model["outline"]:
         width, colour = (3.0, colours[one["group"]]) if one["group"] in colours else (0.8, "0.3")
-        add_polygons(axis, _points(one["lines"], d).reshape(-1, 2, max(d, 2)), edgecolors=colour, linewidths=width)
+        add_polygons(
+            axis,
+            _points(one["lines"], d).reshape(-1, 2, max(d, 2)),
+            edgecolors=colour,
+            linewidths=width,
+        )
     for k, one in enumerate(model["contact"]):
         dots = {"ls": "", "marker": "o", "ms": 3.0, "color": DOTS[k % len(DOTS)]}
         axis.plot(*_points(one["places"], d).T, label=plain(f"contact: {one['name']}"), **dots)
         for kind, places in one.get("others", {}).items():
             if kind in MARKS:
                 marker, colour = MARKS[kind]
-                marks = {"ls": "", "marker": marker, "ms": 7.0, "mfc": "none", "mec": colour, "mew": 1.4}
+                marks = {
+                    "ls": "",
+                    "marker": marker,
+                    "ms": 7.0,
+                    "mfc": "none",
+                    "mec": colour,
+                    "mew": 1.4,
+                }
                 words = plain(f"{one['name']}: {len(places)} {kind}")
                 axis.plot(*_points(places, d).T, label=words, zorder=5, **marks)
     ends = np.concatenate([_points(one["lines"], d) for one in model["outline"]])

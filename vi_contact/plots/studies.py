@@ -29,7 +29,9 @@ class DemandPanel:
 
 
 @checked
-def plot_ida(demands: Sequence[DemandPanel], path: str | Path, *, intensity: str, unit: str) -> Path:
+def plot_ida(
+    demands: Sequence[DemandPanel], path: str | Path, *, intensity: str, unit: str
+) -> Path:
     """Draw a panel for every demand: a grey curve for each record, and the fractiles. Accelerations are in g."""
     figure, ((*axes,),) = canvas(1, len(demands), (1.0 + 4.4 * len(demands), 4.6), sharey=True)
     factor, unit = _in_g(unit)
@@ -38,15 +40,22 @@ def plot_ida(demands: Sequence[DemandPanel], path: str | Path, *, intensity: str
     axes[0].set_ylabel(f"{intensity} [{unit}]")
     axes[0].set_ylim(bottom=0.0)
     handles, labels = axes[0].get_legend_handles_labels()
-    figure.suptitle(" ", fontsize=20)  # keeps room for the legend, which the layout of matplotlib 3.6 does not
+    figure.suptitle(
+        " ", fontsize=20
+    )  # keeps room for the legend, which the layout of matplotlib 3.6 does not
     columns = min(len(labels), 3 * len(demands))
     figure.legend(handles, labels, loc="upper center", ncol=columns, fontsize=8, frameon=False)
     return save(figure, path)
 
 
 @checked
-def plot_fragility(curves: Mapping[str, tuple[Callable[[Array], Array], Array]], path: str | Path, *, intensity: str,
-                   unit: str) -> Path:
+def plot_fragility(
+    curves: Mapping[str, tuple[Callable[[Array], Array], Array]],
+    path: str | Path,
+    *,
+    intensity: str,
+    unit: str,
+) -> Path:
     """Draw the probability that each limit is passed, (3, n) lower bound, curve, upper bound at intensities (n,), and
     the brackets (records, 2) that it is fitted to, one above the other."""
     figure, ((axis,),) = canvas(1, 1, (6.4, 4.4))
@@ -59,9 +68,21 @@ def plot_fragility(curves: Mapping[str, tuple[Callable[[Array], Array], Array]],
         axis.fill_between(factor * x, low, high, color=colour, alpha=0.15, lw=0.0)
         first, last = brackets[np.lexsort(brackets.T)].T
         shares = (np.arange(len(first)) + 0.5) / len(first)
-        axis.hlines(shares, factor * first, factor * np.minimum(last, x[-1]), color=colour, lw=0.8, alpha=0.6)
-    axis.set(xlabel=f"{intensity} [{unit}]", ylabel="probability that the limit is passed [-]", ylim=(0.0, 1.0),
-             xlim=(0.0, factor * x[-1]), title="Fit, its 95 % band, and where each record first passes")
+        axis.hlines(
+            shares,
+            factor * first,
+            factor * np.minimum(last, x[-1]),
+            color=colour,
+            lw=0.8,
+            alpha=0.6,
+        )
+    axis.set(
+        xlabel=f"{intensity} [{unit}]",
+        ylabel="probability that the limit is passed [-]",
+        ylim=(0.0, 1.0),
+        xlim=(0.0, factor * x[-1]),
+        title="Fit, its 95 % band, and where each record first passes",
+    )
     axis.legend(fontsize=8, frameon=False, loc="lower right")
     return save(figure, path)
 
@@ -80,10 +101,22 @@ def _draw(axis: Any, panel: DemandPanel, level: float) -> None:
     for number, (record, (intensity, demand)) in enumerate(panel.curves.items()):
         label = plain(record) if few else "a record" if number == 0 else None
         mark = marks[number] if few else None
-        axis.plot(factor * demand, level * intensity, marker=mark, color="0.65", lw=0.9, ms=4, label=label)
+        axis.plot(
+            factor * demand, level * intensity, marker=mark, color="0.65", lw=0.9, ms=4, label=label
+        )
     if len(panel.levels) > 1:
         for values, (name, colour, style) in zip(panel.fractiles.T, _FRACTILES, strict=True):
-            axis.plot(factor * values, level * panel.levels, color=colour, ls=style, lw=1.6, label=name)
+            axis.plot(
+                factor * values, level * panel.levels, color=colour, ls=style, lw=1.6, label=name
+            )
     if len(panel.failed):
-        axis.plot(np.ones(len(panel.failed)), level * np.array(panel.failed), "x", color="tab:red", ms=7, clip_on=False,
-                  transform=axis.get_yaxis_transform(), label="run failed")
+        axis.plot(
+            np.ones(len(panel.failed)),
+            level * np.array(panel.failed),
+            "x",
+            color="tab:red",
+            ms=7,
+            clip_on=False,
+            transform=axis.get_yaxis_transform(),
+            label="run failed",
+        )

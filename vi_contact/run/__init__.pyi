@@ -18,4 +18,22 @@ from .static import static_equilibrium as static_equilibrium
 from .time_steps import HalvedAtImpact as HalvedAtImpact
 from .time_steps import Schedule as Schedule
 
-__all__: list[str] = ['Contact', 'CrossChecked', 'Energy', 'HalvedAtImpact', 'Probe', 'RunFolder', 'Schedule', 'Solution', 'cross_check', 'march', 'march_many', 'quasi_static', 'read_run', 'simulate', 'simulate_many', 'static_equilibrium', 'with_defaults']
+__all__: list[str] = [
+    "Contact",
+    "CrossChecked",
+    "Energy",
+    "HalvedAtImpact",
+    "Probe",
+    "RunFolder",
+    "Schedule",
+    "Solution",
+    "cross_check",
+    "march",
+    "march_many",
+    "quasi_static",
+    "read_run",
+    "simulate",
+    "simulate_many",
+    "static_equilibrium",
+    "with_defaults",
+]

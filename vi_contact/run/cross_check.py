@@ -56,8 +56,10 @@ class CrossChecked:
         for one in several("CrossChecked", "others", self.others, "give a list of solvers"):
             check_solver("CrossChecked", one, "a solver")
         if not len(self.others):
-            raise InputError("CrossChecked: others names no solver, so that nothing is compared; give one or more, or "
-                             "the first solver alone")
+            raise InputError(
+                "CrossChecked: others names no solver, so that nothing is compared; give one or more, or "
+                "the first solver alone"
+            )
         self.found = [Disagreement() for _ in self.others]
         self._earlier, self._last = self.found, (-1, 0.0)
 
@@ -73,7 +75,9 @@ class CrossChecked:
         for solver in (self.primary, *self.others):
             solver.check(problem)
 
-    def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> "PreparedCrossCheck":
+    def prepare(
+        self, A: EffectiveMatrix, surface: ContactSurface, scale: float
+    ) -> "PreparedCrossCheck":
         """Return all solvers prepared on the same matrix."""
         solvers = [solver.prepare(A, surface, scale) for solver in (self.primary, *self.others)]
         return PreparedCrossCheck(self, solvers, surface)
@@ -82,9 +86,11 @@ class CrossChecked:
         """Return, by method, relative differences in u, r_n and, with friction, r_t, iterations per step: what
         summary.json shows. A name that comes again gets a number."""
         names = [one.method for one in self.found]
-        return {name if names.count(name) == 1 else f"{name} #{rank}":
-                one.relative | {"iterations_per_step": one.iterations / max(one.steps, 1)}
-                for rank, (name, one) in enumerate(zip(names, self.found, strict=True), start=1)}
+        return {
+            name if names.count(name) == 1 else f"{name} #{rank}": one.relative
+            | {"iterations_per_step": one.iterations / max(one.steps, 1)}
+            for rank, (name, one) in enumerate(zip(names, self.found, strict=True), start=1)
+        }
 
     @property
     def worst(self) -> float:
@@ -110,17 +116,32 @@ class PreparedCrossCheck:
     def _compare(self, result: StepResult, other: StepResult, found: Disagreement) -> None:
         pairs = {"u": (other.x, result.x), "r_n": (other.r_n, result.r_n)}
         if result.r_t is not None:
-            pairs["r_t"] = (np.zeros_like(result.r_t) if other.r_t is None else other.r_t, result.r_t)
-        sizes = np.array([[max_abs((its - own).ravel()), max_abs(own.ravel())] for its, own in pairs.values()])
+            pairs["r_t"] = (
+                np.zeros_like(result.r_t) if other.r_t is None else other.r_t,
+                result.r_t,
+            )
+        sizes = np.array(
+            [[max_abs((its - own).ravel()), max_abs(own.ravel())] for its, own in pairs.values()]
+        )
         for name, (off, size) in zip(pairs, self.surface.comm.max(sizes).tolist(), strict=True):
-            found.off[name], found.size[name] = max(found.off.get(name, 0.0), off), max(found.size.get(name, 0.0), size)
+            found.off[name], found.size[name] = (
+                max(found.off.get(name, 0.0), off),
+                max(found.size.get(name, 0.0), size),
+            )
         found.method = other.method
         found.iterations += other.iterations
         found.steps += 1
 
 
-def cross_check(problem: ContactProblem, *, scheme: Scheme | None = None, solvers: Sequence[Solver], dt: TimeSteps,
-                steps: int, state: State | None = None) -> CrossChecked:
+def cross_check(
+    problem: ContactProblem,
+    *,
+    scheme: Scheme | None = None,
+    solvers: Sequence[Solver],
+    dt: TimeSteps,
+    steps: int,
+    state: State | None = None,
+) -> CrossChecked:
     """March with the first solver and compare the others with it at every step. ``report()`` of the result tells.
 
     ``dt`` and ``steps`` as in ``march``: ``steps`` counts base steps, the statistics all accepted ones."""

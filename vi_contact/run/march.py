@@ -17,9 +17,18 @@ from .method import Method, checked_method
 from .time_steps import StepPlan, TimeSteps, step_plan
 
 
-def march(problem: ContactProblem, *, scheme: Scheme | None = None, solver: Solver | None = None, dt: TimeSteps,
-          steps: int | None = None, t_end: float | None = None, state: State | None = None,
-          escalation: Sequence[Solver] = (), tolerance: float = TOLERANCE) -> Iterator[tuple[State, Report]]:
+def march(
+    problem: ContactProblem,
+    *,
+    scheme: Scheme | None = None,
+    solver: Solver | None = None,
+    dt: TimeSteps,
+    steps: int | None = None,
+    t_end: float | None = None,
+    state: State | None = None,
+    escalation: Sequence[Solver] = (),
+    tolerance: float = TOLERANCE,
+) -> Iterator[tuple[State, Report]]:
     """Yield (state, report) after every certified step.
 
     If ``scheme`` is None, or the problem names no mass matrix, ``run.method.with_defaults`` chooses them, and
@@ -30,8 +39,17 @@ def march(problem: ContactProblem, *, scheme: Scheme | None = None, solver: Solv
     A step whose certificate exceeds ``tolerance`` goes to the solvers of ``escalation`` in turn. If all of them fail,
     StepFailure is raised with step, time, residuals and advice. ``state`` is that of a static stage or a checkpoint.
     InputError is raised at the call: arguments of the wrong kind, a state of another problem or inside the obstacle."""
-    method = checked_method("march", problem, scheme, (solver, escalation), dt, steps=steps, t_end=t_end, state=state,
-                            tolerance=tolerance)
+    method = checked_method(
+        "march",
+        problem,
+        scheme,
+        (solver, escalation),
+        dt,
+        steps=steps,
+        t_end=t_end,
+        state=state,
+        tolerance=tolerance,
+    )
     with together(method.problem.surface.comm):
         state = initial_state(method.problem) if state is None else state
     return iter(March(method, step_plan(dt, steps, t_end, state.t), state))
@@ -44,7 +62,9 @@ class March:
         base: base steps done. ended: whether this step ended one, so that a restart may begin here.
         dt: the length of this step [s]. halved: attempts that were thrown away."""
 
-    def __init__(self, method: Method, step_plan: StepPlan, state: State, base: int = 0, halved: int = 0) -> None:
+    def __init__(
+        self, method: Method, step_plan: StepPlan, state: State, base: int = 0, halved: int = 0
+    ) -> None:
         self.method, self.step_plan, self.state = method, step_plan, state
         self.prepared: dict[float, tuple[EffectiveMatrix, CertifiedSolver]] = {}
         self.base, self.halved, self.ended, self.dt = base, halved, True, float("nan")
@@ -56,7 +76,9 @@ class March:
             self.method.bind()  # another run of the problem may be under way
             if not sizes or sizes[0] != dt:
                 sizes = [dt / 2**level for level in range(self.step_plan.halvings + 1)]
-                self.prepared = {size: self.prepared[size] for size in sizes if size in self.prepared}
+                self.prepared = {
+                    size: self.prepared[size] for size in sizes if size in self.prepared
+                }
             self.state, self.dt = self._restarted(dt), dt
             levels = [0]  # how often the parts of the base step that are left were halved
             while levels:
@@ -92,7 +114,9 @@ class March:
             A = scheme.effective_matrix(problem, dt) if A is None else A
             step = scheme.step(problem, state, A, dt)
         if solver is None:
-            solver = CertifiedSolver(problem, A, step.scale, self.method.solvers, self.method.tolerance)
+            solver = CertifiedSolver(
+                problem, A, step.scale, self.method.solvers, self.method.tolerance
+            )
             self.prepared[dt] = A, solver
         if problem.surface.watched:
             problem.surface.refuse_driven(step.t)
@@ -109,7 +133,9 @@ class March:
         return Report(problem, state, new, free.v, step, result, certificate, averages, escalated)
 
 
-def after_impact(problem: ContactProblem, scheme: Scheme, old: State, new: State, dt: float) -> State:
+def after_impact(
+    problem: ContactProblem, scheme: Scheme, old: State, new: State, dt: float
+) -> State:
     """Return the state with the impact law applied; points on massless supports (springs) do not collide."""
     law, surface = problem.impact, problem.surface
     if law is None:
@@ -117,8 +143,14 @@ def after_impact(problem: ContactProblem, scheme: Scheme, old: State, new: State
     active = new.active & surface.rigid
     if not surface.some(active):
         return new
-    impact = Impact(surface.normal_values(old.v), surface.normal_values(new.v), active, active & ~old.active)
-    target = users(f"the impact law {type(law).__name__}", lambda: law.target(impact), np.full(surface.count, np.nan))
+    impact = Impact(
+        surface.normal_values(old.v), surface.normal_values(new.v), active, active & ~old.active
+    )
+    target = users(
+        f"the impact law {type(law).__name__}",
+        lambda: law.target(impact),
+        np.full(surface.count, np.nan),
+    )
     if not surface.some(~np.isnan(target)):
         return new
     return scheme.jump(problem, new, law.apply(problem.equations, surface, new.v, target), dt)

@@ -14,10 +14,18 @@ from .time_steps import TimeSteps, step_plan
 from .together import Together, grouped
 
 
-def march_many(problems: Sequence[ContactProblem], *, scheme: Scheme | None = None, solver: Solver | None = None,
-               dt: TimeSteps, steps: int | Sequence[int] | None = None, t_end: float | Sequence[float] | None = None,
-               states: Sequence[State | None] | None = None, escalation: Sequence[Solver] = (),
-               tolerance: float = TOLERANCE) -> Iterator[tuple[int, Report | ViContactError]]:
+def march_many(
+    problems: Sequence[ContactProblem],
+    *,
+    scheme: Scheme | None = None,
+    solver: Solver | None = None,
+    dt: TimeSteps,
+    steps: int | Sequence[int] | None = None,
+    t_end: float | Sequence[float] | None = None,
+    states: Sequence[State | None] | None = None,
+    escalation: Sequence[Solver] = (),
+    tolerance: float = TOLERANCE,
+) -> Iterator[tuple[int, Report | ViContactError]]:
     """Yield (number of the run, report) after every certified step, a step of each run in turn.
 
     A run that fails yields its error, last; the others go on. ``steps`` or ``t_end``: one for all, or one for each run,
@@ -31,13 +39,24 @@ def march_many(problems: Sequence[ContactProblem], *, scheme: Scheme | None = No
     MoreauJean), with other solvers than Condensed() of ActiveSet(), or of any method for friction, and without CHOLMOD.
     """
     given = several("march_many", "problems", problems, "give a list of ContactProblems")
-    every = [list(_each(name, value, len(given))) for name, value in
-             (("steps", steps), ("t_end", t_end), ("states", states))]
+    every = [
+        list(_each(name, value, len(given)))
+        for name, value in (("steps", steps), ("t_end", t_end), ("states", states))
+    ]
     runs: list[Together] = []
     for problem, count, end, state in zip(given, *every, strict=True):
         problem, scheme = with_defaults(problem, scheme, [run.method.problem for run in runs])
-        method = checked_method("march_many", problem, scheme, (solver, escalation), dt, steps=count, t_end=end,
-                                state=state, tolerance=tolerance)
+        method = checked_method(
+            "march_many",
+            problem,
+            scheme,
+            (solver, escalation),
+            dt,
+            steps=count,
+            t_end=end,
+            state=state,
+            tolerance=tolerance,
+        )
         state = initial_state(method.problem) if state is None else state
         plan = step_plan(dt, count, end, state.t)
         runs.append(Together(method, plan, scheme.start(method.problem, state, plan.dt(0))))
@@ -50,7 +69,9 @@ def _each(name: str, value: Any, count: int) -> Sequence[Any]:
     if not isinstance(value, Sequence):
         return [value] * count
     if len(value) != count:
-        raise InputError(f"march_many has {len(value)} {name} for {count} problems: give one for each")
+        raise InputError(
+            f"march_many has {len(value)} {name} for {count} problems: give one for each"
+        )
     return value
 
 

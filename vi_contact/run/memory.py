@@ -12,11 +12,19 @@ def memory(problem: ContactProblem, A: EffectiveMatrix | None) -> dict[str, Any]
     """Return peak_bytes, the largest resident memory of every rank so far, and the bytes, of all ranks together, of
     what tells them: the matrices of all bases, A, its factor, the mesh. Collective."""
     comm, systems = problem.system.algebra.comm, (problem.system, problem.turned, problem.equations)
-    owners: dict[str, list[Any]] = {name: [getattr(one, name) for one in systems] for name in ("K", "M", "C")}
-    owners |= {"A": [A and A.matrix], "factor": [A.factor if A and A.factorised else None], "mesh": [systems[0].space]}
+    owners: dict[str, list[Any]] = {
+        name: [getattr(one, name) for one in systems] for name in ("K", "M", "C")
+    }
+    owners |= {
+        "A": [A and A.matrix],
+        "factor": [A.factor if A and A.factorised else None],
+        "mesh": [systems[0].space],
+    }
     known: dict[str, int] = {}
     for name, things in owners.items():
-        found = total(comm, sum(getattr(one, "bytes", 0) for one in {id(one): one for one in things}.values()))
+        found = total(
+            comm, sum(getattr(one, "bytes", 0) for one in {id(one): one for one in things}.values())
+        )
         if found:
             known[name] = round(found)
     return {"peak_bytes": from_each(comm, 1024 * getrusage(RUSAGE_SELF).ru_maxrss), "bytes": known}

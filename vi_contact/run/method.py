@@ -40,20 +40,43 @@ class Method:
             companion.bind(self.scheme, self.dt)
 
 
-def checked_method(owner: str, problem: ContactProblem, scheme: Scheme | None,
-                   solvers: tuple[Solver | None, Sequence[Solver]], dt: TimeSteps, *, steps: int | None,
-                   t_end: float | None, state: State | None, tolerance: float) -> Method:
+def checked_method(
+    owner: str,
+    problem: ContactProblem,
+    scheme: Scheme | None,
+    solvers: tuple[Solver | None, Sequence[Solver]],
+    dt: TimeSteps,
+    *,
+    steps: int | None,
+    t_end: float | None,
+    state: State | None,
+    tolerance: float,
+) -> Method:
     """Return the method with its defaults; ``solvers``: the first one, None for Automatic(), and the escalation.
 
     InputError for arguments of the wrong kind, and a state of another problem or inside the obstacle. Collective."""
     check_problem_given(owner, problem)
     comm = problem.surface.comm
-    agree(comm, owner, {"scheme": scheme, "solver": solvers[0], "escalation": solvers[1], "dt": dt, "steps": steps,
-                        "t_end": t_end, "state": Parts(state), "tolerance": tolerance})
+    agree(
+        comm,
+        owner,
+        {
+            "scheme": scheme,
+            "solver": solvers[0],
+            "escalation": solvers[1],
+            "dt": dt,
+            "steps": steps,
+            "t_end": t_end,
+            "state": Parts(state),
+            "tolerance": tolerance,
+        },
+    )
     check_methods(owner, *solvers, tolerance)
     problem, scheme = with_defaults(problem, scheme)
     first, others = solvers
-    method = Method(problem, scheme, [Automatic() if first is None else first, *others], dt, tolerance)
+    method = Method(
+        problem, scheme, [Automatic() if first is None else first, *others], dt, tolerance
+    )
     size = step_plan(dt, steps, t_end, start_time(owner, state)).dt(0)
     with together(comm):  # what is the user's own may fail on one rank
         method.bind()
@@ -62,13 +85,16 @@ def checked_method(owner: str, problem: ContactProblem, scheme: Scheme | None,
         method.solvers[0].check(problem)
         if state is not None:
             check_state(owner, problem, state, dt=size, tolerance=tolerance, scheme=scheme)
-    if problem.system.floating and state is None:  # what continues a run was looked at when it began
+    if (
+        problem.system.floating and state is None
+    ):  # what continues a run was looked at when it began
         refuse_loose_bodies(problem)
     return method
 
 
-def with_defaults(problem: ContactProblem, scheme: Scheme | None,
-                  others: Sequence[ContactProblem] = ()) -> tuple[ContactProblem, Scheme]:
+def with_defaults(
+    problem: ContactProblem, scheme: Scheme | None, others: Sequence[ContactProblem] = ()
+) -> tuple[ContactProblem, Scheme]:
     """Return the problem with a mass matrix and the scheme to run it with.
 
     Without a scheme: the trapezoidal rule on redistributed mass; with an impact law, or with mass at the contact nodes
@@ -79,15 +105,27 @@ def with_defaults(problem: ContactProblem, scheme: Scheme | None,
         check_problem_given("march", one)
     if scheme is None:
         massive = problem.mass is not None and isinstance(problem.mass, ConsistentMass)
-        scheme = Trapezoidal() if problem.impact is None and not massive else ZienkiewiczWoodTaylor()
-    provides("march", "scheme", scheme, SCHEME, "give a time scheme, such as Trapezoidal(), or None")
+        scheme = (
+            Trapezoidal() if problem.impact is None and not massive else ZienkiewiczWoodTaylor()
+        )
+    provides(
+        "march", "scheme", scheme, SCHEME, "give a time scheme, such as Trapezoidal(), or None"
+    )
     problem = problem if problem.mass is not None else replace(problem, mass=scheme.mass)
-    return next((one for other in others if (one := problem.beside(other)) is not None), problem), scheme
+    return next(
+        (one for other in others if (one := problem.beside(other)) is not None), problem
+    ), scheme
 
 
 def check_solver(owner: str, value: Any, meaning: str = "solver") -> None:
     """Raise InputError unless it is a solver of steps."""
-    provides(owner, meaning, value, ("check", "prepare"), "give a solver, such as Condensed() or Volume()")
+    provides(
+        owner,
+        meaning,
+        value,
+        ("check", "prepare"),
+        "give a solver, such as Condensed() or Volume()",
+    )
 
 
 def check_methods(owner: str, solver: Any, escalation: Any, tolerance: Any) -> None:
@@ -97,10 +135,14 @@ def check_methods(owner: str, solver: Any, escalation: Any, tolerance: Any) -> N
     for one in several(owner, "escalation", escalation, "give a list of solvers"):
         check_solver(owner, one, "a solver of escalation")
     if not 0.0 < real(tolerance) <= 1.0:
-        raise InputError(f"{owner}: tolerance is {shown(tolerance)}; give a relative residual above 0, such as 1e-9")
+        raise InputError(
+            f"{owner}: tolerance is {shown(tolerance)}; give a relative residual above 0, such as 1e-9"
+        )
 
 
-def check_state(owner: str, problem: ContactProblem, state: State, *, dt: float, tolerance: float, scheme: Any) -> None:
+def check_state(
+    owner: str, problem: ContactProblem, state: State, *, dt: float, tolerance: float, scheme: Any
+) -> None:
     """Raise InputError, on all ranks, for a state of another problem, or one that penetrates the obstacle. Collective.
 
     A scheme that ``penetrates``, whose condition is one on velocities, may go on from states of its own runs (k > 0).
@@ -114,5 +156,7 @@ def check_state(owner: str, problem: ContactProblem, state: State, *, dt: float,
     inside, *sizes = surface.comm.max(np.array([np.max(-gap, initial=-np.inf), *moved]))
     if inside > SLACK * tolerance * max(sizes):
         worst = np.concatenate(from_each(surface.comm, surface.points[gap == -inside]))[0]
-        raise InputError(f"{owner}: the state is {inside:.3g} m inside the obstacle at {at(worst)}: give a state "
-                         "with every gap >= 0")
+        raise InputError(
+            f"{owner}: the state is {inside:.3g} m inside the obstacle at {at(worst)}: give a state "
+            "with every gap >= 0"
+        )

@@ -75,9 +75,16 @@ class Proximal:
 
     step: StepProblem
 
-    def __init__(self, problem: ContactProblem, K: EffectiveMatrix, solver: Solver, tolerance: float) -> None:
+    def __init__(
+        self, problem: ContactProblem, K: EffectiveMatrix, solver: Solver, tolerance: float
+    ) -> None:
         solver.check(problem)
-        self._system, self._surface, self._K, self._solver = problem.static_load, problem.surface, K, solver
+        self._system, self._surface, self._K, self._solver = (
+            problem.static_load,
+            problem.surface,
+            K,
+            solver,
+        )
         self._bodies = RigidBodies(problem)
         self._weak = body_springs(problem)
         self._tolerance = tolerance
@@ -115,8 +122,10 @@ class Proximal:
             self._stiffen(STIFFER)
         if progress.best is not None and progress.certified:
             return progress.best
-        raise StepFailure(f"the static stage of a body held by contact alone was not solved ({why}): start closer to "
-                          "the obstacle, use stiffer supports, the solver Condensed(), or hold a part of the body")
+        raise StepFailure(
+            f"the static stage of a body held by contact alone was not solved ({why}): start closer to "
+            "the obstacle, use stiffer supports, the solver Condensed(), or hold a part of the body"
+        )
 
     def _iterate(self, answer: StepResult, progress: _Progress) -> None:
         """From the answer; StepFailure of the solver, or when it has spent too many iterations."""
@@ -127,7 +136,10 @@ class Proximal:
             inner = self._left_over(answer, share, centre, carried)
             found = self._prepared.solve(inner)
             result = added(self.step, answer, found, share)
-            worst, new = self.certificate(result).worst, self._motion(result.x - centre, found.active)
+            worst, new = (
+                self.certificate(result).worst,
+                self._motion(result.x - centre, found.active),
+            )
             progress.take(result, worst, new.pace)
             if progress.certified and progress.vain == 2:
                 return
@@ -155,12 +167,19 @@ class Proximal:
         reaction = inner.surface.reaction_load(found.r_n, len(found.x), found.r_t)
         return self._bodies.resultants(inner.b - self._springs @ found.x - reaction)
 
-    def _left_over(self, answer: StepResult, share: float, centre: Array, carried: Array) -> StepProblem:
+    def _left_over(
+        self, answer: StepResult, share: float, centre: Array, carried: Array
+    ) -> StepProblem:
         """The next step, b with the forces' own resultants: K u has none, and its round-off would move the body."""
         left, x, surface = left_over(self.step, answer, share), answer.x, self.step.surface
         r_n, r_t = kept(self.step, answer, share)
         forces = self.step.b - surface.reaction_load(r_n, len(x), r_t)
-        b = left.b + self._bodies.resultants(forces - left.b) + self._springs @ (centre - x) + carried
+        b = (
+            left.b
+            + self._bodies.resultants(forces - left.b)
+            + self._springs @ (centre - x)
+            + carried
+        )
         return replace(left, A=self._A, b=b)
 
     def _motion(self, d: Array, active: Mask) -> _Motion:
@@ -176,13 +195,18 @@ class Proximal:
     def _refuse_flight(self, motion: _Motion) -> None:
         """InputError for a driven rigid motion without end."""
         system, energy = self._system, motion.pace**2
-        bending, work = 2.0 * system.strain_energy(motion.d), system.algebra.dot(self.step.b, motion.d)
+        bending, work = (
+            2.0 * system.strain_energy(motion.d),
+            system.algebra.dot(self.step.b, motion.d),
+        )
         stopped = self.step.surface.some(self._closes(motion))
         if energy == 0.0 or bending > RIGID * energy or work < DRIVEN * energy or stopped:
             return
-        raise InputError(f"the body has no static equilibrium: its loads {self._way(motion.d)} and neither contact nor "
-                         "a prescribed displacement stops it: hold it there, change the loads, or start the dynamics "
-                         "from rest")
+        raise InputError(
+            f"the body has no static equilibrium: its loads {self._way(motion.d)} and neither contact nor "
+            "a prescribed displacement stops it: hold it there, change the loads, or start the dynamics "
+            "from rest"
+        )
 
     def _way(self, d: Array) -> str:
         """Where a motion goes: the direction of its momentum, if it has one."""
@@ -204,7 +228,9 @@ class Proximal:
         surface, ratio = self.step.surface, new.pace / old.pace
         rows = self._closes(new) & ~result.active
         gap = (self.step.bound - surface.normal_values(result.x))[rows]
-        stop = -largest(surface.comm, np.max(-np.maximum(gap, 0.0) / new.closing[rows], initial=-np.inf))
+        stop = -largest(
+            surface.comm, np.max(-np.maximum(gap, 0.0) / new.closing[rows], initial=-np.inf)
+        )
         ahead = min(stop, ratio / (1.0 - ratio) if ratio < UNBRAKED else np.inf)
         off, force = new.d - ratio * old.d, new.pull - ratio * old.pull
         aside = float(np.sqrt(max(self._system.algebra.dot(off, force), 0.0)))

@@ -26,8 +26,11 @@ _COLUMNS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding=
 
 def _named(words: Mapping[str, Sequence[str]], axes: str) -> Columns:
     """Columns of a table of recorders.toml, for these axes."""
-    return {name.format(axis=one): (unit, meaning.format(axis=one)) for name, (unit, meaning) in words.items()
-            for one in (axes if "{axis}" in name else "-")}
+    return {
+        name.format(axis=one): (unit, meaning.format(axis=one))
+        for name, (unit, meaning) in words.items()
+        for one in (axes if "{axis}" in name else "-")
+    }
 
 
 def refuse_overflow(row: Row) -> None:
@@ -36,8 +39,10 @@ def refuse_overflow(row: Row) -> None:
         if not isinstance(value, float) or isfinite(value):
             continue
         if np.isinf(value) or name.startswith(("energy_", "work_", "loss_")):
-            raise StepFailure(f"step {row['k']} at t = {row['t']:.6g} s: {name} is {value}, too large for the "
-                              "machine: check the sizes and units of loads, motions and initial data")
+            raise StepFailure(
+                f"step {row['k']} at t = {row['t']:.6g} s: {name} is {value}, too large for the "
+                "machine: check the sizes and units of loads, motions and initial data"
+            )
 
 
 class Steps:
@@ -49,19 +54,25 @@ class Steps:
         """Name t, k, iterations, certificate, escalated, a_g_x, …"""
         return _named(_COLUMNS["steps"], self._axes)
 
-    def _row(self, state: State, iterations: int = 0, certificate: float = 0.0, escalated: bool = False) -> Row:
+    def _row(
+        self, state: State, iterations: int = 0, certificate: float = 0.0, escalated: bool = False
+    ) -> Row:
         ground = self._problem.ground_acceleration(state.t).tolist()
         values = (state.t, state.k, int(iterations), certificate, int(escalated), *ground)
         return dict(zip(self._names, values, strict=True))
 
-    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
+    def start(
+        self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
+    ) -> Row:
         """Return the initial row: no iterations and no certificate were needed, so zeros."""
         self._problem, self._axes = problem, AXES[: problem.system.influence.shape[1]]
         self._names = tuple(self.columns())
         return self._row(state)
 
     def row(self, report: Report) -> Row:
-        return self._row(report.new, report.result.iterations, report.certificate.worst, report.escalated)
+        return self._row(
+            report.new, report.result.iterations, report.certificate.worst, report.escalated
+        )
 
 
 class Energy:
@@ -76,42 +87,71 @@ class Energy:
     motions. The defect is the summed work of the residual of the equation of motion; ``summary.json`` has its size over
     the largest energy or work. Each step costs three products, and damping and impacts cost one more each."""
 
-    _COLUMNS: ClassVar[Columns] = {name: ("J", meaning) for name, meaning in WORDS["columns"].items()}
+    _COLUMNS: ClassVar[Columns] = {
+        name: ("J", meaning) for name, meaning in WORDS["columns"].items()
+    }
     _SUMS = tuple(_COLUMNS)[2:]
 
     def columns(self) -> Columns:
         """Name energy_kinetic, energy_strain, work_input, loss_*, energy_defect."""
         return self._COLUMNS
 
-    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
+    def start(
+        self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
+    ) -> Row:
         """Return the initial energies; works and losses are zero, or those of the run that is continued."""
         self._problem = problem
-        self._now, self._stored = energies(problem.equations, state.u, state.v), self._of_strains(state)
+        self._now, self._stored = (
+            energies(problem.equations, state.u, state.v),
+            self._of_strains(state),
+        )
         self._sums = {term: 0.0 if resumed is None else float(resumed[term]) for term in self._SUMS}
         return self._row()
 
     def _row(self) -> Row:
-        return {"energy_kinetic": self._now.kinetic, "energy_strain": self._now.strain + self._stored, **self._sums}
+        return {
+            "energy_kinetic": self._now.kinetic,
+            "energy_strain": self._now.strain + self._stored,
+            **self._sums,
+        }
 
     def _of_strains(self, state: State) -> float:
         """What initial strains add to ½ uᵀKu [J]."""
         initial = getattr(getattr(self._problem.system.space, "forms", None), "initial", None)
-        return 0.0 if initial is None else float(initial.energy(self._problem.cartesian(state.u), state.t))
+        return (
+            0.0
+            if initial is None
+            else float(initial.energy(self._problem.cartesian(state.u), state.t))
+        )
 
     def row(self, report: Report) -> Row:
         system, new = self._problem.equations, report.new
         end = new if new.v is report.v_minus else new.with_velocity(report.v_minus)
         with np.errstate(over="ignore", invalid="ignore"):  # refuse_overflow tells of it
             free = energies(system, new.u, report.v_minus)
-            step = energy_balance(self._problem, report.old, end, report.balance, before=self._now, after=free)
+            step = energy_balance(
+                self._problem, report.old, end, report.balance, before=self._now, after=free
+            )
             self._now = free
             if new.v is not report.v_minus:  # the impact law changed it; displacements do not jump
                 momentum = system.product("M", new.v)
                 kinetic = 0.5 * system.algebra.dot(new.v, momentum)
                 self._now = Energies(momentum, free.elastic, kinetic, free.strain)
-        impact, before, self._stored = free.kinetic - self._now.kinetic, self._stored, self._of_strains(new)
+        impact, before, self._stored = (
+            free.kinetic - self._now.kinetic,
+            self._stored,
+            self._of_strains(new),
+        )
         work = step.input + (self._stored - before)
-        losses = (work, step.damping, step.contact, step.friction, impact, step.algorithmic, step.defect)
+        losses = (
+            work,
+            step.damping,
+            step.contact,
+            step.friction,
+            impact,
+            step.algorithmic,
+            step.defect,
+        )
         for term, loss in zip(self._SUMS, losses, strict=True):
             self._sums[term] += loss
         return self._row()
@@ -121,7 +161,9 @@ def told_pressures(surface: ContactSurface) -> Mask | None:
     """Return the conditions (m,) of this rank whose pressure counts among the largest, None for all of them.
 
     Where all on all ranks are ``uncovered`` all count. Collective."""
-    uncovered = np.zeros(surface.count, dtype=bool) if surface.uncovered is None else surface.uncovered
+    uncovered = (
+        np.zeros(surface.count, dtype=bool) if surface.uncovered is None else surface.uncovered
+    )
     left_out = total(surface.comm, np.count_nonzero(uncovered))
     return ~uncovered if 0 < left_out < surface.total else None
 
@@ -151,10 +193,16 @@ class Contact:
 
     def columns(self) -> Columns:
         """Name contact_uplift, contact_resultant, … and the arrays pressure, gap, active. Call ``start`` first."""
-        every = _named(_COLUMNS["contact"] | (_COLUMNS["friction"] if self._frictional else {}), self._axes)
-        return {name: about for name, about in every.items() if self.arrays or name not in self._ARRAYS}
+        every = _named(
+            _COLUMNS["contact"] | (_COLUMNS["friction"] if self._frictional else {}), self._axes
+        )
+        return {
+            name: about for name, about in every.items() if self.arrays or name not in self._ARRAYS
+        }
 
-    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
+    def start(
+        self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
+    ) -> Row:
         """Return the row of the initial contact: of a gravity stage, or open."""
         surface, self._problem, self._frictional = problem.surface, problem, problem.frictional
         self._axes = AXES[: surface.points.shape[1]]
@@ -171,19 +219,36 @@ class Contact:
         gap, added = surface.gap(state.t) - surface.normal_values(state.u), np.add.reduce
         gap = gap if surface.plain else gap + surface.compliance * r_n
         pressure, rubbing = r_n / surface.weights, self._rubbing(state) if self._frictional else ()
-        sums = [float(added(surface.weights[state.active])), float(np.count_nonzero(state.active)), float(added(r_n)),
-                *(r_n @ surface.normals).tolist(), *(r_n @ surface.points).tolist()]
+        sums = [
+            float(added(surface.weights[state.active])),
+            float(np.count_nonzero(state.active)),
+            float(added(r_n)),
+            *(r_n @ surface.normals).tolist(),
+            *(r_n @ surface.points).tolist(),
+        ]
         sums = sums if surface.comm.size == 1 else surface.comm.sum(np.array(sums)).tolist()
         closed, count, resultant, *vectors = sums
-        force, place = [0.0 - one for one in vectors[:d]], vectors[d:]  # not -one: no negative zeros
+        force, place = (
+            [0.0 - one for one in vectors[:d]],
+            vectors[d:],
+        )  # not -one: no negative zeros
         depth, highest, *farthest = self._largest(gap, pressure, *rubbing[1:])
         depth = max([depth, *(-one.smallest(state.t) for one in surface.watched)])
-        values = [1.0 - closed / self._weight if self._weight else 1.0, int(count), resultant, *force,
-                  *[one / resultant if resultant else np.nan for one in place], -depth, highest]
+        values = [
+            1.0 - closed / self._weight if self._weight else 1.0,
+            int(count),
+            resultant,
+            *force,
+            *[one / resultant if resultant else np.nan for one in place],
+            -depth,
+            highest,
+        ]
         values += [*self._friction_force(state), *farthest] if self._frictional else []
         row: dict[str, Any] = dict(zip(self._numbers, values, strict=True))
         if self.arrays:
-            row.update(zip(self._ARRAYS, self._whole(pressure, gap, state.active, *rubbing), strict=False))
+            row.update(
+                zip(self._ARRAYS, self._whole(pressure, gap, state.active, *rubbing), strict=False)
+            )
         return row
 
     def _whole(self, *each: Any) -> Sequence[Any]:
@@ -200,15 +265,24 @@ class Contact:
             return [np.nan] * (2 + len(slip))
         some = len(gap) > 0
         told = pressure if self._told is None else pressure[self._told]
-        tops = [-gap.item(gap.argmin()) if some else -np.inf, told.item(told.argmax()) if len(told) else -np.inf]
+        tops = [
+            -gap.item(gap.argmin()) if some else -np.inf,
+            told.item(told.argmax()) if len(told) else -np.inf,
+        ]
         tops += [float(np.linalg.norm(one, axis=1).max()) if some else -np.inf for one in slip]
-        return tops if self._problem.surface.comm.size == 1 else self._problem.surface.comm.max(np.array(tops)).tolist()
+        return (
+            tops
+            if self._problem.surface.comm.size == 1
+            else self._problem.surface.comm.max(np.array(tops)).tolist()
+        )
 
     def _rubbing(self, state: State) -> tuple[Array, Array]:
         """Tangential tractions and slips (m, d - 1)."""
         surface = self._problem.surface
         slip = surface.slip(state.u, state.t)
-        return (np.zeros_like(slip) if state.r_t is None else state.r_t / surface.weights[:, None]), slip
+        return (
+            np.zeros_like(slip) if state.r_t is None else state.r_t / surface.weights[:, None]
+        ), slip
 
     def _friction_force(self, state: State) -> list[float]:
         surface, system = self._problem.surface, self._problem.system
@@ -236,12 +310,16 @@ class Probe:
         attributes(self, flags=("velocity", "acceleration"))
         instance("Probe", "points", self.points, Mapping, "give labels and points, {'top': (x, y)}")
         if not self.points:
-            raise InputError("Probe: points is empty; give labels and points, {'top': (x, y)}, or leave it out")
+            raise InputError(
+                "Probe: points is empty; give labels and points, {'top': (x, y)}, or leave it out"
+            )
         for label, point in self.points.items():
             column_name("probe label", label)
             array("Probe", f"the point '{label}'", point, (None,), unit="metres")
         if len({len(point) for point in self.points.values()}) > 1:
-            raise InputError("the probe points have different numbers of coordinates: give one for each dimension")
+            raise InputError(
+                "the probe points have different numbers of coordinates: give one for each dimension"
+            )
 
     def columns(self) -> Columns:
         """Name u_x_<label>, …"""
@@ -250,25 +328,35 @@ class Probe:
             quantities["v"] = ("m/s", "velocity after the impact law")
         if self.acceleration:
             quantities["a"] = ("m/s²", "absolute acceleration, mean of the step")
-        return {f"{letter}_{axis}_{label}": (unit, f"{meaning} along {axis} at point {label}")
-                for letter, (unit, meaning) in quantities.items()
-                for label, point in self.points.items() for axis in AXES[: len(point)]}
+        return {
+            f"{letter}_{axis}_{label}": (unit, f"{meaning} along {axis} at point {label}")
+            for letter, (unit, meaning) in quantities.items()
+            for label, point in self.points.items()
+            for axis in AXES[: len(point)]
+        }
 
-    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
+    def start(
+        self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
+    ) -> Row:
         """Find the nodes."""
         self._problem, dimension = problem, problem.system.space.dimension
         points = np.array(list(self.points.values()), dtype=float)
         if points.shape[1] != dimension:
             raise InputError(f"a probe point has {points.shape[1]} coordinates: give {dimension}")
         self._nodes = self._found(problem, points)
-        return self._row(state, lambda: np.tile(problem.ground_acceleration(state.t), (len(points), 1)))
+        return self._row(
+            state, lambda: np.tile(problem.ground_acceleration(state.t), (len(points), 1))
+        )
 
     def _found(self, problem: ContactProblem, points: Array) -> Indices:
         return problem.system.space.find_nodes(points)
 
     def row(self, report: Report) -> Row:
         old, new, ground = report.old.t, report.new.t, self._problem.ground_acceleration
-        return self._row(report.new, lambda: self._sample(report.balance.a, new, 2) + 0.5 * (ground(old) + ground(new)))
+        return self._row(
+            report.new,
+            lambda: self._sample(report.balance.a, new, 2) + 0.5 * (ground(old) + ground(new)),
+        )
 
     def _row(self, state: State, acceleration: Callable[[], Array]) -> Row:
         values = [self._sample(state.u, state.t, 0)]
@@ -279,4 +367,6 @@ class Probe:
         return dict(zip(self.columns(), np.concatenate(values, axis=None).tolist(), strict=True))
 
     def _sample(self, x: Array, t: float, derivative: int) -> Array:
-        return self._problem.system.space.sample(self._problem.cartesian(x), self._nodes, t, derivative)
+        return self._problem.system.space.sample(
+            self._problem.cartesian(x), self._nodes, t, derivative
+        )

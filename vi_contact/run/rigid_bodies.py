@@ -40,7 +40,9 @@ class RigidBodies:
 
     def _own(self, force: Array) -> Array:
         """Forces on the bodies themselves: û = R ǔ, R⁻¹ = 2 - R."""
-        return force if self._coupling is None else 2.0 * force - self._coupling.transpose_apply(force)
+        return (
+            force if self._coupling is None else 2.0 * force - self._coupling.transpose_apply(force)
+        )
 
 
 def body_springs(problem: ContactProblem) -> Matrix:
@@ -53,7 +55,9 @@ def body_springs(problem: ContactProblem) -> Matrix:
     system, surface = problem.turned, problem.surface
     algebra, numbers = system.algebra, np.asarray(system.space.bodies)
     count, d = bodies_in(algebra.comm, numbers), system.influence.shape[1]
-    row_sums = np.sum(system.influence * np.column_stack([system.M @ r for r in system.influence.T]), axis=1)
+    row_sums = np.sum(
+        system.influence * np.column_stack([system.M @ r for r in system.influence.T]), axis=1
+    )
     mass = algebra.comm.sum(np.bincount(numbers, row_sums, minlength=count).astype(float)) / d
     stiffness = np.zeros(count)
     np.maximum.at(stiffness, numbers, np.abs(system.K.diagonal()))
@@ -62,7 +66,9 @@ def body_springs(problem: ContactProblem) -> Matrix:
     bed = total(surface.comm, np.sum(1.0 / surface.compliance[soft])) or np.inf
     softest = min(bed, float(np.min(stiffness, where=stiffness > 0.0, initial=np.inf)))
     wanted = np.clip(STRONG * softest, WEAK * stiffness, STRONG * stiffness)
-    wanted[stiffness == 0.0] = STRONG * softest if np.isfinite(softest) else 1.0  # a mass alone: any strength will do
+    wanted[stiffness == 0.0] = (
+        STRONG * softest if np.isfinite(softest) else 1.0
+    )  # a mass alone: any strength will do
     root = np.sqrt(np.divide(wanted, mass, out=np.zeros(count), where=mass > 0.0))
     every = np.arange(system.rows)
     springs = algebra.congruence(algebra.local(every, every, root[numbers], system.rows), system.M)

@@ -44,10 +44,19 @@ class RowReport(Report):
 def joined(states: Sequence[State]) -> State:
     """Return the state of all runs, read-only; of a memory's arrays only the vectors differ from run to run."""
     first, rubs = states[0], next((0.0 * one.r_t for one in states if one.r_t is not None), None)
-    u, v, r_n, active = (np.stack([getattr(one, name) for one in states]) for name in ("u", "v", "r_n", "active"))
-    memory = {name: frozen(np.stack([one.memory[name] for one in states])) if value.shape == first.u.shape else value
-              for name, value in first.memory.items() if all(name in one.memory for one in states)}
-    r_t = None if rubs is None else np.stack([rubs if one.r_t is None else one.r_t for one in states])
+    u, v, r_n, active = (
+        np.stack([getattr(one, name) for one in states]) for name in ("u", "v", "r_n", "active")
+    )
+    memory = {
+        name: frozen(np.stack([one.memory[name] for one in states]))
+        if value.shape == first.u.shape
+        else value
+        for name, value in first.memory.items()
+        if all(name in one.memory for one in states)
+    }
+    r_t = (
+        None if rubs is None else np.stack([rubs if one.r_t is None else one.r_t for one in states])
+    )
     return State(first.t, first.k, frozen(u), frozen(v), r_n, active, memory, r_t)
 
 
@@ -56,7 +65,9 @@ def own_states(problem: ContactProblem, problems: Sequence[ContactProblem], many
     viscous = () if problem.equations.C is None else ("C",)
 
     def made(row: int) -> State:
-        memory = {name: value[row] if value.ndim == 2 else value for name, value in many.memory.items()}
+        memory = {
+            name: value[row] if value.ndim == 2 else value for name, value in many.memory.items()
+        }
         r_t, u, v = None if many.r_t is None else many.r_t[row], many.u[row], many.v[row]
         pairs = ("M", v, many.v), ("K", u, many.u), *((name, u, many.u) for name in viscous)
         problems[row].equations.know_rows(problem.equations, row, *pairs)
@@ -68,8 +79,20 @@ def own_states(problem: ContactProblem, problems: Sequence[ContactProblem], many
 def own_step(problem: ContactProblem, many: StepProblem, row: int) -> StepProblem:
     """Return the step of one run."""
     slip0 = None if many.slip0 is None else many.slip0[row]
-    return StepProblem(many.A, many.b[row], many.bound, many.surface, many.scale, many.guess[row], many.active[row],
-                       many.t, many.k, problem.friction, slip0, many.rate_factor)
+    return StepProblem(
+        many.A,
+        many.b[row],
+        many.bound,
+        many.surface,
+        many.scale,
+        many.guess[row],
+        many.active[row],
+        many.t,
+        many.k,
+        problem.friction,
+        slip0,
+        many.rate_factor,
+    )
 
 
 @dataclass(frozen=True)
@@ -85,10 +108,16 @@ class Loads(Load):
 def loads_of(problems: Sequence[ContactProblem]) -> Loads:
     """Return the loads of problems on one system: they differ in what shakes them, by few vectors times histories."""
     body = problems[0].unshaken.load
-    shaken = [(run, *pair) for run, one in enumerate(problems)
-              for pair in one.equations.load.separable[len(body.separable) :]]
+    shaken = [
+        (run, *pair)
+        for run, one in enumerate(problems)
+        for pair in one.equations.load.separable[len(body.separable) :]
+    ]
     vectors = {force.tobytes(): force for _, force, _ in shaken}
-    order, forces = list(vectors), np.array(list(vectors.values())).reshape(len(vectors), len(body.constant))
+    order, forces = (
+        list(vectors),
+        np.array(list(vectors.values())).reshape(len(vectors), len(body.constant)),
+    )
     places = [(run, order.index(force.tobytes()), history) for run, force, history in shaken]
 
     def rows(t: float) -> Array:

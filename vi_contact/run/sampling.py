@@ -16,7 +16,18 @@ from ..laws.excitation import FullSine, HalfSine, Rectangular, Tabulated
 
 FEWEST = 4.0  # CHOSEN: steps in a period; a sine at its zeros and peaks still has its largest value at a step
 ROUNDED = 1e-6  # of a time step: round-off of its quotient with a period
-PARTS = ("excitation", "excitations", "motion", "given", "path", "record", "__self__", "__wrapped__", "func", "base")
+PARTS = (
+    "excitation",
+    "excitations",
+    "motion",
+    "given",
+    "path",
+    "record",
+    "__self__",
+    "__wrapped__",
+    "func",
+    "base",
+)
 DEEP = 5  # how far a motion is looked for in what holds it
 
 
@@ -46,12 +57,16 @@ def _said(source: Any, dt: float, depth: int = DEEP) -> Iterator[str]:
         return
     name = type(source).__name__
     if isinstance(source, GroundMotion | Record):
-        yield from _of_samples((source.record if isinstance(source, GroundMotion) else source).dt, dt)
+        yield from _of_samples(
+            (source.record if isinstance(source, GroundMotion) else source).dt, dt
+        )
     elif isinstance(source, Tabulated):
         spacing = float(np.median(np.diff(source.times)))
         if dt > spacing * (1.0 + ROUNDED):
-            yield (f"the time step of {dt:g} s is longer than the {spacing:g} s between the times of {name}, whose "
-                   f"peaks fall between the steps: take a dt of at most {spacing:g} s")
+            yield (
+                f"the time step of {dt:g} s is longer than the {spacing:g} s between the times of {name}, whose "
+                f"peaks fall between the steps: take a dt of at most {spacing:g} s"
+            )
     elif isinstance(source, HalfSine | FullSine | Rectangular):
         period = source.duration * {HalfSine: 2.0, FullSine: 1.0}.get(type(source), FEWEST)
         yield from _of_period(f"{name} of {source.duration:g} s", period, dt)
@@ -89,9 +104,11 @@ def _held(source: Any) -> Iterator[Any]:
 def _of_samples(spacing: float, dt: float) -> Iterator[str]:
     """A record with longer steps than its own."""
     if dt > spacing * (1.0 + ROUNDED):
-        yield (f"the time step of {dt:g} s is longer than the {spacing:g} s of the record, whose peaks fall between "
-               "the steps: take a shorter dt, or give resampled(record, dt), which filters out frequencies that dt "
-               "cannot represent")
+        yield (
+            f"the time step of {dt:g} s is longer than the {spacing:g} s of the record, whose peaks fall between "
+            "the steps: take a shorter dt, or give resampled(record, dt), which filters out frequencies that dt "
+            "cannot represent"
+        )
 
 
 def _of_period(what: str, period: float, dt: float) -> Iterator[str]:
@@ -100,6 +117,10 @@ def _of_period(what: str, period: float, dt: float) -> Iterator[str]:
         return
     halves = 2.0 * dt / period
     blind = round(halves) >= 1 and abs(halves - round(halves)) <= ROUNDED * halves
-    why = (f"is {round(halves)} times half the period of {what}, {0.5 * period:g} s, so that every step sees the same "
-           "value, or zero" if blind else f"has only {period / dt:.3g} steps in the period of {period:g} s of {what}")
+    why = (
+        f"is {round(halves)} times half the period of {what}, {0.5 * period:g} s, so that every step sees the same "
+        "value, or zero"
+        if blind
+        else f"has only {period / dt:.3g} steps in the period of {period:g} s of {what}"
+    )
     yield f"the time step of {dt:g} s {why}: take a dt of at most {period / 20.0:g} s, a twentieth of the period"

@@ -39,7 +39,8 @@ log = logging.getLogger(__name__)
 T = TypeVar("T")
 TIMED = 10_000  # the last steps, of which seconds_per_step is the median
 ENDED: dict[type[BaseException], str] = {
-    KeyboardInterrupt: "interrupted by the user", GeneratorExit: "its steps were not asked for any more",
+    KeyboardInterrupt: "interrupted by the user",
+    GeneratorExit: "its steps were not asked for any more",
 }
 LINEAR_STEPS = 21  # repetitions of the plain linear step that the step is compared with
 
@@ -91,12 +92,21 @@ class Session:
     def settings(self) -> dict[str, Any]:
         """Return what was asked for, for log and summary."""
         method, problem, solver = self.method, self.method.problem, self.method.solvers[0]
-        return {"scheme": repr(method.scheme), "mass": repr(problem.mass),
-                "solver": repr(solver if self.cross_check is None else getattr(solver, "primary", solver)),
-                "dt": described(method.dt), "tolerance": method.tolerance, "ranks": self._comm.size,
-                "unknowns": problem.system.space.unknowns, "contact_points": problem.surface.total,
-                "boundaries": list(problem.system.notes), "damping": damping_in_words(problem, unknown=NOT_COMPUTED),
-                "sampling": sampling_warning(problem, max(pieces_of(method.dt))[0]) or ""}
+        return {
+            "scheme": repr(method.scheme),
+            "mass": repr(problem.mass),
+            "solver": repr(
+                solver if self.cross_check is None else getattr(solver, "primary", solver)
+            ),
+            "dt": described(method.dt),
+            "tolerance": method.tolerance,
+            "ranks": self._comm.size,
+            "unknowns": problem.system.space.unknowns,
+            "contact_points": problem.surface.total,
+            "boundaries": list(problem.system.notes),
+            "damping": damping_in_words(problem, unknown=NOT_COMPUTED),
+            "sampling": sampling_warning(problem, max(pieces_of(method.dt))[0]) or "",
+        }
 
     @property
     def left(self) -> int:
@@ -119,27 +129,42 @@ class Session:
             self._checkpoint(writer)
             self._measure()
             linear = self._seconds_per_linear_step()
-        except BaseException as error:  # whatever ends a run, what it has is saved; the error is raised again
+        except (
+            BaseException
+        ) as error:  # whatever ends a run, what it has is saved; the error is raised again
             interrupted = isinstance(error, KeyboardInterrupt | GeneratorExit)
             reason = str(error) or ENDED.get(type(error), type(error).__name__)
             told = getattr(error, "on_all_ranks", False)
             status = "interrupted" if interrupted else "failed"
             self._rescue(writer, status, reason, time.perf_counter() - begin, all_ranks=told)
-            if isinstance(error, Interrupted):  # on all ranks: none ends before the first has written
+            if isinstance(
+                error, Interrupted
+            ):  # on all ranks: none ends before the first has written
                 self._comm.bcast(None)
             raise
         status = "stopped" if self.stopped else "finished"
-        facts = self._facts(status, self.stopped, time.perf_counter() - begin) | {"seconds_per_linear_step": linear}
+        facts = self._facts(status, self.stopped, time.perf_counter() - begin) | {
+            "seconds_per_linear_step": linear
+        }
         warning = energy_warning(facts)
         if warning and self.root:
             log.warning("%s", warning)
         writer.close(facts)
         problem = replace(self.method.problem)  # without the matrices made for the run
-        yield Solution(self.table.history(), self.table.columns, self.place.state, facts, problem, writer.folder)
+        yield Solution(
+            self.table.history(),
+            self.table.columns,
+            self.place.state,
+            facts,
+            problem,
+            writer.folder,
+        )
 
     def _march(self, writer: Writer, signals: StopSignals) -> Iterator[None]:
         place = self.place
-        loop = self.loop or March(self.method, self.step_plan, place.state, place.base, place.halved)
+        loop = self.loop or March(
+            self.method, self.step_plan, place.state, place.base, place.halved
+        )
         worst, begin = 0.0, time.perf_counter()
         self.wall_time.begin()
         with closing(Progress(self.left, shown=self.progress and self.root)) as progress:
@@ -148,12 +173,16 @@ class Session:
                 self.dt, self.halved = loop.dt, loop.halved
                 worst = max(worst, report.certificate.worst)
                 if loop.ended:
-                    self.place = RestartPoint(state, place.t_start, place.k_start, loop.base, loop.halved)
+                    self.place = RestartPoint(
+                        state, place.t_start, place.k_start, loop.base, loop.halved
+                    )
                     writer.frame(report, self.place.number)
                     if self.place.number % self.checkpoint_every == 0 or self.wall_time.unsure:
                         self._checkpoint(writer)
                     if self.root:
-                        progress.step(state.k, state.t, iterations=report.result.iterations, worst=worst)
+                        progress.step(
+                            state.k, state.t, iterations=report.result.iterations, worst=worst
+                        )
                 self.seconds.append(time.perf_counter() - begin)
                 if len(self.seconds) == 1:
                     self._measure()
@@ -179,7 +208,9 @@ class Session:
             raise Interrupted(f"{Signals(number).name} {rest}", number)
         raise OutOfTime(f"{self.wall_time.words} {rest}")
 
-    def _call(self, callback: Callable[[State, Report], Any], report: Report, writer: Writer) -> None:
+    def _call(
+        self, callback: Callable[[State, Report], Any], report: Report, writer: Writer
+    ) -> None:
         """Show a step to the callback, which may ask for the end of the run or raise, on one rank. Collective."""
         state = report.new
         for array in (state.r_n, state.active, state.r_t, *state.memory.values()):
@@ -199,10 +230,14 @@ class Session:
     def _keep(self, state: State, report: Report, writer: Writer) -> None:
         """Everything that is recorded of a step, be it a base step or a part of one."""
         if report.escalated and self.root:
-            log.warning("step %d, t = %.6g s: escalated to %s", state.k, state.t, report.result.method)
+            log.warning(
+                "step %d, t = %.6g s: escalated to %s", state.k, state.t, report.result.method
+            )
         row: dict[str, Any] = {}
         nothing: Row = {}
-        with together(self._comm):  # one of the user's may fail on one rank, or record what does not fit there
+        with together(
+            self._comm
+        ):  # one of the user's may fail on one rank, or record what does not fit there
             for recorder in self.recorders:
                 name = f"the recorder {type(recorder).__name__} in step {state.k}, t = {state.t:.6g} s,"
                 call: Callable[[], Row] = partial(recorder.row, report)
@@ -225,12 +260,20 @@ class Session:
     @cached_property
     def _about(self) -> dict[str, Any]:
         """What the run is of, for its checkpoints. Collective."""
-        method, start, end = self.method, self.place.t_start, self.place.t_start + self.step_plan.length
-        with together(self._comm):  # histories of the user's are asked at other times than those of steps
+        method, start, end = (
+            self.method,
+            self.place.t_start,
+            self.place.t_start + self.step_plan.length,
+        )
+        with together(
+            self._comm
+        ):  # histories of the user's are asked at other times than those of steps
             known = identity(method.problem, method.scheme, method.dt, start=start, end=end)
         return {"run": known, "span": (start, end)}
 
-    def _rescue(self, writer: Writer, status: str, reason: str, seconds: float, *, all_ranks: bool) -> None:
+    def _rescue(
+        self, writer: Writer, status: str, reason: str, seconds: float, *, all_ranks: bool
+    ) -> None:
         """Save what there is. A checkpoint of the last base step only on one rank, or where ``all_ranks`` raise the
         same error: others might not come."""
         # Of any kind: the error that ended the run is the one to tell, and it may keep each of these from working.
@@ -247,7 +290,9 @@ class Session:
     def _tell_start(self) -> None:
         if not self.root:
             return
-        log.info("versions: %s", ", ".join(f"{name} {version}" for name, version in versions().items()))
+        log.info(
+            "versions: %s", ", ".join(f"{name} {version}" for name, version in versions().items())
+        )
         for name, value in self.settings().items():
             if name != "sampling":
                 log.info("%s: %s", name, value)
@@ -258,23 +303,43 @@ class Session:
         log.info("set up: %s", done())
         log.info("%d steps to do", self.left)
         if self.wall_time.text is not None:
-            log.info("%.0f s are left of the wall time %s", self.wall_time.left, self.wall_time.text)
+            log.info(
+                "%.0f s are left of the wall time %s", self.wall_time.left, self.wall_time.text
+            )
 
     def _facts(self, status: str, reason: str, seconds: float) -> dict[str, Any]:
         """The content of summary.json."""
-        return {"status": status, "reason": reason, "versions": versions("h5py"), **self.settings(),
-                "restarted_from_step": self.resumed_from, **self.table.facts(),
-                "base_steps": self.place.base, "halved_steps": self.halved,
-                "cross_check": None if self.cross_check is None else self.cross_check.report(),
-                "seconds": seconds, "memory": self.memory,
-                "seconds_per_step": float(np.median(list(self.seconds))) if self.seconds else float("nan"),
-                "seconds_per_linear_step": float("nan")}
+        return {
+            "status": status,
+            "reason": reason,
+            "versions": versions("h5py"),
+            **self.settings(),
+            "restarted_from_step": self.resumed_from,
+            **self.table.facts(),
+            "base_steps": self.place.base,
+            "halved_steps": self.halved,
+            "cross_check": None if self.cross_check is None else self.cross_check.report(),
+            "seconds": seconds,
+            "memory": self.memory,
+            "seconds_per_step": float(np.median(list(self.seconds)))
+            if self.seconds
+            else float("nan"),
+            "seconds_per_linear_step": float("nan"),
+        }
 
     def _seconds_per_linear_step(self) -> float:
         """Median time of right-hand side, one back-substitution and update with the same A, from the last state [s]."""
-        if self.last is None or not self.last.step.A.factorised:  # none is made for this: it may not fit
+        if (
+            self.last is None or not self.last.step.A.factorised
+        ):  # none is made for this: it may not fit
             return float("nan")
-        problem, scheme, dt, old, A = self.method.problem, self.method.scheme, self.dt, self.last.old, self.last.step.A
+        problem, scheme, dt, old, A = (
+            self.method.problem,
+            self.method.scheme,
+            self.dt,
+            self.last.old,
+            self.last.step.A,
+        )
         none = np.zeros(problem.surface.count)
 
         def linear_step() -> None:
@@ -282,13 +347,19 @@ class Session:
             result = StepResult(A.factor.solve(step.b), none, none.astype(bool), 0, "linear")
             scheme.finish(problem, old, step, result, dt)
 
-        return float(np.median(repeat(linear_step, number=1, repeat=LINEAR_STEPS + 1)[1:]))  # the first is slower
+        return float(
+            np.median(repeat(linear_step, number=1, repeat=LINEAR_STEPS + 1)[1:])
+        )  # the first is slower
 
 
 def _locked(value: T) -> T:
     """The value with read-only views of its arrays: some of them, such as the gap at rest, belong to the problem."""
     own: Any = value
-    views = {one.name: array.view() for one in fields(own) if isinstance(array := getattr(own, one.name), np.ndarray)}
+    views = {
+        one.name: array.view()
+        for one in fields(own)
+        if isinstance(array := getattr(own, one.name), np.ndarray)
+    }
     for view in views.values():
         view.setflags(write=False)
     locked: T = replace(own, **views)

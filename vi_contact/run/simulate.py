@@ -32,13 +32,28 @@ from .wall_time import WallTime
 __all__ = ["Solution", "simulate"]
 
 
-def simulate(problem: ContactProblem, *, scheme: Scheme | None = None, solver: Solver | None = None, dt: TimeSteps,
-             t_end: float | None = None, steps: int | None = None, record: Sequence[Recorder] | None = None,
-             out: str | Path | None = None, state: State | None = None, escalation: Sequence[Solver] = (),
-             tolerance: float = TOLERANCE, checkpoint_every: int = 100, restart: bool | str | Path = False,
-             changed: bool = False, progress: bool = True, fields: FieldWriter | None = None,
-             cross_check: Comparison | None = None, wall_time: str | None = None,
-             callback: Callable[[State, Report], Any] | None = None) -> Solution:
+def simulate(
+    problem: ContactProblem,
+    *,
+    scheme: Scheme | None = None,
+    solver: Solver | None = None,
+    dt: TimeSteps,
+    t_end: float | None = None,
+    steps: int | None = None,
+    record: Sequence[Recorder] | None = None,
+    out: str | Path | None = None,
+    state: State | None = None,
+    escalation: Sequence[Solver] = (),
+    tolerance: float = TOLERANCE,
+    checkpoint_every: int = 100,
+    restart: bool | str | Path = False,
+    changed: bool = False,
+    progress: bool = True,
+    fields: FieldWriter | None = None,
+    cross_check: Comparison | None = None,
+    wall_time: str | None = None,
+    callback: Callable[[State, Report], Any] | None = None,
+) -> Solution:
     """Compute steps in time until t_end, or so many steps, and record them. Collective; every rank gets the solution.
 
     Args:
@@ -74,32 +89,84 @@ def simulate(problem: ContactProblem, *, scheme: Scheme | None = None, solver: S
 
 
 @contextmanager
-def opened(problem: ContactProblem, scheme: Scheme | None, solver: Solver | None, dt: TimeSteps, t_end: float | None,
-           steps: int | None, record: Sequence[Recorder] | None, out: str | Path | None, state: State | None,
-           escalation: Sequence[Solver], tolerance: float, checkpoint_every: int, restart: bool | str | Path,
-           changed: bool, progress: bool, fields: FieldWriter | None, cross_check: Comparison | None,
-           wall_time: str | None, callback: Callable[[State, Report], Any] | None,
-           others: Sequence[ContactProblem] = (), runs: int = 1) -> Iterator[tuple[Session, Writer]]:
+def opened(
+    problem: ContactProblem,
+    scheme: Scheme | None,
+    solver: Solver | None,
+    dt: TimeSteps,
+    t_end: float | None,
+    steps: int | None,
+    record: Sequence[Recorder] | None,
+    out: str | Path | None,
+    state: State | None,
+    escalation: Sequence[Solver],
+    tolerance: float,
+    checkpoint_every: int,
+    restart: bool | str | Path,
+    changed: bool,
+    progress: bool,
+    fields: FieldWriter | None,
+    cross_check: Comparison | None,
+    wall_time: str | None,
+    callback: Callable[[State, Report], Any] | None,
+    others: Sequence[ContactProblem] = (),
+    runs: int = 1,
+) -> Iterator[tuple[Session, Writer]]:
     """Check the arguments of ``simulate`` and set a run up, in its locked folder. ``others``: problems that lend their
     matrices and factors to it, if they are its own. ``runs``: how many take turns. Collective."""
     check_problem_given("simulate", problem)
     comm = problem.system.algebra.comm
-    agree(comm, "simulate", {
-        "scheme": scheme, "solver": solver, "dt": dt, "t_end": t_end, "steps": steps, "record": _kinds(record),
-        "out": None if out is None else str(out), "state": Parts(state), "escalation": escalation,
-        "tolerance": tolerance, "checkpoint_every": checkpoint_every, "restart": restart, "changed": changed,
-        "fields": fields, "cross_check": cross_check, "wall_time": wall_time, "callback": callback})
+    agree(
+        comm,
+        "simulate",
+        {
+            "scheme": scheme,
+            "solver": solver,
+            "dt": dt,
+            "t_end": t_end,
+            "steps": steps,
+            "record": _kinds(record),
+            "out": None if out is None else str(out),
+            "state": Parts(state),
+            "escalation": escalation,
+            "tolerance": tolerance,
+            "checkpoint_every": checkpoint_every,
+            "restart": restart,
+            "changed": changed,
+            "fields": fields,
+            "cross_check": cross_check,
+            "wall_time": wall_time,
+            "callback": callback,
+        },
+    )
     _check_outputs(record, out, restart, checkpoint_every, (progress, changed), fields, cross_check)
-    optional(function, "simulate", "callback", callback, "give a function of a state and a report, or None")
+    optional(
+        function,
+        "simulate",
+        "callback",
+        callback,
+        "give a function of a state and a report, or None",
+    )
     if wall_time is not None and out is None:
         raise InputError("wall_time needs a folder from which the run continues: give out")
     if changed and restart is False:
-        raise InputError("changed=True is for a run that is continued, and this one begins anew: give restart too, or "
-                         "leave it out")
+        raise InputError(
+            "changed=True is for a run that is continued, and this one begins anew: give restart too, or "
+            "leave it out"
+        )
     end = WallTime(wall_time, runs)
     problem, scheme = with_defaults(problem, scheme, others)
-    method = checked_method("simulate", problem, scheme, (solver, escalation), dt, steps=steps, t_end=t_end,
-                            state=state, tolerance=tolerance)
+    method = checked_method(
+        "simulate",
+        problem,
+        scheme,
+        (solver, escalation),
+        dt,
+        steps=steps,
+        t_end=t_end,
+        state=state,
+        tolerance=tolerance,
+    )
     source = _source(restart, folder := None if out is None else run_folder(comm, out))
     recorders: list[Recorder] = [Steps(), *((Energy(), Contact()) if record is None else record)]
     with locked(comm, folder):
@@ -108,25 +175,61 @@ def opened(problem: ContactProblem, scheme: Scheme | None, solver: Solver | None
                 begin = initial_state(method.problem) if state is None else state
             place, checksum = RestartPoint(begin, begin.t, begin.k), ""
         else:
-            place, checksum = read_checkpoint(source, method.problem, scheme=method.scheme, dt=dt, changed=changed)
+            place, checksum = read_checkpoint(
+                source, method.problem, scheme=method.scheme, dt=dt, changed=changed
+            )
         plan = step_plan(dt, steps, t_end, place.t_start)
         with together(comm):
-            place = replace(place, state=method.scheme.start(problem, place.state, plan.dt(place.base)))
-        table = Table(*_started(problem, recorders, place.state), None if folder is None else folder / HISTORY_H5, comm)
+            place = replace(
+                place, state=method.scheme.start(problem, place.state, plan.dt(place.base))
+            )
+        table = Table(
+            *_started(problem, recorders, place.state),
+            None if folder is None else folder / HISTORY_H5,
+            comm,
+        )
         stored = None if source is None else StoredRows(source, table, place.state.k, checksum)
         if stored is not None:
             _started(problem, recorders, place.state, _restored(table, stored, comm))
-        session = Session(method, recorders, table, plan, place, checkpoint_every, cross_check, progress, end,
-                          resumed_from=None if stored is None else stored.k, callback=callback)
+        session = Session(
+            method,
+            recorders,
+            table,
+            plan,
+            place,
+            checkpoint_every,
+            cross_check,
+            progress,
+            end,
+            resumed_from=None if stored is None else stored.k,
+            callback=callback,
+        )
         yield session, Writer(problem, folder, fields, table, stored)
 
 
-def _check_outputs(record: Any, out: Any, restart: Any, checkpoint_every: Any, flags: tuple[Any, Any], fields: Any,
-                   cross_check: Any) -> None:
+def _check_outputs(
+    record: Any,
+    out: Any,
+    restart: Any,
+    checkpoint_every: Any,
+    flags: tuple[Any, Any],
+    fields: Any,
+    cross_check: Any,
+) -> None:
     """InputError for what is no recorder, folder, number of steps, writer of fields or cross-check."""
     owner = "simulate"
-    for one in () if record is None else several(owner, "record", record, "give a list of recorders, or None"):
-        provides(owner, "a recorder", one, ("columns", "start", "row"), "give Energy(), Contact(), Probe(…) or another")
+    for one in (
+        ()
+        if record is None
+        else several(owner, "record", record, "give a list of recorders, or None")
+    ):
+        provides(
+            owner,
+            "a recorder",
+            one,
+            ("columns", "start", "row"),
+            "give Energy(), Contact(), Probe(…) or another",
+        )
     check(owner, "out", out, str | Path | None)
     check(owner, "restart", restart, bool | str | Path)
     whole(owner, "checkpoint_every", checkpoint_every, least=1)
@@ -136,7 +239,14 @@ def _check_outputs(record: Any, out: Any, restart: Any, checkpoint_every: Any, f
         if out is None:
             raise InputError("fields need an output folder: give out, or leave out fields")
         provides(owner, "fields", fields, ("open",), "give fem.XDMF(every=10), or None")
-    optional(provides, owner, "cross_check", cross_check, ("report",), "give a CrossChecked solver, or None")
+    optional(
+        provides,
+        owner,
+        "cross_check",
+        cross_check,
+        ("report",),
+        "give a CrossChecked solver, or None",
+    )
 
 
 def _source(restart: bool | str | Path, folder: Path | None) -> Path | None:
@@ -149,8 +259,12 @@ def _source(restart: bool | str | Path, folder: Path | None) -> Path | None:
     return path.parent if path.suffix == ".npz" else path
 
 
-def _started(problem: ContactProblem, recorders: Sequence[Recorder], state: State,
-             resumed: Mapping[str, Any] | None = None) -> tuple[Columns, Row]:
+def _started(
+    problem: ContactProblem,
+    recorders: Sequence[Recorder],
+    state: State,
+    resumed: Mapping[str, Any] | None = None,
+) -> tuple[Columns, Row]:
     """Start the recorders: their columns, and the row of the state. InputError when two record the same column."""
     row: dict[str, Any] = {}
     nothing: Row = {}
@@ -165,7 +279,9 @@ def _started(problem: ContactProblem, recorders: Sequence[Recorder], state: Stat
         for recorder in recorders:
             twice = sorted(set(columns) & set(recorder.columns()))
             if twice:
-                raise InputError(f"two recorders have the column '{twice[0]}': leave one of them out")
+                raise InputError(
+                    f"two recorders have the column '{twice[0]}': leave one of them out"
+                )
             columns |= recorder.columns()
     agree(comm, "simulate", {"the list of recorded columns": list(columns)})
     return columns, row
@@ -176,7 +292,10 @@ def _kinds(record: Any) -> Any:
     part of what is recorded."""
     if not isinstance(record, list | tuple):
         return record
-    return [Parts(one) if type(one).__module__.startswith("vi_contact.") else type(one) for one in record]
+    return [
+        Parts(one) if type(one).__module__.startswith("vi_contact.") else type(one)
+        for one in record
+    ]
 
 
 def _restored(table: Table, stored: StoredRows, comm: Comm) -> Row:

@@ -20,8 +20,9 @@ from .together import Together, grouped
 Ended = tuple[int, Solution | ViContactError]
 
 
-def simulate_many(runs: Sequence[Mapping[str, Any]], *,
-                  tell: Callable[[float], None] = lambda share: None) -> Iterator[Ended]:
+def simulate_many(
+    runs: Sequence[Mapping[str, Any]], *, tell: Callable[[float], None] = lambda share: None
+) -> Iterator[Ended]:
     """Yield (number of the run, its solution) as the runs end; each is given by the arguments of ``simulate``.
 
     A run that fails yields its error instead, and the others go on; what cannot begin is told before the first step.
@@ -32,12 +33,21 @@ def simulate_many(runs: Sequence[Mapping[str, Any]], *,
 
     Raises InputError for arguments that ``simulate`` does not know; Interrupted and OutOfTime as ``simulate`` does,
     when all runs that have begun have written their checkpoints: ``restart=True`` continues them."""
-    every = [_arguments(run) for run in several("simulate_many", "runs", runs, "give a list of arguments of simulate")]
-    folders = [str(Path(run["out"]).resolve()) for run in every if isinstance(run["out"], str | Path)]
-    books = [id(one) for run in every if isinstance(run["record"], Sequence) for one in run["record"]]
+    every = [
+        _arguments(run)
+        for run in several("simulate_many", "runs", runs, "give a list of arguments of simulate")
+    ]
+    folders = [
+        str(Path(run["out"]).resolve()) for run in every if isinstance(run["out"], str | Path)
+    ]
+    books = [
+        id(one) for run in every if isinstance(run["record"], Sequence) for one in run["record"]
+    ]
     for what, own in (("recorder", books), ("folder", folders)):
         if len(set(own)) < len(own):
-            raise InputError(f"simulate_many: two runs have one {what}, which keeps results of one: give each its own")
+            raise InputError(
+                f"simulate_many: two runs have one {what}, which keeps results of one: give each its own"
+            )
     return _in_turn(every, tell)
 
 
@@ -46,7 +56,9 @@ def _arguments(run: Mapping[str, Any]) -> dict[str, Any]:
     try:
         bound = signature(simulate).bind(**run)
     except TypeError as error:
-        raise InputError(f"simulate_many: {error}; give the arguments of simulate for every run") from None
+        raise InputError(
+            f"simulate_many: {error}; give the arguments of simulate for every run"
+        ) from None
     bound.apply_defaults()
     return bound.arguments | {"progress": False}
 
@@ -74,7 +86,9 @@ class _Turn:
         """End a run that nobody waits for any more, with its checkpoint."""
         with turn_of(self):
             self.steps.close()
-        self.session.last = self.session.loop = None  # the matrices of one that has ended serve nobody
+        self.session.last = self.session.loop = (
+            None  # the matrices of one that has ended serve nobody
+        )
         self.loop.prepared.clear()
 
 
@@ -86,12 +100,17 @@ def _in_turn(runs: Sequence[Mapping[str, Any]], tell: Callable[[float], None]) -
         for number, run in enumerate(runs):
             try:
                 session, writer = stack.enter_context(
-                    opened(**run, others=[one.session.method.problem for one in going], runs=len(runs)))
+                    opened(
+                        **run, others=[one.session.method.problem for one in going], runs=len(runs)
+                    )
+                )
             except ViContactError as error:
                 yield number, error
                 continue
             place = session.place
-            loop = session.loop = Together(session.method, session.step_plan, place.state, place.base, place.halved)
+            loop = session.loop = Together(
+                session.method, session.step_plan, place.state, place.base, place.halved
+            )
             going.append(_Turn(number, session, loop, session.steps(writer, signals)))
             stack.callback(going[-1].close)
         grouped([one.loop for one in going])
@@ -99,7 +118,11 @@ def _in_turn(runs: Sequence[Mapping[str, Any]], tell: Callable[[float], None]) -
         while going:
             begin = time.perf_counter()
             group = going[0].loop.group  # one alone may need much memory: one after the other
-            ends = [(one, one.step()) for one in going if one is going[0] or (group and one.loop.group is group)]
+            ends = [
+                (one, one.step())
+                for one in going
+                if one is going[0] or (group and one.loop.group is group)
+            ]
             made += len(ends)
             tell(min(made / max(total, 1), 1.0))
             for one, end in ends:

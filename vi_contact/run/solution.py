@@ -20,7 +20,9 @@ from ..core.step import Columns, State
 from .files.table import LEDGER
 
 _LINES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
-CREATED = 0.01  # of the largest energy: more than schemes without a fault gain at sensible time steps
+CREATED = (
+    0.01  # of the largest energy: more than schemes without a fault gain at sensible time steps
+)
 
 
 @dataclass(frozen=True)
@@ -41,35 +43,59 @@ class Solution:
     problem: ContactProblem
     folder: Path | None = None
 
-    def function(self, name: str, *, t: float | None = None, frame: int | None = None, continuous: bool = False) -> Any:
+    def function(
+        self,
+        name: str,
+        *,
+        t: float | None = None,
+        frame: int | None = None,
+        continuous: bool = False,
+    ) -> Any:
         """Return "u", "v", "stress" or "contact_pressure" as a DOLFINx Function, ``fem.as_function`` of the end state.
 
         With ``t`` [s] or ``frame`` that of a frame in the run folder, ``fem.read_function``. Collective.
         InputError for a system without a mesh, and without such a frame."""
         if not hasattr(self.problem.system.space, "V"):
-            raise InputError("function: the system has no mesh and so no Functions; use history and state")
-        from ..fem.output.functions import as_function, read_function  # late: runs need no finite elements
+            raise InputError(
+                "function: the system has no mesh and so no Functions; use history and state"
+            )
+        from ..fem.output.functions import (
+            as_function,
+            read_function,
+        )  # late: runs need no finite elements
 
         if t is None and frame is None:
             return as_function(self.problem, self.state, name, continuous=continuous)
         if self.folder is None:
-            raise InputError("function: the run kept no frames; run with out and fields=fem.XDMF(every=10)")
-        return read_function(self.problem, self.folder, name, t=t, frame=frame, continuous=continuous)
+            raise InputError(
+                "function: the run kept no frames; run with out and fields=fem.XDMF(every=10)"
+            )
+        return read_function(
+            self.problem, self.folder, name, t=t, frame=frame, continuous=continuous
+        )
 
     def summary(self) -> str:
         """Return the run in a few lines for people."""
-        return "\n".join(f"  {name:<26} {value}" if name else value for name, value in _entries(self.facts))
+        return "\n".join(
+            f"  {name:<26} {value}" if name else value for name, value in _entries(self.facts)
+        )
 
     __repr__ = summary
 
     def plot(self) -> Any:
         """Return a matplotlib Figure of what was recorded: probes, contact force, energy ledger, certificates."""
-        return import_module("vi_contact.plots").plot_overview(self)  # by name: on a floor above, and no run needs it
+        return import_module("vi_contact.plots").plot_overview(
+            self
+        )  # by name: on a floor above, and no run needs it
 
     def _repr_html_(self) -> str:
         """Return summary and figure for a notebook, without reference to anything outside."""
-        rows = "".join(f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" if name else
-                       f'<tr><td colspan="2">{escape(value)}</td></tr>' for name, value in _entries(self.facts))
+        rows = "".join(
+            f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>"
+            if name
+            else f'<tr><td colspan="2">{escape(value)}</td></tr>'
+            for name, value in _entries(self.facts)
+        )
         image = BytesIO()
         self.plot().savefig(image, format="png", dpi=70)
         picture = b64encode(image.getvalue()).decode()
@@ -80,29 +106,64 @@ def energy_warning(facts: Mapping[str, Any]) -> str | None:
     """Return a sentence when the run had more energy than was put in, by more than CREATED of the largest energy."""
     if facts.get("energy_created", 0.0) <= CREATED:
         return None
-    return (f"contact and time scheme created {100 * facts['energy_created']:.3g} % of the largest energy of the run: "
-            "take a smaller dt (a wave should not cross more than two elements in a step) or, without impact law, "
-            "ContactStabilisedNewmark(), which creates none; HHT() and HalvedAtImpact do not cure it")
+    return (
+        f"contact and time scheme created {100 * facts['energy_created']:.3g} % of the largest energy of the run: "
+        "take a smaller dt (a wave should not cross more than two elements in a step) or, without impact law, "
+        "ContactStabilisedNewmark(), which creates none; HHT() and HalvedAtImpact do not cure it"
+    )
 
 
 def _entries(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     """(name, value) of every line of the summary; those without a name are whole lines."""
     dt, mean, plain = facts["dt"], facts["seconds_per_step"], facts["seconds_per_linear_step"]
-    ratio = f", plain linear step {plain:.3e} s, ratio {mean / plain:.2f}" if np.isfinite(plain) else ""
-    told = dict(facts) | {"s": "s" * (facts["ranks"] > 1)} | {
-        "length": f"({facts['base_steps']} base steps of {dt})" if isinstance(dt, str) else f"of {dt:g} s",
-        "solver": shorten(facts["solver"], 88, placeholder=" …"), "ratio": ratio if np.isfinite(mean) else None,
-        "and_output": ", output and the cross-check" if facts["cross_check"] else " and output",
-        "halved_steps": facts["halved_steps"] or None, "reason": facts["reason"] or None,
-    }
+    ratio = (
+        f", plain linear step {plain:.3e} s, ratio {mean / plain:.2f}" if np.isfinite(plain) else ""
+    )
+    told = (
+        dict(facts)
+        | {"s": "s" * (facts["ranks"] > 1)}
+        | {
+            "length": f"({facts['base_steps']} base steps of {dt})"
+            if isinstance(dt, str)
+            else f"of {dt:g} s",
+            "solver": shorten(facts["solver"], 88, placeholder=" …"),
+            "ratio": ratio if np.isfinite(mean) else None,
+            "and_output": ", output and the cross-check" if facts["cross_check"] else " and output",
+            "halved_steps": facts["halved_steps"] or None,
+            "reason": facts["reason"] or None,
+        }
+    )
 
     def lines(part: str) -> list[tuple[str, str]]:
-        return [(name, text.format_map(told)) for name, text, *needs in _LINES[part]
-                if all(told.get(one) is not None for one in needs)]
+        return [
+            (name, text.format_map(told))
+            for name, text, *needs in _LINES[part]
+            if all(told.get(one) is not None for one in needs)
+        ]
 
-    crossed = [(f"cross-check {method}", ", ".join(f"{name} {value:.2e}" for name, value in difference.items()))
-               for method, difference in (facts["cross_check"] or {}).items()]
-    ledger = [(f"  {title}", f"{facts['energy'][name]: .6e}") for name, title in LEDGER[:-1] if "energy" in facts]
-    warned = [("", text) for one in filter(None, (energy_warning(facts), facts.get("sampling")))
-              for text in wrap(f"WARNING: {one}", 110, initial_indent="  ", subsequent_indent="  ")]
-    return [*lines("run"), *crossed, *lines("energy"), *ledger, *lines("defect"), *warned, *lines("end")]
+    crossed = [
+        (
+            f"cross-check {method}",
+            ", ".join(f"{name} {value:.2e}" for name, value in difference.items()),
+        )
+        for method, difference in (facts["cross_check"] or {}).items()
+    ]
+    ledger = [
+        (f"  {title}", f"{facts['energy'][name]: .6e}")
+        for name, title in LEDGER[:-1]
+        if "energy" in facts
+    ]
+    warned = [
+        ("", text)
+        for one in filter(None, (energy_warning(facts), facts.get("sampling")))
+        for text in wrap(f"WARNING: {one}", 110, initial_indent="  ", subsequent_indent="  ")
+    ]
+    return [
+        *lines("run"),
+        *crossed,
+        *lines("energy"),
+        *ledger,
+        *lines("defect"),
+        *warned,
+        *lines("end"),
+    ]

@@ -35,8 +35,13 @@ TOUCHING = 1e-9  # of the largest coordinate: a gap that is none
 ADVICE = "try another solver, or smaller load steps, and check the data"
 
 
-def static_equilibrium(problem: ContactProblem, *, solver: Solver | None = None, t: float = 0.0,
-                       tolerance: float = TOLERANCE) -> State:
+def static_equilibrium(
+    problem: ContactProblem,
+    *,
+    solver: Solver | None = None,
+    t: float = 0.0,
+    tolerance: float = TOLERANCE,
+) -> State:
     """Return the gravity stage: K u = f(t) - B_nᵀ r_n - B_tᵀ r_t with contact active, without excitation.
 
     The state has v = 0, and it has the stresses, reactions and contact set with which the dynamic stage starts. A body
@@ -76,18 +81,27 @@ def _warn_if_open(problem: ContactProblem, state: State) -> None:
     own = opened & (surface.slots == first)
     place = surface.comm.sum(surface.points[own].sum(axis=0))
     if surface.comm.rank == 0:
-        log.warning("at rest at t = %g s %.3g %% of the contact area that touches at the start is open, from %s on: "
-                    "loads that lift a body do that; so does a side 1 with smaller facets than a softer side 2, which "
-                    "should be meshed as finely or be side 1", state.t, 100.0 * lost / area, at(place))
+        log.warning(
+            "at rest at t = %g s %.3g %% of the contact area that touches at the start is open, from %s on: "
+            "loads that lift a body do that; so does a side 1 with smaller facets than a softer side 2, which "
+            "should be meshed as finely or be side 1",
+            state.t,
+            100.0 * lost / area,
+            at(place),
+        )
 
 
 class Equilibria:
     """Solve static stages of one problem, with one factorisation, or none, for all."""
 
-    def __init__(self, problem: ContactProblem, *, solver: Solver | None = None, tolerance: float = TOLERANCE) -> None:
+    def __init__(
+        self, problem: ContactProblem, *, solver: Solver | None = None, tolerance: float = TOLERANCE
+    ) -> None:
         system, solver = problem.static_load, solver or Automatic()
         self._problem = problem
-        self._K = EffectiveMatrix(system.K, system.algebra, space=system.space, inertia=(0.0, system.M))
+        self._K = EffectiveMatrix(
+            system.K, system.algebra, space=system.space, inertia=(0.0, system.M)
+        )
         self._solve: Callable[[StepProblem], StepResult]
         refuse_matrix(problem, self._K)
         if system.floating:
@@ -99,18 +113,38 @@ class Equilibria:
     def after(self, old: State, t: float) -> State:
         """Return the equilibrium at time t of a body that rubs and slides from where ``old`` was; its number too."""
         problem = self._problem
-        with together(problem.surface.comm):  # loads, motions and laws of the user's may fail on one rank
+        with together(
+            problem.surface.comm
+        ):  # loads, motions and laws of the user's may fail on one rank
             problem.surface.refuse_driven(t)
-            step = StepProblem(A=self._K, b=problem.static_load.load.at_rest(t), bound=problem.surface.gap(t),
-                               scale=1.0, surface=problem.surface, guess=old.u, active=old.active, t=t, k=old.k,
-                               friction=problem.friction, slip0=problem.slip_origin(old.u, old.t, t))
+            step = StepProblem(
+                A=self._K,
+                b=problem.static_load.load.at_rest(t),
+                bound=problem.surface.gap(t),
+                scale=1.0,
+                surface=problem.surface,
+                guess=old.u,
+                active=old.active,
+                t=t,
+                k=old.k,
+                friction=problem.friction,
+                slip0=problem.slip_origin(old.u, old.t, t),
+            )
             refuse_nan(step, lambda: problem.static_load)
             result = self._solve(step)
-        return State(t, old.k, result.x, np.zeros_like(old.u), result.r_n, result.active, r_t=result.r_t)
+        return State(
+            t, old.k, result.x, np.zeros_like(old.u), result.r_n, result.active, r_t=result.r_t
+        )
 
 
-def quasi_static(problem: ContactProblem, times: Iterable[float], *, solver: Solver | None = None,
-                 state: State | None = None, tolerance: float = TOLERANCE) -> Iterator[State]:
+def quasi_static(
+    problem: ContactProblem,
+    times: Iterable[float],
+    *,
+    solver: Solver | None = None,
+    state: State | None = None,
+    tolerance: float = TOLERANCE,
+) -> Iterator[State]:
     """Yield the equilibrium at each of the times, from where the one before left the body. v = 0; k counts stages.
 
     A load that grows in proportion needs one step as long as all slips go one way; a cyclic one at least a step for
@@ -129,12 +163,17 @@ def quasi_static(problem: ContactProblem, times: Iterable[float], *, solver: Sol
     check_problem_given("quasi_static", problem)
     if isinstance(times, Iterable) and not isinstance(times, str | bytes):
         times = list(times)
-    agree(problem.surface.comm, "quasi_static",
-          {"times": times, "solver": solver, "state": Parts(state), "tolerance": tolerance})
+    agree(
+        problem.surface.comm,
+        "quasi_static",
+        {"times": times, "solver": solver, "state": Parts(state), "tolerance": tolerance},
+    )
     check_methods("quasi_static", solver, (), tolerance)
     if problem.friction.at(np.zeros(problem.surface.count)) is not problem.friction:
-        raise InputError(f"load steps have no slip rate for {problem.friction}: use Coulomb with the coefficient of "
-                         "slow sliding, or compute the history in time by march")
+        raise InputError(
+            f"load steps have no slip rate for {problem.friction}: use Coulomb with the coefficient of "
+            "slow sliding, or compute the history in time by march"
+        )
     if state is None:
         with together(problem.surface.comm):
             state = initial_state(problem)
@@ -142,7 +181,9 @@ def quasi_static(problem: ContactProblem, times: Iterable[float], *, solver: Sol
         check_sizes("quasi_static", problem, state)
     order = _checked(times, state.t)
     equilibria = Equilibria(problem, solver=solver, tolerance=tolerance)
-    stages = accumulate(order, lambda old, t: replace(equilibria.after(old, t), k=old.k + 1), initial=state)
+    stages = accumulate(
+        order, lambda old, t: replace(equilibria.after(old, t), k=old.k + 1), initial=state
+    )
     return islice(stages, 1, None)  # the first one is the start
 
 
@@ -153,5 +194,7 @@ def _checked(times: Iterable[float], start: float) -> list[float]:
     order = [real(t) for t in times]
     ways = np.diff([start, *order])
     if not (np.all(np.isfinite(ways)) and np.all(ways >= 0.0) and np.all(ways[1:] > 0.0)):
-        raise InputError(f"load steps from t = {start:g} s at {order}: give times that increase, none before the start")
+        raise InputError(
+            f"load steps from t = {start:g} s at {order}: give times that increase, none before the start"
+        )
     return order

@@ -46,7 +46,11 @@ class StopSignals:
     def asked(self, comm: Comm, over: bool = False) -> tuple[int, bool]:
         """Return the number of a signal that a rank has got, or 0, and whether time is over for one. Collective."""
         over = over or self._late
-        number, late = (self._found, over) if comm.size == 1 else comm.max(np.array([self._found, over], dtype=float))
+        number, late = (
+            (self._found, over)
+            if comm.size == 1
+            else comm.max(np.array([self._found, over], dtype=float))
+        )
         if self._lasting:
             self._late = bool(late)
         elif number:

@@ -16,7 +16,9 @@ from ..core.errors import InputError
 HALVINGS = 20  # at most: a millionth of the base step
 SLACK = 1e-6  # of a step: round-off of the times t + dt + … of a run does not add a step to a piece
 LARGEST = 10**9  # steps of a run: beyond, dt is a mistake
-LONGEST = 1e100  # [s] and its inverse: squares of dt, with masses and stiffnesses as factors, are numbers
+LONGEST = (
+    1e100  # [s] and its inverse: squares of dt, with masses and stiffnesses as factors, are numbers
+)
 
 
 @dataclass(frozen=True)
@@ -33,14 +35,20 @@ class Schedule:
             pairs = [(dt, float(until)) for dt, until in self.pieces]
         except (TypeError, ValueError, OverflowError):
             given = shown(self.pieces)
-            raise InputError(f"Schedule pieces are {given}: give pairs ((dt, until), …) in seconds") from None
+            raise InputError(
+                f"Schedule pieces are {given}: give pairs ((dt, until), …) in seconds"
+            ) from None
         if not pairs:
-            raise InputError("Schedule has no pieces: give at least one (dt, until); until may be math.inf")
+            raise InputError(
+                "Schedule has no pieces: give at least one (dt, until); until may be math.inf"
+            )
         object.__setattr__(self, "pieces", tuple((_positive(dt), until) for dt, until in pairs))
         for (_, before), (_, until) in pairwise([(0.0, -inf), *self.pieces]):
             if not until > before:
-                raise InputError(f"Schedule: the piece until {until:g} s does not end after {before:g} s: give "
-                                 "increasing times, and math.inf as the last one only")
+                raise InputError(
+                    f"Schedule: the piece until {until:g} s does not end after {before:g} s: give "
+                    "increasing times, and math.inf as the last one only"
+                )
 
 
 @dataclass(frozen=True)
@@ -119,16 +127,22 @@ def step_plan(plan: TimeSteps, steps: int | None, t_end: float | None, t0: float
         made += done
         if made > LARGEST:
             goal = "the run" if t_end is None else f"the run to t_end = {t_end:g} s"
-            raise InputError(f"{goal} has more than {LARGEST:.0e} steps of dt = {size:g} s: give a larger dt or end "
-                             "earlier")
+            raise InputError(
+                f"{goal} has more than {LARGEST:.0e} steps of dt = {size:g} s: give a larger dt or end "
+                "earlier"
+            )
         if done or not parts:
             parts.append((size, done))
         t, left = t + done * size, 0 if last else left - done
         if left == 0:
             return StepPlan(tuple(parts), halvings)
-        t = until if abs(t - until) <= SLACK * size else t  # the next piece begins where the plan says
+        t = (
+            until if abs(t - until) <= SLACK * size else t
+        )  # the next piece begins where the plan says
     rest = f"t_end = {t_end:g} s" if t_end is not None else f"the {left:g} steps that are left"
-    raise InputError(f"the last piece of the Schedule ends at {pieces[-1][1]:g} s, before {rest}: end it at math.inf")
+    raise InputError(
+        f"the last piece of the Schedule ends at {pieces[-1][1]:g} s, before {rest}: end it at math.inf"
+    )
 
 
 def _reaching(span: float, size: float) -> float:
@@ -146,14 +160,24 @@ def _wanted(steps: int | None, t_end: float | None, t0: float) -> float:
         if _read(number, t_end, remedy) < t0:
             raise InputError(remedy)
         return inf
-    return int(_read(whole, steps, f"steps is {shown(steps)}: give a whole number of steps >= 0, or t_end in seconds"))
+    return int(
+        _read(
+            whole,
+            steps,
+            f"steps is {shown(steps)}: give a whole number of steps >= 0, or t_end in seconds",
+        )
+    )
 
 
 def _positive(dt: Any) -> float:
-    remedy = f"dt is {shown(dt)}: give a positive time step in seconds, a Schedule or HalvedAtImpact"
+    remedy = (
+        f"dt is {shown(dt)}: give a positive time step in seconds, a Schedule or HalvedAtImpact"
+    )
     found = float(_read(number, dt, remedy, positive=True))
     if not 1.0 / LONGEST < found < LONGEST:
-        raise InputError(f"dt is {found:g} s: give a time step between {1.0 / LONGEST:g} and {LONGEST:g} s")
+        raise InputError(
+            f"dt is {found:g} s: give a time step between {1.0 / LONGEST:g} and {LONGEST:g} s"
+        )
     return found
 
 

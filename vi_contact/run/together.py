@@ -27,7 +27,9 @@ from .time_steps import StepPlan
 class Together(March):
     """March one of several runs: what ``March`` yields, made with others as long as it can be."""
 
-    def __init__(self, method: Method, step_plan: StepPlan, state: State, base: int = 0, halved: int = 0) -> None:
+    def __init__(
+        self, method: Method, step_plan: StepPlan, state: State, base: int = 0, halved: int = 0
+    ) -> None:
         super().__init__(method, step_plan, state, base, halved)
         self.group: Group | None = None
         self.waiting: deque[tuple[float, Report]] = deque()  # made, and not handed out yet
@@ -81,7 +83,14 @@ def grouped(runs: Sequence[Together]) -> None:
 
 def _ways(run: Together) -> tuple[Any, ...]:
     """Where a run is, and how it goes on."""
-    return run.state.t, run.state.k, run.base, run.method.scheme, *run.method.solvers, run.method.tolerance
+    return (
+        run.state.t,
+        run.state.k,
+        run.base,
+        run.method.scheme,
+        *run.method.solvers,
+        run.method.tolerance,
+    )
 
 
 class Group:
@@ -119,9 +128,16 @@ class Group:
         """Make the next step of all runs; those that cannot make it together leave."""
         while self._runs:
             plans = [(run, run.step_plan) for run in self._runs]
-            dt, ended = plans[0][1].dt(self._base), [run for run, plan in plans if plan.steps == self._base]
+            dt, ended = (
+                plans[0][1].dt(self._base),
+                [run for run, plan in plans if plan.steps == self._base],
+            )
             try:
-                leaving = ended or [run for run, plan in plans if plan.dt(self._base) != dt] or self._step(dt)
+                leaving = (
+                    ended
+                    or [run for run, plan in plans if plan.dt(self._base) != dt]
+                    or self._step(dt)
+                )
             except ViContactError:  # of one of them, which meets it again alone
                 leaving = self._runs
             if not leaving:
@@ -133,11 +149,15 @@ class Group:
         """Make a step and hand out its reports; the runs that cannot make it, and then none is made."""
         runs, scheme, problem = self._runs, self._scheme, self._problem
         if dt != self._dt:
-            states = [scheme.start(one, self._states[row], dt) for row, one in enumerate(self._problems)]
+            states = [
+                scheme.start(one, self._states[row], dt) for row, one in enumerate(self._problems)
+            ]
             self._many, self._states = joined(states), Each(states.__getitem__)
             self._dt, self._A, self._solver = dt, scheme.effective_matrix(problem, dt), None
         many = scheme.step(problem, self._many, self._A, dt)
-        if not np.isfinite(many.b.sum()) and len(wrong := np.flatnonzero(~np.isfinite(many.b).all(axis=-1))):
+        if not np.isfinite(many.b.sum()) and len(
+            wrong := np.flatnonzero(~np.isfinite(many.b).all(axis=-1))
+        ):
             return [runs[row] for row in wrong]
         try:
             problem.surface.refuse_driven(many.t)
@@ -145,10 +165,16 @@ class Group:
             return list(runs)  # each says so alone
         if self._solver is None:
             method = runs[0].method
-            self._solver = CertifiedSolver(problem, self._A, many.scale, method.solvers, self._tolerance)
+            self._solver = CertifiedSolver(
+                problem, self._A, many.scale, method.solvers, self._tolerance
+            )
         problems, together = self._problems, self._solver.first
         steps = Each(lambda row: own_step(problems[row], many, row))
-        answers = together.solve_many(many, steps.__getitem__) if hasattr(together, "solve_many") else None
+        answers = (
+            together.solve_many(many, steps.__getitem__)
+            if hasattr(together, "solve_many")
+            else None
+        )
         if answers is None:
             return list(runs)
         for run in () if dt in runs[0].prepared else runs:
@@ -160,11 +186,15 @@ class Group:
             self._finish(many, result, parts)
         return [runs[row] for row in leaving]
 
-    def _judged(self, many: StepProblem, rows: StepResult, parts: dict[str, Any]) -> tuple[StepResult, list[int]]:
+    def _judged(
+        self, many: StepProblem, rows: StepResult, parts: dict[str, Any]
+    ) -> tuple[StepResult, list[int]]:
         """The answers as rows, those not good at once found alone; the rows of runs that have to escalate, or fail."""
         steps, results, leaving = parts["step"], parts["result"], []
         certificates = kkt_residuals(many, rows, lambda row: (steps[row], results[row]))
-        doubtful = [row for row, one in enumerate(certificates) if not one.worst <= NEAR * self._tolerance]
+        doubtful = [
+            row for row, one in enumerate(certificates) if not one.worst <= NEAR * self._tolerance
+        ]
         for row in doubtful:
             escalated = True
             with suppress(ViContactError):
@@ -173,7 +203,9 @@ class Group:
         if doubtful and not leaving:
             names = ("x", "r_n", "active") if rows.r_t is None else ("x", "r_n", "active", "r_t")
             each = [results[row] for row in range(len(certificates))]
-            rows = replace(rows, **{name: np.stack([getattr(one, name) for one in each]) for name in names})
+            rows = replace(
+                rows, **{name: np.stack([getattr(one, name) for one in each]) for name in names}
+            )
         parts["certificate"] = certificates
         return rows, leaving
 
@@ -185,14 +217,23 @@ class Group:
             frozen(vector)  # what is known of them stays true
         free = own_states(self._problem, problems, rows)
         self._many, self._states = self._struck(rows, free)
-        system, loads = self._problem.equations, [("load", t, t) for t in self._problem.equations.times]
+        system, loads = (
+            self._problem.equations,
+            [("load", t, t) for t in self._problem.equations.times],
+        )
 
         def averages(row: int) -> Callable[[], Balance]:
             problems[row].equations.know_rows(system, row, *loads)
             return partial(scheme.balance, problems[row], old[row], free[row], dt)
 
-        parts |= {"problem": problems, "old": old, "new": self._states, "v_minus": Each(lambda row: free[row].v),
-                  "averages": Each(averages), "escalated": Each(lambda row: False)}
+        parts |= {
+            "problem": problems,
+            "old": old,
+            "new": self._states,
+            "v_minus": Each(lambda row: free[row].v),
+            "averages": Each(averages),
+            "escalated": Each(lambda row: False),
+        }
         for row, run in enumerate(self._runs):
             run.waiting.append((dt, RowReport(parts=parts, row=row)))
 
@@ -209,10 +250,14 @@ class Group:
             def moved(row: int) -> State:
                 if not struck[row]:
                     return free[row]
-                problems[row].equations.know_rows(problem.equations, row, ("M", v := new.v[row], new.v))
+                problems[row].equations.know_rows(
+                    problem.equations, row, ("M", v := new.v[row], new.v)
+                )
                 return free[row].with_velocity(v)
 
             return new, Each(moved)
-        own = [after_impact(one, scheme, old[row], free[row], dt) if closed[row].any() else free[row]
-               for row, one in enumerate(self._problems)]
+        own = [
+            after_impact(one, scheme, old[row], free[row], dt) if closed[row].any() else free[row]
+            for row, one in enumerate(self._problems)
+        ]
         return replace(joined(own), u=rows.u), Each(own.__getitem__)

@@ -14,7 +14,10 @@ from ..core.errors import InputError
 
 SAFETY = 2.0  # times the longest step and the checkpoint and histories at the end, as long as the longest so far
 _FORMS = "minutes, minutes:seconds, hours:minutes:seconds, days-hours, days-hours:minutes or days-hours:minutes:seconds"
-_UNITS = {"": ((60,), (60, 1), (3600, 60, 1)), "-": ((3600,), (3600, 60), (3600, 60, 1))}  # without and with days [s]
+_UNITS = {
+    "": ((60,), (60, 1), (3600, 60, 1)),
+    "-": ((3600,), (3600, 60), (3600, 60, 1)),
+}  # without and with days [s]
 _IMPORTED = time.monotonic()
 
 

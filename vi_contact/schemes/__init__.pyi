@@ -12,4 +12,16 @@ from .ss22 import SS22 as SS22
 from .trapezoidal import Trapezoidal as Trapezoidal
 from .zienkiewicz_wood_taylor import ZienkiewiczWoodTaylor as ZienkiewiczWoodTaylor
 
-__all__: list[str] = ['ContactStabilisedNewmark', 'GeneralisedAlpha', 'HHT', 'Houbolt', 'LinearMultistep', 'Midpoint', 'MoreauJean', 'Newmark', 'SS22', 'Trapezoidal', 'ZienkiewiczWoodTaylor']
+__all__: list[str] = [
+    "ContactStabilisedNewmark",
+    "GeneralisedAlpha",
+    "HHT",
+    "Houbolt",
+    "LinearMultistep",
+    "Midpoint",
+    "MoreauJean",
+    "Newmark",
+    "SS22",
+    "Trapezoidal",
+    "ZienkiewiczWoodTaylor",
+]

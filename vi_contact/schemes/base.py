@@ -24,8 +24,10 @@ class SingleStep:
         """Raise InputError for unknowns without mass, as contact nodes: their forces would swing for ever."""
         _refuse_massless_elsewhere(problem)
         if problem.equations.massless is not None:
-            raise InputError(f"{type(self).__name__} needs mass at the contact nodes, else their forces oscillate: "
-                             "give the problem mass=ConsistentMass(), or use the default scheme Trapezoidal()")
+            raise InputError(
+                f"{type(self).__name__} needs mass at the contact nodes, else their forces oscillate: "
+                "give the problem mass=ConsistentMass(), or use the default scheme Trapezoidal()"
+            )
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
         """Return the state: there is nothing to prepare."""
@@ -49,15 +51,33 @@ class BalanceStep:
         check_balance(repr(self), problem)
 
 
-def position_step(problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float, *, b: Array, scale: float,
-                  guess: Array | None = None, active: Mask | None = None) -> StepProblem:
+def position_step(
+    problem: ContactProblem,
+    state: State,
+    A: EffectiveMatrix,
+    dt: float,
+    *,
+    b: Array,
+    scale: float,
+    guess: Array | None = None,
+    active: Mask | None = None,
+) -> StepProblem:
     """Return the step A x = b - …, x = u1: gap and slip of the end of the step; by default free flight as the guess."""
     end = state.t + dt
-    return StepProblem(A=A, b=b, bound=problem.surface.gap(end), surface=problem.surface, scale=scale,
-                       guess=state.u + dt * state.v if guess is None else guess,
-                       active=state.active if active is None else active, t=end, k=state.k + 1,
-                       friction=problem.friction, slip0=problem.slip_origin(state.u, state.t, end),
-                       rate_factor=1.0 / dt)
+    return StepProblem(
+        A=A,
+        b=b,
+        bound=problem.surface.gap(end),
+        surface=problem.surface,
+        scale=scale,
+        guess=state.u + dt * state.v if guess is None else guess,
+        active=state.active if active is None else active,
+        t=end,
+        k=state.k + 1,
+        friction=problem.friction,
+        slip0=problem.slip_origin(state.u, state.t, end),
+        rate_factor=1.0 / dt,
+    )
 
 
 def stepped(step: StepProblem, result: StepResult, u: Array, v: Array) -> State:
@@ -66,7 +86,9 @@ def stepped(step: StepProblem, result: StepResult, u: Array, v: Array) -> State:
     return State(step.t, step.k, u, v, result.r_n / step.scale, result.active, r_t=r_t)
 
 
-def means(problem: ContactProblem, old: State, new: State, dt: float, *, u: Array, f: Array) -> Balance:
+def means(
+    problem: ContactProblem, old: State, new: State, dt: float, *, u: Array, f: Array
+) -> Balance:
     """Return the equation of a step with mean u and f, mean rates of u and v, and the reactions of the new state."""
     v, a = problem.equations.rates(old.u, new.u, old.v, new.v, dt)
     return Balance(u=u, v=v, a=a, f=f, r_n=new.r_n, r_t=new.r_t)
@@ -81,14 +103,19 @@ def check_balance(name: str, problem: ContactProblem) -> None:
     _refuse_massless_elsewhere(problem)
     massless, surface = problem.equations.massless is not None, problem.surface
     if massless and problem.impact is not None:
-        raise InputError(f"the impact law {problem.impact} acts on the mass of contact nodes, which is zero in this "
-                         "problem: leave the law out, or give the problem mass=ConsistentMass()")
+        raise InputError(
+            f"the impact law {problem.impact} acts on the mass of contact nodes, which is zero in this "
+            "problem: leave the law out, or give the problem mass=ConsistentMass()"
+        )
     if massless or not surface.some(~surface.bilateral & surface.rigid):
         return
     told = problem.equations.cached(f"told of {name}", list, surface)
     if not told and surface.comm.rank == 0:
-        log.warning("%s with consistent mass can gain energy whenever a contact opens: leave out "
-                    "mass=ConsistentMass(), or take ContactStabilisedNewmark() or Midpoint()", name)
+        log.warning(
+            "%s with consistent mass can gain energy whenever a contact opens: leave out "
+            "mass=ConsistentMass(), or take ContactStabilisedNewmark() or Midpoint()",
+            name,
+        )
     told.append(True)
 
 
@@ -96,5 +123,7 @@ def _refuse_massless_elsewhere(problem: ContactProblem) -> None:
     """Raise InputError for unknowns without mass beside contact nodes with mass."""
     layer, surface = problem.equations.massless, problem.surface
     if layer is not None and surface.some(~layer[surface.owned]):
-        raise InputError("rows of M are zero while contact nodes have mass: condense these unknowns out of K (it is "
-                         "exact, as for rotations of a lumped beam), give them mass, or use mass=Redistributed()")
+        raise InputError(
+            "rows of M are zero while contact nodes have mass: condense these unknowns out of K (it is "
+            "exact, as for rotations of a lumped beam), give them mass, or use mass=Redistributed()"
+        )

@@ -33,7 +33,9 @@ from ..solvers.certified import TOLERANCE, CertifiedSolver
 ROUND_OFF = 1e-12  # of the largest displacement or velocity: smaller gaps and velocities are zero
 
 
-def consistent_acceleration(problem: ContactProblem, state: State, dt: float) -> tuple[Array, Array]:
+def consistent_acceleration(
+    problem: ContactProblem, state: State, dt: float
+) -> tuple[Array, Array]:
     """Return (a [m/s²], B_nᵀ r_n + B_tᵀ r_t [N]) of the state's u and v, owned unknowns of the rotated basis."""
     system = problem.equations
     force = system.load(state.t) - system.K @ state.u
@@ -48,12 +50,16 @@ def consistent_acceleration(problem: ContactProblem, state: State, dt: float) ->
     return a, force - moving
 
 
-def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float) -> tuple[Array, Array]:
+def _with_contact(
+    problem: ContactProblem, state: State, force: Array, dt: float
+) -> tuple[Array, Array]:
     """Solve the small problem of points that rest on their support."""
     surface, rigid = problem.surface, problem.surface.rigid
     compression = surface.normal_values(state.u) - surface.gap(state.t)
     pressed = np.divide(compression, surface.compliance, out=np.zeros(surface.count), where=~rigid)
-    pressed = np.where(surface.bilateral, pressed, np.maximum(pressed, 0.0))  # only bilateral springs pull
+    pressed = np.where(
+        surface.bilateral, pressed, np.maximum(pressed, 0.0)
+    )  # only bilateral springs pull
     springs = surface.reaction_load(pressed, len(force))
     u_max, v_max = ROUND_OFF * surface.comm.max(np.array([max_abs(state.u), max_abs(state.v)]))
     still = (compression >= -u_max) & (np.abs(surface.normal_values(state.v)) <= v_max)
@@ -62,11 +68,25 @@ def _with_contact(problem: ContactProblem, state: State, force: Array, dt: float
     if problem.frictional:
         rate, sliding = surface.tangential_values(state.v), surface.sliding(state.t, state.t + dt)
         rate = rate if sliding is None else rate - sliding / dt
-    step = StepProblem(A=mass_matrix(problem), b=force - springs, bound=np.where(resting, 0.0, np.inf),
-                       surface=rigid_part(surface), scale=1.0, guess=np.zeros_like(force), active=resting, t=state.t,
-                       k=state.k, friction=problem.friction, slip0=None if rate is None else -rate / dt, rate_factor=dt)
-    solver: PreparedSolver = problem.equations.cached("resting contacts", lambda: solver_beside_steps(
-        step.A, step.surface).prepare(step.A, step.surface, 1.0), surface)
+    step = StepProblem(
+        A=mass_matrix(problem),
+        b=force - springs,
+        bound=np.where(resting, 0.0, np.inf),
+        surface=rigid_part(surface),
+        scale=1.0,
+        guess=np.zeros_like(force),
+        active=resting,
+        t=state.t,
+        k=state.k,
+        friction=problem.friction,
+        slip0=None if rate is None else -rate / dt,
+        rate_factor=dt,
+    )
+    solver: PreparedSolver = problem.equations.cached(
+        "resting contacts",
+        lambda: solver_beside_steps(step.A, step.surface).prepare(step.A, step.surface, 1.0),
+        surface,
+    )
     result = solver.solve(step)
     return result.x, springs + surface.reaction_load(result.r_n, len(force), result.r_t)
 
@@ -84,7 +104,9 @@ def mass_matrix(problem: ContactProblem) -> EffectiveMatrix:
 
 def rigid_part(surface: ContactSurface) -> ContactSurface:
     """Return the surface without springs: they are loads here, not bounds."""
-    return replace(surface, compliance=np.zeros(surface.count), bilateral=surface.bilateral & surface.rigid)
+    return replace(
+        surface, compliance=np.zeros(surface.count), bilateral=surface.bilateral & surface.rigid
+    )
 
 
 def equilibrated(problem: ContactProblem, state: State) -> State:
@@ -95,16 +117,35 @@ def equilibrated(problem: ContactProblem, state: State) -> State:
     if layer is None:
         return state
     load = system.load(state.t) - system.K @ np.where(layer, 0.0, state.u)
-    A = system.cached("massless block", lambda: EffectiveMatrix(system.algebra.block(system.K, layer), system.algebra))
-    place = np.where(layer, np.cumsum(layer) - 1, -1)  # among the massless unknowns, as all normal ones are
+    A = system.cached(
+        "massless block",
+        lambda: EffectiveMatrix(system.algebra.block(system.K, layer), system.algebra),
+    )
+    place = np.where(
+        layer, np.cumsum(layer) - 1, -1
+    )  # among the massless unknowns, as all normal ones are
     surface = problem.surface
     tangents = np.where(surface.tangents >= 0, place[surface.tangents], -1)
-    surface = replace(surface, owned=place[surface.owned], tangents=tangents, basis=None, coupling=None, dual=None)
-    step = StepProblem(A=A, b=load[layer], bound=surface.gap(state.t), surface=surface, scale=1.0, guess=state.u[layer],
-                       active=state.active, t=state.t, k=state.k, friction=problem.friction,
-                       slip0=problem.slip_origin(state.u, state.t, state.t))
+    surface = replace(
+        surface, owned=place[surface.owned], tangents=tangents, basis=None, coupling=None, dual=None
+    )
+    step = StepProblem(
+        A=A,
+        b=load[layer],
+        bound=surface.gap(state.t),
+        surface=surface,
+        scale=1.0,
+        guess=state.u[layer],
+        active=state.active,
+        t=state.t,
+        k=state.k,
+        friction=problem.friction,
+        slip0=problem.slip_origin(state.u, state.t, state.t),
+    )
     solver = solver_beside_steps(A, surface)
-    result, _, _ = CertifiedSolver(problem, A, 1.0, [solver], TOLERANCE, surface=surface).solve(step)
+    result, _, _ = CertifiedSolver(problem, A, 1.0, [solver], TOLERANCE, surface=surface).solve(
+        step
+    )
     u = state.u.copy()
     u[layer] = result.x
     return replace(state, u=u, r_n=result.r_n, r_t=result.r_t, active=result.active)

@@ -50,25 +50,49 @@ class ContactStabilisedNewmark(SingleStep):
         """Return A = 4/dt² M + 2/dt C + K."""
         return problem.equations.effective(m=4.0 / dt**2, c=2.0 / dt, k=1.0, shares=True)
 
-    def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
+    def step(
+        self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
+    ) -> StepProblem:
         """Return the step with b of the module's equations."""
         system = problem.equations
         u_p, active = free, _ = state.u + dt * state.v, state.active
         if self.projected:
             u_p, active = admissible(problem, state, free, dt)
-        Mu = system.product("M", state.u) + dt * system.product("M", state.v) if u_p is free else system.M @ u_p
-        b = 2.0 * system.load_at(state.t + 0.5 * dt) + 4.0 / dt**2 * Mu - system.product("K", state.u)
+        Mu = (
+            system.product("M", state.u) + dt * system.product("M", state.v)
+            if u_p is free
+            else system.M @ u_p
+        )
+        b = (
+            2.0 * system.load_at(state.t + 0.5 * dt)
+            + 4.0 / dt**2 * Mu
+            - system.product("K", state.u)
+        )
         if system.C is not None:
             b += 2.0 / dt * system.product("C", state.u)
         return position_step(problem, state, A, dt, b=b, scale=2.0, guess=u_p, active=active)
 
-    def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
+    def finish(
+        self,
+        problem: ContactProblem,
+        state: State,
+        step: StepProblem,
+        result: StepResult,
+        dt: float,
+    ) -> State:
         """Return the state with v1 = v0 + 2/dt (u1 - u_p)."""
         return stepped(step, result, result.x, state.v + 2.0 / dt * (result.x - step.guess))
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the averages of the equation above."""
-        return means(problem, old, new, dt, u=0.5 * (old.u + new.u), f=problem.equations.load_at(old.t + 0.5 * dt))
+        return means(
+            problem,
+            old,
+            new,
+            dt,
+            u=0.5 * (old.u + new.u),
+            f=problem.equations.load_at(old.t + 0.5 * dt),
+        )
 
 
 def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tuple[Array, Mask]:
@@ -90,12 +114,28 @@ def admissible(problem: ContactProblem, state: State, u: Array, dt: float) -> tu
         surface,
     )
     M = mass_matrix(problem)
-    solver: CertifiedSolver = system.cached("admissible predictor", lambda: CertifiedSolver(
-        bounds, M, 1.0, [solver_beside_steps(M, bounds.surface)], TOLERANCE), surface)
-    step = StepProblem(A=M, b=np.zeros_like(u), bound=gap, surface=bounds.surface, scale=1.0, guess=np.zeros_like(u),
-                       active=closed, t=state.t + dt, k=state.k + 1)
+    solver: CertifiedSolver = system.cached(
+        "admissible predictor",
+        lambda: CertifiedSolver(
+            bounds, M, 1.0, [solver_beside_steps(M, bounds.surface)], TOLERANCE
+        ),
+        surface,
+    )
+    step = StepProblem(
+        A=M,
+        b=np.zeros_like(u),
+        bound=gap,
+        surface=bounds.surface,
+        scale=1.0,
+        guess=np.zeros_like(u),
+        active=closed,
+        t=state.t + dt,
+        k=state.k + 1,
+    )
     try:
         result, _, _ = solver.solve(step)
     except StepFailure as failure:
-        raise StepFailure(f"the predictor could not be brought out of the obstacle: {failure}") from failure
+        raise StepFailure(
+            f"the predictor could not be brought out of the obstacle: {failure}"
+        ) from failure
     return u + result.x, result.active

@@ -80,7 +80,9 @@ class AlphaStep(BalanceStep, ABC):
         a = (w.beta - 0.5) / w.beta * a0 - (state.u + dt * state.v) / (w.beta * dt**2)
         return state.v + dt * ((1.0 - w.gamma) * a0 + w.gamma * a), a
 
-    def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
+    def step(
+        self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
+    ) -> StepProblem:
         """Return the step with b = f1 - C v1 - (M a_m - alpha_f (f0 - C v0 - K u0 - Bᵀr0))/(1 - alpha_f) at u1 = 0."""
         system, w = problem.equations, self.weights
         v, a = self._known(state, dt)
@@ -88,20 +90,33 @@ class AlphaStep(BalanceStep, ABC):
         b = system.load_at(state.t + dt) - system.M @ mean
         if w.alpha_f != 0.0:
             ratio = w.alpha_f / (1.0 - w.alpha_f)
-            b += ratio * (system.load_at(state.t) - system.product("K", state.u) - state.memory["reaction"])
+            b += ratio * (
+                system.load_at(state.t) - system.product("K", state.u) - state.memory["reaction"]
+            )
             v = v + ratio * state.v
         if system.C is not None:
             b -= system.C @ v
         return position_step(problem, state, A, dt, b=b, scale=1.0)
 
-    def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
+    def finish(
+        self,
+        problem: ContactProblem,
+        state: State,
+        step: StepProblem,
+        result: StepResult,
+        dt: float,
+    ) -> State:
         """Return the state with a1 and v1 from u1; massless unknowns get none and the mean velocity of the step."""
         w = self.weights
         v, a = self._known(state, dt)
         v += w.gamma / (w.beta * dt) * result.x
         a += result.x / (w.beta * dt**2)
         reaction = problem.surface.reaction_load(result.r_n, v.shape[-1], result.r_t)
-        memory = {"a": massless_take(problem, 0.0, a), "reaction": reaction, "of": self._mark(step.t)}
+        memory = {
+            "a": massless_take(problem, 0.0, a),
+            "reaction": reaction,
+            "of": self._mark(step.t),
+        }
         v = massless_take(problem, (result.x - state.u) / dt, v)
         return State(step.t, step.k, result.x, v, result.r_n, result.active, memory, result.r_t)
 
@@ -110,13 +125,19 @@ class AlphaStep(BalanceStep, ABC):
         return weighted(problem, old, new, self.weights.alpha_m, self.weights.alpha_f)
 
 
-def weighted(problem: ContactProblem, old: State, new: State, m: float, f: float, level: str = "") -> Balance:
+def weighted(
+    problem: ContactProblem, old: State, new: State, m: float, f: float, level: str = ""
+) -> Balance:
     """Return 1 - m of the new and m of the old acceleration, 1 - f and f of all else; ``level``: of names in memory."""
     load, surface, r0 = problem.equations.load_at, problem.surface, old.memory[f"reaction{level}"]
-    return Balance(u=(1.0 - f) * new.u + f * old.u, v=(1.0 - f) * new.v + f * old.v,
-                   a=(1.0 - m) * new.memory[f"a{level}"] + m * old.memory[f"a{level}"],
-                   f=(1.0 - f) * load(new.t) + f * load(old.t), r_n=(1.0 - f) * new.r_n + f * surface.normal_values(r0),
-                   r_t=None if new.r_t is None else (1.0 - f) * new.r_t + f * surface.tangential_values(r0))
+    return Balance(
+        u=(1.0 - f) * new.u + f * old.u,
+        v=(1.0 - f) * new.v + f * old.v,
+        a=(1.0 - m) * new.memory[f"a{level}"] + m * old.memory[f"a{level}"],
+        f=(1.0 - f) * load(new.t) + f * load(old.t),
+        r_n=(1.0 - f) * new.r_n + f * surface.normal_values(r0),
+        r_t=None if new.r_t is None else (1.0 - f) * new.r_t + f * surface.tangential_values(r0),
+    )
 
 
 @dataclass(frozen=True)
@@ -129,13 +150,19 @@ class GeneralisedAlpha(AlphaStep):
     gamma: float
 
     def __post_init__(self) -> None:
-        alpha_m, alpha_f, beta, gamma = (real(getattr(self, name)) for name in self.__dataclass_fields__)
+        alpha_m, alpha_f, beta, gamma = (
+            real(getattr(self, name)) for name in self.__dataclass_fields__
+        )
         least = 0.5 - alpha_m + alpha_f
         stable = alpha_m <= alpha_f + SLACK and alpha_f <= 0.5 + SLACK and gamma >= least - SLACK
         if not (stable and np.inf > beta >= 0.5 * gamma - SLACK and np.isfinite(least + gamma)):
-            told = ", ".join(f"{name}={shown(getattr(self, name))}" for name in self.__dataclass_fields__)
-            raise InputError(f"{told} are not unconditionally stable, and contact has no highest frequency to choose "
-                             "dt by: give alpha_m <= alpha_f <= 1/2, gamma >= 1/2 - alpha_m + alpha_f, beta >= gamma/2")
+            told = ", ".join(
+                f"{name}={shown(getattr(self, name))}" for name in self.__dataclass_fields__
+            )
+            raise InputError(
+                f"{told} are not unconditionally stable, and contact has no highest frequency to choose "
+                "dt by: give alpha_m <= alpha_f <= 1/2, gamma >= 1/2 - alpha_m + alpha_f, beta >= gamma/2"
+            )
 
     @property
     def weights(self) -> "GeneralisedAlpha":

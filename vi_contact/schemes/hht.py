@@ -24,7 +24,13 @@ class HHT(AlphaStep):
     alpha: float = -0.1
 
     def __post_init__(self) -> None:
-        between("HHT alpha", self.alpha, -1.0 / 3.0, 0.0, "give a number from -1/3 to 0, others are not stable")
+        between(
+            "HHT alpha",
+            self.alpha,
+            -1.0 / 3.0,
+            0.0,
+            "give a number from -1/3 to 0, others are not stable",
+        )
 
     @cached_property
     def weights(self) -> GeneralisedAlpha:

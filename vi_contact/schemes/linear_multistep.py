@@ -54,28 +54,46 @@ class LinearMultistep(BalanceStep):
         number("LinearMultistep", "mu", self.mu)
         q = len(self.a) - 1
         if q < 1 or len(self.b) != q + 1 or len(self.gamma) != q + 1:
-            raise InputError("LinearMultistep: give a, b and gamma of one length q + 1 >= 2 (levels p, ..., p-q)")
+            raise InputError(
+                "LinearMultistep: give a, b and gamma of one length q + 1 >= 2 (levels p, ..., p-q)"
+            )
         if self.b[0] == 0.0 or self.mu == 0.0 or self.gamma[0] == 0.0:
-            raise InputError("LinearMultistep: give b[0], gamma[0] and mu other than zero, as only implicit schemes "
-                             "can hold contact")
+            raise InputError(
+                "LinearMultistep: give b[0], gamma[0] and mu other than zero, as only implicit schemes "
+                "can hold contact"
+            )
         level = -np.arange(q + 1.0)
         a, b, gamma = (np.asarray(c, dtype=float) for c in (self.a, self.b, self.gamma))
-        defects = (a.sum(), a @ level - b.sum(), gamma.sum(), gamma @ level, gamma @ level**2 - 2.0 * self.mu * b.sum())
+        defects = (
+            a.sum(),
+            a @ level - b.sum(),
+            gamma.sum(),
+            gamma @ level,
+            gamma @ level**2 - 2.0 * self.mu * b.sum(),
+        )
         scale = np.abs(a).sum() + np.abs(b).sum() + np.abs(gamma).sum()
         if not np.max(np.abs(defects)) <= 1e-12 * scale * (q + 1) ** 2:
-            raise InputError("LinearMultistep coefficients are inconsistent: give some for which eq. 11a is exact for "
-                             "u = 1, t and eq. 11b for u = 1, t, t²")
+            raise InputError(
+                "LinearMultistep coefficients are inconsistent: give some for which eq. 11a is exact for "
+                "u = 1, t and eq. 11b for u = 1, t, t²"
+            )
         if self.spectral_radius() > 1.0 + 1e-6:
-            raise InputError(f"LinearMultistep a={self.a}, b={self.b}, gamma={self.gamma} is not unconditionally "
-                             "stable: contact has no highest frequency to choose dt by; take other coefficients, for "
-                             "Newmark beta >= gamma/2 >= 1/4")
+            raise InputError(
+                f"LinearMultistep a={self.a}, b={self.b}, gamma={self.gamma} is not unconditionally "
+                "stable: contact has no highest frequency to choose dt by; take other coefficients, for "
+                "Newmark beta >= gamma/2 >= 1/4"
+            )
 
     def spectral_radius(self) -> float:
         """Return the largest |z| of the solutions u(p) = z^p of u'' + 2 xi w u' + w² u = 0 over FREQUENCIES w dt and
         DAMPING xi: roots of gamma(z)/mu + 2 xi w dt a(z) + (w dt)² b(z)."""
         a, b, gamma = (np.asarray(c, dtype=float) for c in (self.a, self.b, self.gamma))
-        polynomials = [b] + [gamma / (self.mu * w**2) + 2.0 * xi / w * a + b for w in FREQUENCIES for xi in DAMPING]
-        return max(float(np.max(np.abs(np.roots(polynomial)), initial=0.0)) for polynomial in polynomials)
+        polynomials = [b] + [
+            gamma / (self.mu * w**2) + 2.0 * xi / w * a + b for w in FREQUENCIES for xi in DAMPING
+        ]
+        return max(
+            float(np.max(np.abs(np.roots(polynomial)), initial=0.0)) for polynomial in polynomials
+        )
 
     @classmethod
     def newmark(cls, beta: float = 0.25, gamma: float = 0.5) -> "LinearMultistep":
@@ -83,7 +101,9 @@ class LinearMultistep(BalanceStep):
         for name, value in (("beta", beta), ("gamma", gamma)):
             number("LinearMultistep.newmark", name, value)
         if beta <= 0.0:
-            raise InputError(f"Newmark beta is {beta}: give beta > 0, as the explicit scheme cannot hold contact")
+            raise InputError(
+                f"Newmark beta is {beta}: give beta > 0, as the explicit scheme cannot hold contact"
+            )
         b = (beta, 0.5 + gamma - 2.0 * beta, 0.5 - gamma + beta)
         return cls(a=(gamma, 1.0 - 2.0 * gamma, gamma - 1.0), b=b, gamma=(1.0, -2.0, 1.0))
 
@@ -139,7 +159,9 @@ class LinearMultistep(BalanceStep):
             a += self.gamma[r] * levels[f"u_{r}"] - self.mu * dt**2 * self.b[r] * levels[f"a_{r}"]
         return v / (dt * self.b[0]), a / (self.mu * dt**2 * self.b[0])
 
-    def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
+    def step(
+        self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
+    ) -> StepProblem:
         """Return the step with b = f(t_p) - M a_known - C v_known."""
         system = problem.equations
         v, a = self._known(self._levels(state), dt)
@@ -148,15 +170,29 @@ class LinearMultistep(BalanceStep):
             b -= system.C @ v
         return position_step(problem, state, A, dt, b=b, scale=1.0)
 
-    def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
+    def finish(
+        self,
+        problem: ContactProblem,
+        state: State,
+        step: StepProblem,
+        result: StepResult,
+        dt: float,
+    ) -> State:
         """Return the state with velocity and acceleration from eqs. 11c,d; the levels move one down."""
         levels = self._levels(state)
         (v_known, a_known), (by_v, by_a) = self._known(levels, dt), self._factors(dt)
         v = massless_take(problem, (result.x - state.u) / dt, v_known + by_v * result.x)
         a = massless_take(problem, 0.0, a_known + by_a * result.x)
         reaction = problem.surface.reaction_load(result.r_n, v.shape[-1], result.r_t)
-        newest = {"a_0": a, "reaction_0": reaction, "dt": state.memory["dt"], "t": np.array([step.t])}
-        return State(step.t, step.k, result.x, v, result.r_n, result.active, levels | newest, result.r_t)
+        newest = {
+            "a_0": a,
+            "reaction_0": reaction,
+            "dt": state.memory["dt"],
+            "t": np.array([step.t]),
+        }
+        return State(
+            step.t, step.k, result.x, v, result.r_n, result.active, levels | newest, result.r_t
+        )
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the mean of the equations of motion at both ends of the step, the old end after its impact."""

@@ -55,30 +55,48 @@ class MoreauJean(SingleStep):
 
     def __post_init__(self) -> None:
         flag("MoreauJean", "allow_energy_gain", self.allow_energy_gain)
-        between("MoreauJean e", self.e, 0.0, 1.0, "give a restitution from 0 (inelastic) to 1 (elastic)")
-        between("MoreauJean theta", self.theta, 0.5, 1.0, "give a weight from 0.5 to 1, less is unstable")
+        between(
+            "MoreauJean e", self.e, 0.0, 1.0, "give a restitution from 0 (inelastic) to 1 (elastic)"
+        )
+        between(
+            "MoreauJean theta",
+            self.theta,
+            0.5,
+            1.0,
+            "give a weight from 0.5 to 1, less is unstable",
+        )
         largest = 1.0 / (1.0 + self.e)
         if self.theta > largest + 1e-12 and not self.allow_energy_gain:
-            raise InputError(f"MoreauJean theta={self.theta} with e={self.e} creates energy in impacts: give theta "
-                             f"from 0.5 to 1/(1 + e) = {largest:g}, or allow_energy_gain=True")
+            raise InputError(
+                f"MoreauJean theta={self.theta} with e={self.e} creates energy in impacts: give theta "
+                f"from 0.5 to 1/(1 + e) = {largest:g}, or allow_energy_gain=True"
+            )
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for massless contact nodes, springs, an impact law, or a bilateral point with a gap."""
         super().check(problem)
         surface = problem.surface
         if surface.some(surface.compliance > 0.0):
-            raise InputError("MoreauJean has unilateral velocities, which do not fit elastic supports: use "
-                             "ContactStabilisedNewmark() or Midpoint() there")
+            raise InputError(
+                "MoreauJean has unilateral velocities, which do not fit elastic supports: use "
+                "ContactStabilisedNewmark() or Midpoint() there"
+            )
         if problem.impact is not None:
-            raise InputError(f"MoreauJean has its own restitution coefficient and {problem.impact} would act on top of "
-                             "it: leave the impact law out, and give MoreauJean(e=…)")
+            raise InputError(
+                f"MoreauJean has its own restitution coefficient and {problem.impact} would act on top of "
+                "it: leave the impact law out, and give MoreauJean(e=…)"
+            )
         if surface.some(surface.bilateral & (surface.gap0 > 0.0)):
-            raise InputError("MoreauJean holds the velocity of bilateral points and would never close their initial "
-                             "gap: let them start on the obstacle, or use another scheme")
+            raise InputError(
+                "MoreauJean holds the velocity of bilateral points and would never close their initial "
+                "gap: let them start on the obstacle, or use another scheme"
+            )
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """Return A = M + theta dt C + theta² dt² K."""
-        return problem.equations.effective(m=1.0, c=self.theta * dt, k=(self.theta * dt) ** 2, shares=True)
+        return problem.equations.effective(
+            m=1.0, c=self.theta * dt, k=(self.theta * dt) ** 2, shares=True
+        )
 
     def _load(self, problem: ContactProblem, t: float, dt: float) -> Array:
         load = problem.equations.load_at
@@ -90,30 +108,66 @@ class MoreauJean(SingleStep):
         obstacle = 0.0 if advance is None else -advance / dt
         v_n = surface.normal_values(state.v) - obstacle
         returning = -self.e if self.allow_energy_gain else -(1.0 - self.theta) / self.theta
-        return obstacle + np.where(surface.bilateral, 0.0, np.where(v_n < 0.0, returning, -self.e) * v_n)
+        return obstacle + np.where(
+            surface.bilateral, 0.0, np.where(v_n < 0.0, returning, -self.e) * v_n
+        )
 
-    def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
+    def step(
+        self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
+    ) -> StepProblem:
         """Return the step with b = M v0 + dt (f_θ - K (u0 + theta (1 - theta) dt v0) - (1 - theta) C v0)."""
         system, surface, left = problem.equations, problem.surface, 1.0 - self.theta
         force = self._load(problem, state.t, dt) - system.product("K", state.u)
         force -= self.theta * left * dt * system.product("K", state.v)
         if system.C is not None:
             force -= left * system.product("C", state.v)
-        middle = surface.gap(state.t + 0.5 * dt) - surface.normal_values(state.u + 0.5 * dt * state.v)
+        middle = surface.gap(state.t + 0.5 * dt) - surface.normal_values(
+            state.u + 0.5 * dt * state.v
+        )
         size = largest(surface.comm, max(max_abs(state.u), dt * max_abs(state.v)))
-        closed = np.asarray((middle <= ROUND_OFF * size) | surface.bilateral)  # if nothing stops them; and held points
+        closed = np.asarray(
+            (middle <= ROUND_OFF * size) | surface.bilateral
+        )  # if nothing stops them; and held points
         sliding = surface.sliding(state.t, state.t + dt)
-        slip = np.zeros((surface.count, surface.tangents.shape[1])) if sliding is None else sliding / dt
-        return StepProblem(A=A, b=system.product("M", state.v) + dt * force,
-                           bound=np.where(closed, self._target(problem, state, dt), np.inf), surface=surface, scale=dt,
-                           guess=state.v, active=closed, t=state.t + dt, k=state.k + 1, friction=problem.friction,
-                           slip0=slip if problem.frictional else None, rate_factor=1.0)
+        slip = (
+            np.zeros((surface.count, surface.tangents.shape[1]))
+            if sliding is None
+            else sliding / dt
+        )
+        return StepProblem(
+            A=A,
+            b=system.product("M", state.v) + dt * force,
+            bound=np.where(closed, self._target(problem, state, dt), np.inf),
+            surface=surface,
+            scale=dt,
+            guess=state.v,
+            active=closed,
+            t=state.t + dt,
+            k=state.k + 1,
+            friction=problem.friction,
+            slip0=slip if problem.frictional else None,
+            rate_factor=1.0,
+        )
 
-    def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
+    def finish(
+        self,
+        problem: ContactProblem,
+        state: State,
+        step: StepProblem,
+        result: StepResult,
+        dt: float,
+    ) -> State:
         """Return the state with u1 = u0 + dt v_θ."""
         u = state.u + dt * ((1.0 - self.theta) * state.v + self.theta * result.x)
         return stepped(step, result, u, result.x)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the averages of the equation above."""
-        return means(problem, old, new, dt, u=old.u + self.theta * (new.u - old.u), f=self._load(problem, old.t, dt))
+        return means(
+            problem,
+            old,
+            new,
+            dt,
+            u=old.u + self.theta * (new.u - old.u),
+            f=self._load(problem, old.t, dt),
+        )

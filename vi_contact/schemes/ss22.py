@@ -33,25 +33,40 @@ class SS22(SingleStep):
 
     def __post_init__(self) -> None:
         if not np.inf > real(self.theta2) >= real(self.theta1) >= 0.5:
-            raise InputError(f"SS22 weights theta1={shown(self.theta1)}, theta2={shown(self.theta2)}: give theta2 >= "
-                             "theta1 >= 0.5, the unconditionally stable range")
+            raise InputError(
+                f"SS22 weights theta1={shown(self.theta1)}, theta2={shown(self.theta2)}: give theta2 >= "
+                "theta1 >= 0.5, the unconditionally stable range"
+            )
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """Return A = 2/(theta2 dt²) M + 2 theta1/(theta2 dt) C + K."""
         theta1, theta2 = self.theta1, self.theta2
-        return problem.equations.effective(m=2.0 / (theta2 * dt**2), c=2.0 * theta1 / (theta2 * dt), k=1.0)
+        return problem.equations.effective(
+            m=2.0 / (theta2 * dt**2), c=2.0 * theta1 / (theta2 * dt), k=1.0
+        )
 
-    def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
+    def step(
+        self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
+    ) -> StepProblem:
         """Return the step with b = A (u0 + dt v0) + (f - C v0 - K (u0 + theta1 dt v0))/theta2."""
         system = problem.equations
         guess = state.u + dt * state.v
-        force = system.load_at(state.t + self.theta1 * dt) - system.K @ (state.u + self.theta1 * dt * state.v)
+        force = system.load_at(state.t + self.theta1 * dt) - system.K @ (
+            state.u + self.theta1 * dt * state.v
+        )
         if system.C is not None:
             force -= system.C @ state.v
         b = A @ guess + force / self.theta2
         return position_step(problem, state, A, dt, b=b, scale=1.0 / self.theta2, guess=guess)
 
-    def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
+    def finish(
+        self,
+        problem: ContactProblem,
+        state: State,
+        step: StepProblem,
+        result: StepResult,
+        dt: float,
+    ) -> State:
         """Return the state with alpha = 2 (u1 - u0 - dt v0)/dt², v1 = v0 + dt alpha."""
         v = state.v + 2.0 * (result.x - step.guess) / dt
         return stepped(step, result, result.x, v)
@@ -60,5 +75,7 @@ class SS22(SingleStep):
         """Return the averages of the residual equation."""
         alpha = (new.v - old.v) / dt
         u = old.u + self.theta1 * dt * old.v + 0.5 * self.theta2 * dt**2 * alpha
-        mean = means(problem, old, new, dt, u=u, f=problem.equations.load_at(old.t + self.theta1 * dt))
+        mean = means(
+            problem, old, new, dt, u=u, f=problem.equations.load_at(old.t + self.theta1 * dt)
+        )
         return replace(mean, v=old.v + self.theta1 * dt * alpha)

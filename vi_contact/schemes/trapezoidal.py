@@ -42,8 +42,10 @@ class Trapezoidal:
         """Raise InputError for an impact law on massless contact nodes, and a mass of its own beside that of the
         problem; warn when contact nodes have mass."""
         if self.mass not in (Redistributed(), problem.mass):
-            raise InputError(f"Trapezoidal: mass={self.mass} is not read, as the problem has mass={problem.mass}: "
-                             "leave one of the two out")
+            raise InputError(
+                f"Trapezoidal: mass={self.mass} is not read, as the problem has mass={problem.mass}: "
+                "leave one of the two out"
+            )
         check_balance("Trapezoidal()", problem)
 
     def start(self, problem: ContactProblem, state: State, dt: float) -> State:
@@ -56,7 +58,10 @@ class Trapezoidal:
         """Keep f - K u - Bᵀr of the state: the next step starts with it."""
         system = problem.equations
         reaction = problem.surface.reaction_load(state.r_n, system.rows, state.r_t)
-        return replace(state, memory={"force": system.load_at(state.t) - system.product("K", state.u) - reaction})
+        return replace(
+            state,
+            memory={"force": system.load_at(state.t) - system.product("K", state.u) - reaction},
+        )
 
     def jump(self, problem: ContactProblem, state: State, v: Array, dt: float) -> State:
         """Return the state with the new velocity; forces do not depend on it."""
@@ -66,7 +71,9 @@ class Trapezoidal:
         """Return A = 4/dt² M + 2/dt C + K."""
         return problem.equations.effective(m=4.0 / dt**2, c=2.0 / dt, k=1.0, shares=True)
 
-    def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
+    def step(
+        self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
+    ) -> StepProblem:
         """Return the step with b of the module's equations."""
         system = problem.equations
         b = state.memory["force"] + system.load_at(state.t + dt)
@@ -75,7 +82,14 @@ class Trapezoidal:
             b += 2.0 / dt * system.product("C", state.u)
         return position_step(problem, state, A, dt, b=b, scale=1.0)
 
-    def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
+    def finish(
+        self,
+        problem: ContactProblem,
+        state: State,
+        step: StepProblem,
+        result: StepResult,
+        dt: float,
+    ) -> State:
         """Return the state with v1 = 2 (u1 - u0)/dt - v0; massless unknowns get the mean velocity of the step."""
         mean = (result.x - state.u) / dt
         v = massless_take(problem, mean, 2.0 / dt * (result.x - state.u) - state.v)
@@ -85,5 +99,7 @@ class Trapezoidal:
         """Return the means of both ends."""
         load = problem.equations.load_at
         r_t = None if new.r_t is None else 0.5 * (new.r_t if old.r_t is None else old.r_t + new.r_t)
-        end = means(problem, old, new, dt, u=0.5 * (old.u + new.u), f=0.5 * (load(old.t) + load(new.t)))
+        end = means(
+            problem, old, new, dt, u=0.5 * (old.u + new.u), f=0.5 * (load(old.t) + load(new.t))
+        )
         return replace(end, r_n=0.5 * (old.r_n + new.r_n), r_t=r_t)

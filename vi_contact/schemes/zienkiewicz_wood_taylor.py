@@ -31,16 +31,26 @@ class ZienkiewiczWoodTaylor(SingleStep):
     phi: float = 0.5
 
     def __post_init__(self) -> None:
-        between("ZienkiewiczWoodTaylor phi", self.phi, 0.5, 1.0, "give a weight from 0.5 to 1, less is unstable")
+        between(
+            "ZienkiewiczWoodTaylor phi",
+            self.phi,
+            0.5,
+            1.0,
+            "give a weight from 0.5 to 1, less is unstable",
+        )
 
     def effective_matrix(self, problem: ContactProblem, dt: float) -> EffectiveMatrix:
         """Return A = M/(phi dt)² + C/(phi dt) + K."""
-        return problem.equations.effective(m=1.0 / (self.phi * dt) ** 2, c=1.0 / (self.phi * dt), k=1.0, shares=True)
+        return problem.equations.effective(
+            m=1.0 / (self.phi * dt) ** 2, c=1.0 / (self.phi * dt), k=1.0, shares=True
+        )
 
     def _load(self, problem: ContactProblem, state: State, dt: float) -> Array:
         return problem.equations.load_at(state.t + self.phi * dt)
 
-    def step(self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float) -> StepProblem:
+    def step(
+        self, problem: ContactProblem, state: State, A: EffectiveMatrix, dt: float
+    ) -> StepProblem:
         """Return the step with b = f/phi + M (u0 + dt v0)/(phi dt)² + C u0/(phi dt) - (1 - phi)/phi K u0."""
         system, phi = problem.equations, self.phi
         b = self._load(problem, state, dt) / phi
@@ -50,11 +60,25 @@ class ZienkiewiczWoodTaylor(SingleStep):
             b += system.product("C", state.u) / (phi * dt)
         return position_step(problem, state, A, dt, b=b, scale=1.0 / phi)
 
-    def finish(self, problem: ContactProblem, state: State, step: StepProblem, result: StepResult, dt: float) -> State:
+    def finish(
+        self,
+        problem: ContactProblem,
+        state: State,
+        step: StepProblem,
+        result: StepResult,
+        dt: float,
+    ) -> State:
         """Return the state with v1 = v0 + ((u1 - u0)/dt - v0)/phi."""
         v = state.v + ((result.x - state.u) / dt - state.v) / self.phi
         return stepped(step, result, result.x, v)
 
     def balance(self, problem: ContactProblem, old: State, new: State, dt: float) -> Balance:
         """Return the averages of the equation above."""
-        return means(problem, old, new, dt, u=old.u + self.phi * (new.u - old.u), f=self._load(problem, old, dt))
+        return means(
+            problem,
+            old,
+            new,
+            dt,
+            u=old.u + self.phi * (new.u - old.u),
+            f=self._load(problem, old, dt),
+        )

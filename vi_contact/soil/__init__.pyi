@@ -13,4 +13,17 @@ from .strain_compatible import strain_compatible as strain_compatible
 from .upgoing_wave import UpgoingVelocity as UpgoingVelocity
 from .upgoing_wave import upgoing as upgoing
 
-__all__: list[str] = ['BaseMotion', 'CompanionRun', 'FreeField', 'SiteResponse', 'SoilColumn', 'SoilCurves', 'StrainCompatible', 'UpgoingVelocity', 'base_motion', 'equivalent_linear', 'strain_compatible', 'upgoing']
+__all__: list[str] = [
+    "BaseMotion",
+    "CompanionRun",
+    "FreeField",
+    "SiteResponse",
+    "SoilColumn",
+    "SoilCurves",
+    "StrainCompatible",
+    "UpgoingVelocity",
+    "base_motion",
+    "equivalent_linear",
+    "strain_compatible",
+    "upgoing",
+]

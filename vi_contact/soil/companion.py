@@ -45,12 +45,18 @@ class CompanionRun:
         if self._bound is not None and self._bound == (scheme, dt):
             return
         if isinstance(dt, HalvedAtImpact):
-            raise InputError(f"{self.name} is computed beside the run and needs its time steps beforehand, but the "
-                             f"run has {dt!r}: give dt as a number or a Schedule")
+            raise InputError(
+                f"{self.name} is computed beside the run and needs its time steps beforehand, but the "
+                f"run has {dt!r}: give dt as a number or a Schedule"
+            )
         self._bound = scheme, dt
-        if isinstance(dt, Schedule):  # the last piece does not end: only the times of a run are asked for
+        if isinstance(
+            dt, Schedule
+        ):  # the last piece does not end: only the times of a run are asked for
             dt = Schedule((*dt.pieces[:-1], (dt.pieces[-1][0], inf)))
-        self._steps: Iterator[tuple[State, Any]] = march(self._problem, scheme=scheme, dt=dt, steps=LARGEST)
+        self._steps: Iterator[tuple[State, Any]] = march(
+            self._problem, scheme=scheme, dt=dt, steps=LARGEST
+        )
         system = self._problem.system
         self._t, self._u, self._v = [0.0], [system.u0.copy()], [system.v0.copy()]
 
@@ -59,9 +65,11 @@ class CompanionRun:
         if t <= 0.0:
             return self._problem.system.u0.copy(), self._problem.system.v0.copy()
         if self._bound is None:
-            raise InputError(f"{self.name} is asked for its motion at t = {t:g} s, but no run has bound it yet: give "
-                             "it to a run as it is, not inside a function of your own, or call bind(scheme, dt) "
-                             "first")
+            raise InputError(
+                f"{self.name} is asked for its motion at t = {t:g} s, but no run has bound it yet: give "
+                "it to a run as it is, not inside a function of your own, or call bind(scheme, dt) "
+                "first"
+            )
         while self._t[-1] < t:
             state, _ = next(self._steps)
             self._t.append(state.t)
@@ -71,7 +79,9 @@ class CompanionRun:
         if self._t[k] == t:
             return self._u[k], self._v[k]
         w = (t - self._t[k]) / (self._t[k + 1] - self._t[k])
-        return (1.0 - w) * self._u[k] + w * self._u[k + 1], (1.0 - w) * self._v[k] + w * self._v[k + 1]
+        return (1.0 - w) * self._u[k] + w * self._u[k + 1], (1.0 - w) * self._v[k] + w * self._v[
+            k + 1
+        ]
 
 
 def linear_problem(M: Any, C: Any | None, K: Any, load: Load, dimension: int) -> ContactProblem:

@@ -32,17 +32,29 @@ class SoilCurves:
 
     def __post_init__(self) -> None:
         strain = array("SoilCurves", "strain", self.strain, (None,))
-        reduction, damping = (array("SoilCurves", name, getattr(self, name), strain.shape)
-                              for name in ("reduction", "damping"))
+        reduction, damping = (
+            array("SoilCurves", name, getattr(self, name), strain.shape)
+            for name in ("reduction", "damping")
+        )
         if len(strain) < 2 or strain[0] <= 0.0 or np.any(np.diff(strain) <= 0.0):
-            raise InputError(f"SoilCurves: strain of '{self.name}' is {shown(self.strain)}; give two or more rising "
-                             "numbers above zero")
-        if np.any(np.diff(reduction) > 0.0) or reduction[-1] <= 0.0 or not LINEAR <= reduction[0] <= 1.0:
-            raise InputError(f"SoilCurves: reduction of '{self.name}' is {shown(self.reduction)}; give G/Gmax that "
-                             f"falls from 1 (at least {LINEAR:g}) and stays above zero: begin at smaller strains")
+            raise InputError(
+                f"SoilCurves: strain of '{self.name}' is {shown(self.strain)}; give two or more rising "
+                "numbers above zero"
+            )
+        if (
+            np.any(np.diff(reduction) > 0.0)
+            or reduction[-1] <= 0.0
+            or not LINEAR <= reduction[0] <= 1.0
+        ):
+            raise InputError(
+                f"SoilCurves: reduction of '{self.name}' is {shown(self.reduction)}; give G/Gmax that "
+                f"falls from 1 (at least {LINEAR:g}) and stays above zero: begin at smaller strains"
+            )
         if damping.min() < 0.0 or damping.max() >= 0.5:
-            raise InputError(f"SoilCurves: damping of '{self.name}' is {shown(self.damping)}; give ratios from 0 to "
-                             "less than 1/2, not per cent")
+            raise InputError(
+                f"SoilCurves: damping of '{self.name}' is {shown(self.damping)}; give ratios from 0 to "
+                "less than 1/2, not per cent"
+            )
         for name, values in (("strain", strain), ("reduction", reduction), ("damping", damping)):
             object.__setattr__(self, name, tuple(values.tolist()))
 
@@ -58,24 +70,42 @@ class SoilCurves:
         "upper" modulus with lower damping, which SHAKE91 goes by. Strains up to 1 %."""
         known = _TABLES["seed_idriss"]
         check_word("bound of seed_idriss", bound, tuple(known))
-        return cls(_TABLES["strain"], known[bound]["reduction"], known[bound]["damping"], f"Seed-Idriss {bound}")
+        return cls(
+            _TABLES["strain"],
+            known[bound]["reduction"],
+            known[bound]["damping"],
+            f"Seed-Idriss {bound}",
+        )
 
     @classmethod
     def vucetic_dobry(cls, plasticity: float) -> "SoilCurves":
         """Return those of a plasticity index from 0 to 200 [%], Vucetic and Dobry (1991), read likewise: published for
         0, 15, 30, 50, 100 and 200, straight lines over the index between. Strains up to 1 %."""
-        index = number("SoilCurves.vucetic_dobry", "the plasticity index [%]", plasticity, not_negative=True)
+        index = number(
+            "SoilCurves.vucetic_dobry", "the plasticity index [%]", plasticity, not_negative=True
+        )
         known = _TABLES["vucetic_dobry"]
         if index > known["plasticity"][-1]:
-            raise InputError(f"SoilCurves.vucetic_dobry: the plasticity index is {index:g} %, and the curves end at "
-                             f"{known['plasticity'][-1]} %: give SoilCurves of your own")
-        reduction, damping = ([float(np.interp(index, known["plasticity"], one)) for one in np.transpose(known[name])]
-                              for name in ("reduction", "damping"))
+            raise InputError(
+                f"SoilCurves.vucetic_dobry: the plasticity index is {index:g} %, and the curves end at "
+                f"{known['plasticity'][-1]} %: give SoilCurves of your own"
+            )
+        reduction, damping = (
+            [float(np.interp(index, known["plasticity"], one)) for one in np.transpose(known[name])]
+            for name in ("reduction", "damping")
+        )
         return cls(_TABLES["strain"], reduction, damping, f"Vucetic-Dobry PI {index:g}")
 
     @classmethod
-    def darendeli(cls, *, mean_stress: float, plasticity: float = 0.0, ocr: float = 1.0, frequency: float = 1.0,
-                  cycles: float = 10.0) -> "SoilCurves":
+    def darendeli(
+        cls,
+        *,
+        mean_stress: float,
+        plasticity: float = 0.0,
+        ocr: float = 1.0,
+        frequency: float = 1.0,
+        cycles: float = 10.0,
+    ) -> "SoilCurves":
         """Return those of Darendeli (2001), for p = mean_stress / 1 atm, PI in %, strains in % up to 1:
 
             G/Gmax = 1 / (1 + (s/s_r)^0.919),    s_r = (0.0352 + 0.001 PI ocr^0.3246) p^0.3483
@@ -86,14 +116,24 @@ class SoilCurves:
         owner = "SoilCurves.darendeli"
         p = number(owner, "mean_stress [Pa]", mean_stress, positive=True) / ATMOSPHERE
         index = number(owner, "plasticity [%]", plasticity, not_negative=True)
-        f, n = (number(owner, name, one, positive=True) for name, one in (("frequency", frequency), ("cycles", cycles)))
+        f, n = (
+            number(owner, name, one, positive=True)
+            for name, one in (("frequency", frequency), ("cycles", cycles))
+        )
         if number(owner, "ocr", ocr, positive=True) < 1.0:
             raise InputError(f"{owner}: ocr is {shown(ocr)}; give 1 or more")
         s, a = np.logspace(-4.0, 0.0, 41), 0.919
         s_r = (0.0352 + 0.001 * index * ocr**0.3246) * p**0.3483
         hyperbola = 4.0 * (s - s_r * np.log1p(s / s_r)) * (s + s_r) / s**2 - 2.0
-        masing = np.polyval([-0.0005 * a**2 + 0.0002 * a + 0.0003, 0.0805 * a**2 - 0.071 * a - 0.0095,
-                             -1.1143 * a**2 + 1.8618 * a + 0.2523, 0.0], 100.0 / np.pi * hyperbola)
+        masing = np.polyval(
+            [
+                -0.0005 * a**2 + 0.0002 * a + 0.0003,
+                0.0805 * a**2 - 0.071 * a - 0.0095,
+                -1.1143 * a**2 + 1.8618 * a + 0.2523,
+                0.0,
+            ],
+            100.0 / np.pi * hyperbola,
+        )
         least = (0.8005 + 0.0129 * index * ocr**-0.1069) * p**-0.2889 * (1.0 + 0.2919 * np.log(f))
         reduction = 1.0 / (1.0 + (s / s_r) ** a)
         damping = (0.6329 - 0.00566 * np.log(n)) * reduction**0.1 * masing + least
@@ -102,9 +142,14 @@ class SoilCurves:
 
     def beyond(self, strain: float, place: str) -> str:
         """Return the sentence about an effective strain beyond the largest of the curves; empty where it is not."""
-        return "" if strain <= self.strain[-1] else (
-            f"SoilCurves: the effective shear strain is {100.0 * strain:.3g} % {place}, and '{self.name}' ends at "
-            f"{100.0 * self.strain[-1]:.3g} %; give a weaker motion, or curves that go further")
+        return (
+            ""
+            if strain <= self.strain[-1]
+            else (
+                f"SoilCurves: the effective shear strain is {100.0 * strain:.3g} % {place}, and '{self.name}' ends at "
+                f"{100.0 * self.strain[-1]:.3g} %; give a weaker motion, or curves that go further"
+            )
+        )
 
     def at(self, strain: Array) -> tuple[Array, Array]:
         """Return (G/Gmax, damping ratio) at these shear strains; beyond the last strain its values."""

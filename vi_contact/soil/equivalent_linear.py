@@ -26,7 +26,9 @@ from .soil_column import SoilColumn
 
 T = TypeVar("T")
 ROCK_DAMPING = 0.01
-Layer = tuple[float, LinearElastic, SoilCurves]  # its thickness [m], its material at small strains, its curves
+Layer = tuple[
+    float, LinearElastic, SoilCurves
+]  # its thickness [m], its material at small strains, its curves
 
 
 @dataclass(frozen=True)
@@ -44,20 +46,34 @@ class SiteResponse:
     def column(self, *, frequency: float, height: float) -> SoilColumn:
         """Return the column for runs in time, base at y = 0, damped by beta = xi / (pi f) at this frequency [Hz]; its
         elements have at most this height [m], and Poisson's ratio is that of the layers."""
-        f, most = (number("SiteResponse.column", name, one, positive=True)
-                   for name, one in (("frequency", frequency), ("height", height)))
+        f, most = (
+            number("SiteResponse.column", name, one, positive=True)
+            for name, one in (("frequency", frequency), ("height", height))
+        )
         thick = np.array([thickness for thickness, _, _ in self.layers])
         parts = np.ceil(thick / most * (1.0 - 1e-9)).astype(int)
         rows = zip(self.layers, self.shear, self.damping, strict=True)
-        values = np.array([(2.0 * one.nu / (1.0 - 2.0 * one.nu) * shear, shear, one.rho, 0.0, xi / (np.pi * f))
-                           for (_, one, _), shear, xi in rows])
+        values = np.array(
+            [
+                (2.0 * one.nu / (1.0 - 2.0 * one.nu) * shear, shear, one.rho, 0.0, xi / (np.pi * f))
+                for (_, one, _), shear, xi in rows
+            ]
+        )
         heights = np.concatenate([[0.0], np.cumsum(np.repeat(thick / parts, parts)[::-1])])
         return SoilColumn(heights, *np.repeat(values, parts, axis=0)[::-1].T)
 
 
-def equivalent_linear(layers: Sequence[Layer], record: Record, *, rock: LinearElastic | None = None,
-                      rock_damping: float = ROCK_DAMPING, ratio: float = 0.65, tolerance: float = 0.01,
-                      frequency: float | None = None, most: int = 50) -> SiteResponse:
+def equivalent_linear(
+    layers: Sequence[Layer],
+    record: Record,
+    *,
+    rock: LinearElastic | None = None,
+    rock_damping: float = ROCK_DAMPING,
+    ratio: float = 0.65,
+    tolerance: float = 0.01,
+    frequency: float | None = None,
+    most: int = 50,
+) -> SiteResponse:
     """Return the response of layers to a record along the surface.
 
     layers: (thickness [m], material at small strains, curves) of each, from the top.
@@ -68,7 +84,9 @@ def equivalent_linear(layers: Sequence[Layer], record: Record, *, rock: LinearEl
     ends beyond its curves; ViContactError without convergence in so many iterations."""
     owner = "equivalent_linear"
     remedy = "give (thickness, LinearElastic, SoilCurves) of each layer, from the top"
-    layers = tuple(several(owner, "a layer", one, remedy) for one in several(owner, "layers", layers, remedy))
+    layers = tuple(
+        several(owner, "a layer", one, remedy) for one in several(owner, "layers", layers, remedy)
+    )
     if not layers or any(len(one) != 3 for one in layers):
         raise InputError(f"{owner}: layers is {shown(layers)}; {remedy}")
     for thickness, material, curves in layers:
@@ -76,28 +94,42 @@ def equivalent_linear(layers: Sequence[Layer], record: Record, *, rock: LinearEl
         instance(owner, "the material", material, LinearElastic, remedy)
         instance(owner, "the curves", curves, SoilCurves, remedy)
         if material.xi:
-            raise InputError(f"{owner}: the material of a layer has the damping ratio xi = {material.xi:g}, and the "
-                             "curves of the layer give its damping; leave xi out")
+            raise InputError(
+                f"{owner}: the material of a layer has the damping ratio xi = {material.xi:g}, and the "
+                "curves of the layer give its damping; leave xi out"
+            )
     instance(owner, "record", record, Record, "give a Record, such as read_record returns")
     optional(instance, owner, "rock", rock, LinearElastic, "give a LinearElastic, or None")
     number(owner, "rock_damping", rock_damping, not_negative=True)
     if rock is None and rock_damping not in (0.0, ROCK_DAMPING):
-        raise InputError(f"{owner}: rock_damping = {shown(rock_damping)} has no rock to damp; give rock too, or leave "
-                         "it out")
+        raise InputError(
+            f"{owner}: rock_damping = {shown(rock_damping)} has no rock to damp; give rock too, or leave "
+            "it out"
+        )
     if rock is not None and rock.xi:
-        raise InputError(f"{owner}: the rock has the damping ratio xi = {rock.xi:g}, which is not read here; give "
-                         "rock_damping, and leave xi out")
+        raise InputError(
+            f"{owner}: the rock has the damping ratio xi = {rock.xi:g}, which is not read here; give "
+            "rock_damping, and leave xi out"
+        )
     optional(number, owner, "frequency", frequency, positive=True)
     number(owner, "ratio", ratio, positive=True)
     n = next_fast_len(2 * record.acceleration.size)
     w = 2.0 * np.pi * np.fft.rfftfreq(n, record.dt)
-    slope = np.ones_like(w) if frequency is None else w / (2.0 * np.pi * frequency)  # of xi over the frequency
+    slope = (
+        np.ones_like(w) if frequency is None else w / (2.0 * np.pi * frequency)
+    )  # of xi over the frequency
     motion = np.fft.rfft(record.acceleration, n)
-    below = None if rock is None else np.sqrt(rock.rho * rock.shear_modulus * (1.0 + 2j * rock_damping * slope))
+    below = (
+        None
+        if rock is None
+        else np.sqrt(rock.rho * rock.shear_modulus * (1.0 + 2j * rock_damping * slope))
+    )
     stiff = np.array([material.shear_modulus for _, material, _ in layers])
 
     def softened(strain: Array) -> Array:
-        return np.array([curves.at(ratio * x) for (_, _, curves), x in zip(layers, strain, strict=True)]).T
+        return np.array(
+            [curves.at(ratio * x) for (_, _, curves), x in zip(layers, strain, strict=True)]
+        ).T
 
     def run(values: Array) -> tuple[tuple[Any, Array], Array]:
         top, sheared = _waves(layers, stiff * values[0], values[1], w, slope, below)
@@ -106,15 +138,26 @@ def equivalent_linear(layers: Sequence[Layer], record: Record, *, rock: LinearEl
 
     start, alone = softened(np.zeros(len(layers))), SerialComm()
     (top, strain), values, changes = iterated(owner, run, start, tolerance, most, alone)
-    refuse([layer[2].beyond(ratio * x, f"in layer {place} from the top")
-            for place, (layer, x) in enumerate(zip(layers, strain, strict=True), start=1)], alone)
+    refuse(
+        [
+            layer[2].beyond(ratio * x, f"in layer {place} from the top")
+            for place, (layer, x) in enumerate(zip(layers, strain, strict=True), start=1)
+        ],
+        alone,
+    )
     surface = np.fft.irfft(top * motion, n)[: record.acceleration.size]
     risen = record.changed(surface, f"at the surface of {len(layers)} equivalent-linear layers")
     return SiteResponse(layers, stiff * values[0], values[1], strain, risen, len(changes))
 
 
-def iterated(owner: str, run: Callable[[Array], tuple[T, Array]], values: Array, tolerance: float, most: int,
-             comm: Comm) -> tuple[T, Array, tuple[float, ...]]:
+def iterated(
+    owner: str,
+    run: Callable[[Array], tuple[T, Array]],
+    values: Array,
+    tolerance: float,
+    most: int,
+    comm: Comm,
+) -> tuple[T, Array, tuple[float, ...]]:
     """Return (what the last run returned, the values it had, changes) as soon as none of run(values) -> (…, new values)
     changes by more than the tolerance, relative to the new one. ViContactError after so many runs. Collective."""
     number(owner, "tolerance", tolerance, positive=True)
@@ -126,17 +169,27 @@ def iterated(owner: str, run: Callable[[Array], tuple[T, Array]], values: Array,
         if changes[-1] <= tolerance:
             return found, values, tuple(changes)
         values = new
-    raise ViContactError(f"{owner}: after {most} runs G or damping still change by {100.0 * changes[-1]:.2g} %: the "
-                         "motion is too strong for this soil, or give a larger most")
+    raise ViContactError(
+        f"{owner}: after {most} runs G or damping still change by {100.0 * changes[-1]:.2g} %: the "
+        "motion is too strong for this soil, or give a larger most"
+    )
 
 
-def _waves(layers: Sequence[Layer], shear: Array, xi: Array, w: Array, slope: Array,
-           rock: NDArray[np.complex128] | None) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+def _waves(
+    layers: Sequence[Layer],
+    shear: Array,
+    xi: Array,
+    w: Array,
+    slope: Array,
+    rock: NDArray[np.complex128] | None,
+) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
     """Surface acceleration and strains in the middle of the layers, (n, frequencies), over the acceleration given.
 
     From the top down: B/A, and A over that of the layer below, of which none grows with depth or frequency. Below a
     base that moves as given any rock does."""
-    thick, rho = np.array([[thickness, material.rho] for thickness, material, _ in layers]).T[:, :, None]
+    thick, rho = np.array([[thickness, material.rho] for thickness, material, _ in layers]).T[
+        :, :, None
+    ]
     G = shear[:, None] * (1.0 + 2j * xi[:, None] * slope)
     k, z = w * np.sqrt(rho / G), np.sqrt(rho * G)
     a = z / np.vstack([z[1:], z[-1:] if rock is None else rock])

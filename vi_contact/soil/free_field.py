@@ -58,7 +58,9 @@ class FreeField(Dashpots):
     def loads(self, matrix: DashpotMatrix, forms: Any) -> BoundaryLoads:
         """Return the stress of the free field on the side, D v_ff, and the column that both are taken from."""
         side = FreeFieldSide(matrix, self, forms)
-        return BoundaryLoads((side.elastic,), (side.viscous,), (side.run, *getattr(self.base, "companions", ())))
+        return BoundaryLoads(
+            (side.elastic,), (side.viscous,), (side.run, *getattr(self.base, "companions", ()))
+        )
 
     @property
     def expects(self) -> str:
@@ -77,29 +79,39 @@ class FreeFieldSide:
         self.space, self.given, self._ground = absorber.space, given, given.ground
         self.run = CompanionRun(f"FreeField on '{given.facets.name}'", self._problem)
         if self.space.dimension != 2:
-            raise InputError("FreeField is for plane bodies: tie the sides of this one, or give them dashpots")
+            raise InputError(
+                "FreeField is for plane bodies: tie the sides of this one, or give them dashpots"
+            )
         if self.space.degree > 1:
             raise InputError("FreeField has a soil column of first order: give assemble degree=1")
         self._section: Section = forms.section
         self._dashpots = PetscMatrix(absorber.mat)
         self.column, self._sign = _column(self.space, forms, self.given)
         blocks = self.space.facet_blocks(self.given.facets.indices)
-        self._rows = np.abs(self.space.points[blocks, 1][:, None] - self.column.heights).argmin(axis=1)
+        self._rows = np.abs(self.space.points[blocks, 1][:, None] - self.column.heights).argmin(
+            axis=1
+        )
         self._blocks = blocks
         held = total(self.space.comm, self.space.held[blocks[self._rows == 0]].sum())
         name, compliant = given.facets.name, self._ground.lets_waves_in
         if not compliant and held < 2:
-            raise InputError(f"the lowest node of free-field side '{name}' is not held: clamp or prescribe the base, "
-                             "or give the side its CompliantBase")
+            raise InputError(
+                f"the lowest node of free-field side '{name}' is not held: clamp or prescribe the base, "
+                "or give the side its CompliantBase"
+            )
         if compliant and held:
-            raise InputError(f"the lowest node of free-field side '{name}' is held, but its base is compliant: leave "
-                             "the base free")
+            raise InputError(
+                f"the lowest node of free-field side '{name}' is held, but its base is compliant: leave "
+                "the base free"
+            )
 
     def _problem(self) -> ContactProblem:
         """The column on its base."""
         ground, column = self._ground, self.column
         if isinstance(ground, CompliantBase):
-            normal, shear = impedances(ground, self._section, column.lame[0], column.shear[0], column.rho[0])
+            normal, shear = impedances(
+                ground, self._section, column.lame[0], column.shear[0], column.rho[0]
+            )
             return column.on_dashpots(float(shear), float(normal), ground.motion)
         return column.on_rigid_base(lambda t: ground.at(t)[2], lambda t: ground.at(t)[1])
 
@@ -140,22 +152,32 @@ def _column(space: FemSpace, forms: Any, given: FreeField) -> tuple[SoilColumn, 
     mesh, name = space.mesh, given.facets.name
     owned = given.facets.indices[given.facets.indices < mesh.topology.index_map(1).size_local]
     mesh.topology.create_connectivity(1, 2)
-    cells = np.array([mesh.topology.connectivity(1, 2).links(facet)[0] for facet in owned], dtype=np.int64)
+    cells = np.array(
+        [mesh.topology.connectivity(1, 2).links(facet)[0] for facet in owned], dtype=np.int64
+    )
     ends = mesh.geometry.x[compat.entities_to_geometry(mesh, 1, owned)][:, :, :2]
-    middles = np.array([mesh.geometry.x[compat.geometry_dofmap(mesh)[cell], 0].mean() for cell in cells])
+    middles = np.array(
+        [mesh.geometry.x[compat.geometry_dofmap(mesh)[cell], 0].mean() for cell in cells]
+    )
     _refuse_unlike(forms, name)
     values = [forms.cellwise(key)[cells] for key in ("lame", "shear", "rho", "alpha_rho", "beta")]
     low, high = ends[:, :, 1].min(axis=1), ends[:, :, 1].max(axis=1)
-    mine = np.column_stack([low, high, *values, ends[:, 0, 0], ends[:, 1, 0], middles]).reshape(-1, 10)
+    mine = np.column_stack([low, high, *values, ends[:, 0, 0], ends[:, 1, 0], middles]).reshape(
+        -1, 10
+    )
     rows = np.concatenate(space.comm.bcast(space.comm.gather(mine)))
     rows = rows[np.argsort(rows[:, 0])]
     if np.isnan(rows).any():
-        raise InputError(f"free-field side '{name}' stands beside orthotropic cells, and its soil column is isotropic: "
-                         "put a LinearElastic there, or Dashpots(…, material=)")
+        raise InputError(
+            f"free-field side '{name}' stands beside orthotropic cells, and its soil column is isotropic: "
+            "put a LinearElastic there, or Dashpots(…, material=)"
+        )
     x, close = rows[:, 7:9], 1e-9 * space.size
     if np.ptp(x) > close or np.any(np.abs(rows[1:, 0] - rows[:-1, 1]) > close):
-        raise InputError(f"free-field side '{name}' is not one vertical line of facets: give a straight side of "
-                         "the body")
+        raise InputError(
+            f"free-field side '{name}' is not one vertical line of facets: give a straight side of "
+            "the body"
+        )
     lame, shear, rho, alpha_rho, beta = rows[:, 2:7].T
     column = SoilColumn(np.append(rows[:, 0], rows[-1, 1]), lame, shear, rho, alpha_rho / rho, beta)
     return column, 1.0 if x[0, 0] > rows[0, 9] else -1.0
@@ -164,5 +186,11 @@ def _column(space: FemSpace, forms: Any, given: FreeField) -> tuple[SoilColumn, 
 def _refuse_unlike(forms: Any, name: str) -> None:
     """Raise InputError where the column could not be what the body is beside it."""
     if forms.viscous or not forms.fields:
-        what = "of Rayleigh damping only, not KelvinVoigt" if forms.fields else "of materials, and forms=… have none"
-        raise InputError(f"free-field side '{name}': its column is {what}: put Dashpots(…, material=) there")
+        what = (
+            "of Rayleigh damping only, not KelvinVoigt"
+            if forms.fields
+            else "of materials, and forms=… have none"
+        )
+        raise InputError(
+            f"free-field side '{name}': its column is {what}: put Dashpots(…, material=) there"
+        )

@@ -36,7 +36,11 @@ class GroundFrame:
 
     def at(self, t: float) -> tuple[Array, Array, Array]:
         """Return (0, 0, a_g) at time t, each (2,)."""
-        return np.zeros(2), np.zeros(2), np.sum([excitation(t) for excitation in self.excitations], axis=0)
+        return (
+            np.zeros(2),
+            np.zeros(2),
+            np.sum([excitation(t) for excitation in self.excitations], axis=0),
+        )
 
 
 @dataclass(frozen=True)
@@ -74,12 +78,16 @@ class BaseMotion(GroundFrame):
 
         Between two deformable bodies nothing changes: both are moved by the ground."""
         rigid = np.array([surface.in_frames(r) for r in system.influence.T])
-        if surface.coupling is not None:  # relative to the other side: see SemiDiscreteSystem.in_relative
+        if (
+            surface.coupling is not None
+        ):  # relative to the other side: see SemiDiscreteSystem.in_relative
             rigid = np.array([2.0 * r - surface.coupling @ r for r in rigid])
         normal = np.array([surface.normal_values(r) for r in rigid])
         tangential = np.array([surface.tangential_values(r) for r in rigid])
-        moved = surface.moving(lambda t: -self.at(t)[0] @ normal,
-                               lambda t: np.tensordot(self.at(t)[0], tangential, axes=1))
+        moved = surface.moving(
+            lambda t: -self.at(t)[0] @ normal,
+            lambda t: np.tensordot(self.at(t)[0], tangential, axes=1),
+        )
         watched = tuple(one.carried(lambda t: self.at(t)[0]) for one in surface.watched)
         return replace(moved, companions=(*surface.companions, self.path), watched=watched)
 
@@ -92,11 +100,23 @@ def base_motion(excitation: Excitation | Sequence[Excitation]) -> BaseMotion:
     InputError for no excitation, or excitations of different dimensions."""
     excitations = tuple(excitation) if isinstance(excitation, Sequence) else (excitation,)
     for one in excitations:
-        provides("base_motion", "excitation", one, EXCITATION, "give Harmonic(…), GroundMotion(record) or another")
+        provides(
+            "base_motion",
+            "excitation",
+            one,
+            EXCITATION,
+            "give Harmonic(…), GroundMotion(record) or another",
+        )
     sizes = {len(one.direction) for one in excitations}
     if len(sizes) != 1:
-        raise InputError("base_motion needs one or more excitations with directions of the same number of components")
+        raise InputError(
+            "base_motion needs one or more excitations with directions of the same number of components"
+        )
     d = sizes.pop()
-    forces = tuple((np.asarray(one.direction, dtype=float), one.acceleration) for one in excitations)
-    problem = linear_problem(sp.identity(d), None, sp.csr_matrix((d, d)), Load(np.zeros(d), forces), d)
+    forces = tuple(
+        (np.asarray(one.direction, dtype=float), one.acceleration) for one in excitations
+    )
+    problem = linear_problem(
+        sp.identity(d), None, sp.csr_matrix((d, d)), Load(np.zeros(d), forces), d
+    )
     return BaseMotion(excitations, CompanionRun("base_motion", lambda: problem))

@@ -35,13 +35,17 @@ class SoilColumn:
     def __post_init__(self) -> None:
         n = len(array("SoilColumn", "heights", self.heights, (None,), unit="m")) - 1
         if n < 1 or np.any(np.diff(self.heights) <= 0.0):
-            raise InputError(f"SoilColumn: heights is {shown(self.heights)}; give two or more, upwards")
+            raise InputError(
+                f"SoilColumn: heights is {shown(self.heights)}; give two or more, upwards"
+            )
         for name in ("lame", "shear", "rho", "alpha", "beta"):
             array("SoilColumn", name, getattr(self, name), (n,))
 
     def matrices(self) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix]:
         """Return (M, C, K) of all nodes; unknown 2 i + c is component c of node i."""
-        rho, length, alpha, beta = (x[:, None, None] for x in (self.rho, np.diff(self.heights), self.alpha, self.beta))
+        rho, length, alpha, beta = (
+            x[:, None, None] for x in (self.rho, np.diff(self.heights), self.alpha, self.beta)
+        )
         moduli = np.tile(np.column_stack([self.shear, self.lame + 2.0 * self.shear]), 2)[:, None, :]
         m = rho * length / 6.0 * np.kron([[2.0, 1.0], [1.0, 2.0]], np.eye(2))
         k = np.kron([[1.0, -1.0], [-1.0, 1.0]], np.eye(2)) * moduli / length
@@ -54,8 +58,11 @@ class SoilColumn:
         size = 2 * len(self.heights)
         return sp.csr_matrix((blocks.ravel(), (rows, columns)), shape=(size, size))
 
-    def on_rigid_base(self, acceleration: Callable[[float], Array],
-                      velocity: Callable[[float], Array] | None = None) -> ContactProblem:
+    def on_rigid_base(
+        self,
+        acceleration: Callable[[float], Array],
+        velocity: Callable[[float], Array] | None = None,
+    ) -> ContactProblem:
         """Return the system of nodes 1 to n, node 0 held, in the frame of a base with this acceleration (2,).
 
         velocity: of the base, where mass damping acts on absolute velocities; None where it acts on relative ones."""
@@ -64,11 +71,17 @@ class SoilColumn:
         inertia, drag = -(M @ rigid)[2:], -(C @ rigid)[2:]
 
         def load(t: float) -> Array:
-            return np.asarray(inertia @ acceleration(t) + (0.0 if velocity is None else drag @ velocity(t)))
+            return np.asarray(
+                inertia @ acceleration(t) + (0.0 if velocity is None else drag @ velocity(t))
+            )
 
-        return linear_problem(M[2:, 2:], C[2:, 2:], K[2:, 2:], Load(np.zeros(len(inertia)), general=(load,)), 2)
+        return linear_problem(
+            M[2:, 2:], C[2:, 2:], K[2:, 2:], Load(np.zeros(len(inertia)), general=(load,)), 2
+        )
 
-    def on_dashpots(self, shear: float, normal: float, upgoing: Callable[[float], Array]) -> ContactProblem:
+    def on_dashpots(
+        self, shear: float, normal: float, upgoing: Callable[[float], Array]
+    ) -> ContactProblem:
         """Return the system of all nodes, node 0 on dashpots of these impedances [Pa s/m]; ``upgoing``: (2,) [m/s]."""
         M, C, K = self.matrices()
         impedance = np.array([shear, normal])

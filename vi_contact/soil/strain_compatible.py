@@ -35,9 +35,16 @@ class StrainCompatible(Generic[T]):
     changes: tuple[float, ...]
 
 
-def strain_compatible(mesh: Any, material: Materials, curves: Sequence[tuple[Cells, SoilCurves]],
-                      run: Callable[[Heterogeneous, LargestStrain], T], *, ratio: float = 0.65, tolerance: float = 0.01,
-                      most: int = 20) -> StrainCompatible[T]:
+def strain_compatible(
+    mesh: Any,
+    material: Materials,
+    curves: Sequence[tuple[Cells, SoilCurves]],
+    run: Callable[[Heterogeneous, LargestStrain], T],
+    *,
+    ratio: float = 0.65,
+    tolerance: float = 0.01,
+    most: int = 20,
+) -> StrainCompatible[T]:
     """Run a model until G and xi of every cell are those of its effective strain. Collective.
 
     Args:
@@ -53,14 +60,29 @@ def strain_compatible(mesh: Any, material: Materials, curves: Sequence[tuple[Cel
     function(OWNER, "run", run, "give a function of a material and a recorder")
     number(OWNER, "ratio", ratio, positive=True)
     comm, remedy = MpiComm(mesh.comm), "give (cells, SoilCurves) pairs"
-    pairs = [(cells_of(OWNER, "the cells of curves", cells, mesh).indices, instance(OWNER, "curves", one, SoilCurves,
-              remedy)) for cells, one in several(OWNER, "curves", curves, remedy)]
+    pairs = [
+        (
+            cells_of(OWNER, "the cells of curves", cells, mesh).indices,
+            instance(OWNER, "curves", one, SoilCurves, remedy),
+        )
+        for cells, one in several(OWNER, "curves", curves, remedy)
+    ]
     named = np.concatenate([np.zeros(0, dtype=int), *(cells for cells, _ in pairs)])
-    refuse([f"{OWNER}: some cells have two curves: give one" if len(np.unique(named)) < len(named) else ""], comm)
+    refuse(
+        [
+            f"{OWNER}: some cells have two curves: give one"
+            if len(np.unique(named)) < len(named)
+            else ""
+        ],
+        comm,
+    )
     _refuse_lost_ratios(material, pairs, comm)
     space = compat.cell_space(mesh)
     place, (E, nu, rho, xi) = compat.cell_blocks(space)[:, 0], cell_constants(space, material)
-    refuse([f"{OWNER}: Orthotropic has several G: give a LinearElastic" if np.isnan(E).any() else ""], comm)
+    refuse(
+        [f"{OWNER}: Orthotropic has several G: give a LinearElastic" if np.isnan(E).any() else ""],
+        comm,
+    )
 
     def field(values: Array) -> Any:
         found = compat.function(space)
@@ -75,10 +97,15 @@ def strain_compatible(mesh: Any, material: Materials, curves: Sequence[tuple[Cel
         return values
 
     def once(values: Array) -> tuple[tuple[T, Heterogeneous, Any], Array]:
-        body, strain = Heterogeneous(field(E * values[0]), field(nu), field(rho), field(values[1])), LargestStrain()
+        body, strain = (
+            Heterogeneous(field(E * values[0]), field(nu), field(rho), field(values[1])),
+            LargestStrain(),
+        )
         solution = run(body, strain)
         if not hasattr(strain, "values"):
-            raise InputError(f"{OWNER}: run has not recorded its strain: give simulate record=(strain, …)")
+            raise InputError(
+                f"{OWNER}: run has not recorded its strain: give simulate record=(strain, …)"
+            )
         effective = field(ratio * strain.values)
         return (solution, body, effective), softened(effective.x.array[place])
 
@@ -90,7 +117,9 @@ def strain_compatible(mesh: Any, material: Materials, curves: Sequence[tuple[Cel
     return StrainCompatible(*found, changes)
 
 
-def _refuse_lost_ratios(material: Materials, pairs: Sequence[tuple[Any, SoilCurves]], comm: MpiComm) -> None:
+def _refuse_lost_ratios(
+    material: Materials, pairs: Sequence[tuple[Any, SoilCurves]], comm: MpiComm
+) -> None:
     """Raise InputError for a material with a damping ratio whose cells all have curves, which give it another one."""
     if isinstance(material, KINDS):
         return  # of a whole mesh: cells beside the curves keep its ratio
@@ -98,5 +127,7 @@ def _refuse_lost_ratios(material: Materials, pairs: Sequence[tuple[Any, SoilCurv
     for cells, one in material:
         outside = len(np.setdiff1d(cells.indices, named))
         if not largest(comm, outside) and isinstance(one, LinearElastic) and one.xi:
-            raise InputError(f"{OWNER}: the material of '{cells.name}' has the damping ratio xi = {one.xi:g}, and the "
-                             "curves of its cells give another one; leave xi out there")
+            raise InputError(
+                f"{OWNER}: the material of '{cells.name}' has the damping ratio xi = {one.xi:g}, and the "
+                "curves of its cells give another one; leave xi out there"
+            )

@@ -24,7 +24,13 @@ class UpgoingVelocity:
     def __init__(self, excitation: Excitation, dt: float, share: float) -> None:
         number("UpgoingVelocity", "dt", dt, positive=True, unit="s")
         number("UpgoingVelocity", "share", share)
-        provides("UpgoingVelocity", "excitation", excitation, ("acceleration", "direction"), "give GroundMotion(…)")
+        provides(
+            "UpgoingVelocity",
+            "excitation",
+            excitation,
+            ("acceleration", "direction"),
+            "give GroundMotion(…)",
+        )
         self.excitation, self.dt, self.share = excitation, dt, share
         self._a, self._v = [excitation.acceleration(0.0)], [0.0]
 
@@ -39,8 +45,13 @@ class UpgoingVelocity:
         return self.share * speed * np.asarray(self.excitation.direction, dtype=float)
 
 
-def upgoing(motion: Record | Excitation | Sequence[Excitation], *, direction: tuple[float, ...] = (1.0, 0.0),
-            dt: float | None = None, outcrop: bool = True) -> Callable[[float], Array]:
+def upgoing(
+    motion: Record | Excitation | Sequence[Excitation],
+    *,
+    direction: tuple[float, ...] = (1.0, 0.0),
+    dt: float | None = None,
+    outcrop: bool = True,
+) -> Callable[[float], Array]:
     """Return the upgoing velocity of a motion: half its velocity, or all when ``outcrop`` is False (already upgoing).
 
     motion: a record, along ``direction``, or an excitation, which has its own, or several, which act together (the
@@ -51,14 +62,24 @@ def upgoing(motion: Record | Excitation | Sequence[Excitation], *, direction: tu
     flag("upgoing", "outcrop", outcrop)
     if isinstance(motion, Sequence) and not isinstance(motion, str):
         if any(isinstance(one, Record) for one in motion):
-            raise InputError("upgoing: a record in a list has no direction; give GroundMotion(record, "
-                             "direction=...) for each")
+            raise InputError(
+                "upgoing: a record in a list has no direction; give GroundMotion(record, "
+                "direction=...) for each"
+            )
         waves = [upgoing(one, direction=direction, dt=dt, outcrop=outcrop) for one in motion]
         if len({len(wave(0.0)) for wave in waves}) != 1:
-            raise InputError("upgoing needs one or more excitations with directions of the same number of components")
+            raise InputError(
+                "upgoing needs one or more excitations with directions of the same number of components"
+            )
         return lambda t: np.asarray(np.sum([wave(t) for wave in waves], axis=0))
     if not isinstance(motion, Record):
-        provides("upgoing", "motion", motion, EXCITATION, "give a Record or an excitation, or a list of excitations")
+        provides(
+            "upgoing",
+            "motion",
+            motion,
+            EXCITATION,
+            "give a Record or an excitation, or a list of excitations",
+        )
     excitation = GroundMotion(motion, direction=direction) if isinstance(motion, Record) else motion
     if dt is None and isinstance(excitation, GroundMotion):
         dt = excitation.record.dt

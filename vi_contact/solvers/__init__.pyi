@@ -7,4 +7,24 @@ from .iterative import *
 from .normal import *
 from .volume import *
 
-__all__: list[str] = ['ActiveSet', 'Anderson', 'Automatic', 'Condensed', 'FixedPoint', 'FrictionNewton', 'GivenForces', 'Hildreth', 'Iterative', 'Lemke', 'NSGS', 'PMatrix', 'Plain', 'RateIteration', 'ReducedNewton', 'SemismoothNewton', 'TaoTron', 'Volume', 'p_matrix']
+__all__: list[str] = [
+    "ActiveSet",
+    "Anderson",
+    "Automatic",
+    "Condensed",
+    "FixedPoint",
+    "FrictionNewton",
+    "GivenForces",
+    "Hildreth",
+    "Iterative",
+    "Lemke",
+    "NSGS",
+    "PMatrix",
+    "Plain",
+    "RateIteration",
+    "ReducedNewton",
+    "SemismoothNewton",
+    "TaoTron",
+    "Volume",
+    "p_matrix",
+]

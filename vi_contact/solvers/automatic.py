@@ -23,8 +23,14 @@ from .condensed import Condensed
 log = logging.getLogger(__name__)
 IN_SPACE = 20_000  # unknowns in three dimensions from which on a few hundred steps are faster without a factor
 ALONE_IN_SPACE = 50_000  # the same on one rank, where CHOLMOD factorises
-DENSE = {3: 4_000, 2: 5_000, 1: 5_000}  # rows of the small problem, by dimension: 5000 take 200 MB on every rank
-TOLERANCE = 1e-12  # of conjugate gradients beside the steps: what starts a run should not be seen in it
+DENSE = {
+    3: 4_000,
+    2: 5_000,
+    1: 5_000,
+}  # rows of the small problem, by dimension: 5000 take 200 MB on every rank
+TOLERANCE = (
+    1e-12  # of conjugate gradients beside the steps: what starts a run should not be seen in it
+)
 
 
 @dataclass(frozen=True)
@@ -42,7 +48,13 @@ class Automatic:
     def __post_init__(self) -> None:
         for name in ("condensed", "iterative"):
             if getattr(self, name) is not None:
-                provides("Automatic", name, getattr(self, name), ("check", "prepare"), "give a solver, or leave it out")
+                provides(
+                    "Automatic",
+                    name,
+                    getattr(self, name),
+                    ("check", "prepare"),
+                    "give a solver, or leave it out",
+                )
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for what the chosen route cannot treat. Collective."""
@@ -58,7 +70,9 @@ class Automatic:
             return self.condensed
         dimension, comm = surface.points.shape[1], surface.comm
         alone = comm.size == 1 and cholmod(comm) is not None
-        large = dimension == 3 and total(comm, matrix.rows) >= (ALONE_IN_SPACE if alone else IN_SPACE)
+        large = dimension == 3 and total(comm, matrix.rows) >= (
+            ALONE_IN_SPACE if alone else IN_SPACE
+        )
         if not large and surface.total * (dimension if frictional else 1) <= DENSE[dimension]:
             return self.condensed
         if self.iterative is not None:
@@ -88,7 +102,9 @@ class Chosen:
         if self._prepared is None:
             route = self._rule.route(step.A.matrix, step.surface, step.slip0 is not None)
             if step.surface.comm.rank == 0:
-                log.info("Automatic: %s for %d contact points", type(route).__name__, step.surface.total)
+                log.info(
+                    "Automatic: %s for %d contact points", type(route).__name__, step.surface.total
+                )
             self._prepared = route.prepare(*self._given)
         return self._prepared
 

@@ -30,11 +30,25 @@ ADVICE = "try a smaller dt or another solver, or check the data of this time"
 class CertifiedSolver:
     """Try a solver and the methods to escalate to, all bound to one effective matrix; nothing uncertified leaves it."""
 
-    def __init__(self, problem: ContactProblem, A: EffectiveMatrix, scale: float, solvers: Sequence[Solver],
-                 tolerance: float, *, surface: ContactSurface | None = None, advice: str = ADVICE) -> None:
+    def __init__(
+        self,
+        problem: ContactProblem,
+        A: EffectiveMatrix,
+        scale: float,
+        solvers: Sequence[Solver],
+        tolerance: float,
+        *,
+        surface: ContactSurface | None = None,
+        advice: str = ADVICE,
+    ) -> None:
         for solver in solvers:
             solver.check(problem)
-        self._surface, self._A, self._scale, self._advice = surface or problem.surface, A, scale, advice
+        self._surface, self._A, self._scale, self._advice = (
+            surface or problem.surface,
+            A,
+            scale,
+            advice,
+        )
         self._solvers, self._tolerance = solvers, tolerance
         self._prepared: dict[int, PreparedSolver] = {}
         refuse_matrix(problem, A)
@@ -72,8 +86,10 @@ class CertifiedSolver:
             if certificate.worst <= self._tolerance:
                 return result, certificate, rank > 0
             tried.append(f"{result.method}: {certificate}")
-        raise StepFailure(f"step {step.k} at t = {step.t:.6g} s stayed above the certificate tolerance "
-                          f"{self._tolerance:g} ({'; '.join(tried)}): {self._advice}")
+        raise StepFailure(
+            f"step {step.k} at t = {step.t:.6g} s stayed above the certificate tolerance "
+            f"{self._tolerance:g} ({'; '.join(tried)}): {self._advice}"
+        )
 
 
 def check_laws(owner: str, problem: ContactProblem, *, unsymmetric: bool = False) -> None:
@@ -81,8 +97,16 @@ def check_laws(owner: str, problem: ContactProblem, *, unsymmetric: bool = False
     that are not symmetric unless the owner solves with them. Collective."""
     surface, law = problem.surface, problem.friction
     if not unsymmetric and not problem.system.algebra.symmetric:
-        raise InputError(f"{owner} needs symmetric matrices and those of the system are not: use "
-                         "Condensed(Lemke()), or Volume() with ReducedNewton() or SemismoothNewton()")
+        raise InputError(
+            f"{owner} needs symmetric matrices and those of the system are not: use "
+            "Condensed(Lemke()), or Volume() with ReducedNewton() or SemismoothNewton()"
+        )
     if problem.frictional and surface.tangents.shape[1] == 0:
-        raise InputError(f"{owner} cannot use {law}: a body in one dimension cannot slide, so use Frictionless()")
-    on_all(surface.comm, "the friction law", lambda: law.limit(np.zeros(surface.count), surface.weights, 1.0))
+        raise InputError(
+            f"{owner} cannot use {law}: a body in one dimension cannot slide, so use Frictionless()"
+        )
+    on_all(
+        surface.comm,
+        "the friction law",
+        lambda: law.limit(np.zeros(surface.count), surface.weights, 1.0),
+    )

@@ -61,7 +61,14 @@ class Condensed:
 
     def __post_init__(self) -> None:
         remedy = "give ActiveSet(), Hildreth() or Lemke()"
-        provides("Condensed", "method", self.method, ("prepare",), remedy, lacks=("check", "carries_friction"))
+        provides(
+            "Condensed",
+            "method",
+            self.method,
+            ("prepare",),
+            remedy,
+            lacks=("check", "carries_friction"),
+        )
         inner_method("Condensed", "friction_method", self.friction_method)
         instance("Condensed", "rates", self.rates, RateIteration, "give RateIteration()")
 
@@ -70,13 +77,22 @@ class Condensed:
         contact unknowns than a dense matrix suits, and matrices that are not symmetric unless the methods take them."""
         surface = problem.surface
         if problem.frictional:
-            refuse_dense(f"Condensed() with {problem.friction}", surface.total * (1 + surface.tangents.shape[1]))
+            refuse_dense(
+                f"Condensed() with {problem.friction}",
+                surface.total * (1 + surface.tangents.shape[1]),
+            )
         else:
             refuse_dense("Condensed()", surface.total)
         used = (self.method, self.friction_method) if problem.frictional else (self.method,)
-        check_laws("Condensed", problem, unsymmetric=all(getattr(one, "unsymmetric", False) for one in used))
+        check_laws(
+            "Condensed",
+            problem,
+            unsymmetric=all(getattr(one, "unsymmetric", False) for one in used),
+        )
 
-    def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> "PreparedCondensed":
+    def prepare(
+        self, A: EffectiveMatrix, surface: ContactSurface, scale: float
+    ) -> "PreparedCondensed":
         """Return what condenses A at its first step, which tells of friction. InputError for too many conditions."""
         refuse_dense("Condensed()", surface.total)
         return PreparedCondensed(self, A, surface, scale)
@@ -85,7 +101,9 @@ class Condensed:
 class PreparedCondensed:
     """Solve the condensed problem of one A. ``delassus`` is G (dense, equal on all ranks)."""
 
-    def __init__(self, settings: Condensed, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
+    def __init__(
+        self, settings: Condensed, A: EffectiveMatrix, surface: ContactSurface, scale: float
+    ) -> None:
         self._settings, self._A, self._surface, self._scale = settings, A, surface, scale
         self._rigid = surface.everywhere(surface.rigid)
         self._name = f"condensed {type(settings.method).__name__}" if surface.total else "linear"
@@ -95,7 +113,10 @@ class PreparedCondensed:
     @cached_property
     def _normal(self) -> tuple[Condensation, Any]:
         """A condensed onto the normal unknowns, and the method for the small problem."""
-        made, bilateral = self._condensed(frictional=False), self._surface.everywhere(self._surface.bilateral)
+        made, bilateral = (
+            self._condensed(frictional=False),
+            self._surface.everywhere(self._surface.bilateral),
+        )
         return made, self._settings.method.prepare(made.flexibility, bilateral)
 
     @stage("condensing")
@@ -116,19 +137,28 @@ class PreparedCondensed:
     def friction(self) -> CondensedFriction:
         """Return the small problem with friction, made at the first step that has some."""
         method, rates = self._settings.friction_method, self._settings.rates
-        return CondensedFriction(method, self._condensed(frictional=True), self._surface, rates=rates)
+        return CondensedFriction(
+            method, self._condensed(frictional=True), self._surface, rates=rates
+        )
 
     def solve(self, step: StepProblem) -> StepResult:
         """Return x, r_n and the active set of a step."""
         if step.slip0 is not None and self._surface.total:
             return self.friction.solve(step, self._rigid)
-        surface, (condensed, small), bound, guess = self._surface, self._normal, step.bound, step.active
+        surface, (condensed, small), bound, guess = (
+            self._surface,
+            self._normal,
+            step.bound,
+            step.active,
+        )
         if surface.comm.size > 1:
             bound, guess = surface.everywhere(np.column_stack([bound, guess])).T
             guess = guess > 0.0
         found: LCPResult = small.solve(bound - condensed.free(step.b), guess)
         x = condensed.answer(found.r, (found.r != 0.0) & self._rigid, bound)
-        return StepResult(x, surface.mine(found.r), surface.mine(found.active), found.iterations, self._name)
+        return StepResult(
+            x, surface.mine(found.r), surface.mine(found.active), found.iterations, self._name
+        )
 
     def solve_many(self, many: StepProblem, own: Callable[[int], StepProblem]) -> Answers | None:
         """Return the answers to the steps that are rows of ``many``; ``own`` makes one. None where this cannot be: on
@@ -141,6 +171,8 @@ class PreparedCondensed:
             return self.friction.solve_many(many, own, self._rigid)
         if not isinstance(small, PreparedSets):
             return None
-        r, active, counts, failed = small.solve_many(many.bound - condensed.free(many.b), many.active)
+        r, active, counts, failed = small.solve_many(
+            many.bound - condensed.free(many.b), many.active
+        )
         x = frozen(condensed.answer(r, (r != 0.0) & self._rigid, many.bound))
         return Answers(StepResult(x, r, active, 0, self._name), counts, failed)

@@ -24,7 +24,9 @@ from ..core.protocols import FrictionLaw
 from ..core.step import StepProblem, StepResult
 from ..core.verify import kkt_residual
 
-MARGIN = 2.0**10  # share over residual: reactions may be that much more wrong than the residual tells
+MARGIN = (
+    2.0**10
+)  # share over residual: reactions may be that much more wrong than the residual tells
 LEAST = 2.0**-30
 ROUNDS = 3
 
@@ -59,11 +61,17 @@ def left_over(step: StepProblem, answer: StepResult, share: float) -> StepProble
     """Return the step for d and q of the head of this file."""
     surface, x = step.surface, answer.x
     r_n, r_t = kept(step, answer, share)
-    return replace(step, b=step.b - step.A.image(x) - surface.reaction_load(r_n, len(x), r_t),
-                   bound=step.bound - surface.normal_values(x) + surface.compliance * r_n / step.scale,
-                   guess=np.zeros_like(x), active=answer.active,
-                   friction=step.friction if step.slip0 is None or share == 1.0 else Share(step.friction, share),
-                   slip0=None if step.slip0 is None else step.slip0 - surface.tangential_values(x))
+    return replace(
+        step,
+        b=step.b - step.A.image(x) - surface.reaction_load(r_n, len(x), r_t),
+        bound=step.bound - surface.normal_values(x) + surface.compliance * r_n / step.scale,
+        guess=np.zeros_like(x),
+        active=answer.active,
+        friction=step.friction
+        if step.slip0 is None or share == 1.0
+        else Share(step.friction, share),
+        slip0=None if step.slip0 is None else step.slip0 - surface.tangential_values(x),
+    )
 
 
 def added(step: StepProblem, answer: StepResult, found: StepResult, share: float) -> StepResult:
@@ -71,8 +79,13 @@ def added(step: StepProblem, answer: StepResult, found: StepResult, share: float
     r_n, r_t = kept(step, answer, share)
     if found.r_t is not None:
         r_t = found.r_t if r_t is None else r_t + found.r_t
-    return replace(found, x=answer.x + found.x, r_n=r_n + found.r_n, r_t=r_t,
-                   iterations=answer.iterations + found.iterations)
+    return replace(
+        found,
+        x=answer.x + found.x,
+        r_n=r_n + found.r_n,
+        r_t=r_t,
+        iterations=answer.iterations + found.iterations,
+    )
 
 
 def kept(step: StepProblem, answer: StepResult, share: float) -> tuple[Array, Array | None]:
@@ -83,13 +96,21 @@ def kept(step: StepProblem, answer: StepResult, share: float) -> tuple[Array, Ar
     if answer.r_t is None or step.slip0 is None:
         return (1.0 - share) * r_n, None
     law = step.friction_at(surface.tangential_values(answer.x) - step.slip0)
-    limit, size = limit_of(law, r_n, surface.weights, step.scale), np.linalg.norm(answer.r_t, axis=1)
+    limit, size = (
+        limit_of(law, r_n, surface.weights, step.scale),
+        np.linalg.norm(answer.r_t, axis=1),
+    )
     onto = np.divide(limit, size, out=np.ones_like(size), where=size > (1.0 - share) * limit)
     return (1.0 - share) * r_n, (1.0 - share) * onto[:, None] * answer.r_t
 
 
-def corrected(step: StepProblem, result: StepResult, certificate: Certificate,
-              solve: Callable[[StepProblem], StepResult], goal: float) -> tuple[StepResult, Certificate]:
+def corrected(
+    step: StepProblem,
+    result: StepResult,
+    certificate: Certificate,
+    solve: Callable[[StepProblem], StepResult],
+    goal: float,
+) -> tuple[StepResult, Certificate]:
     """Return the result after corrections that brought its certificate to the goal, or as near to it as they got."""
     for _ in range(ROUNDS):
         share = share_of(certificate.worst)

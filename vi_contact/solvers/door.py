@@ -26,7 +26,9 @@ def refuse_nan(step: StepProblem, source: Source | None = None) -> None:
     """Raise StepFailure for NaN or infinite loads, NaN in gaps, guesses or slips, with time and place; asked of all
     ranks, so that all stop. ``source``: makes the system whose histories may be named. Collective."""
     bound, slip0 = step.bound, step.slip0
-    fine = isfinite(step.b.dot(step.guess))  # the quickest look there is; an overflow is looked into
+    fine = isfinite(
+        step.b.dot(step.guess)
+    )  # the quickest look there is; an overflow is looked into
     gaps = bound.dot(bound)  # infinite gaps are gaps that never close
     fine = fine and gaps == gaps and (slip0 is None or isfinite(np.vdot(slip0, slip0)))
     if largest(step.surface.comm, not fine):
@@ -41,7 +43,12 @@ def _refuse(step: StepProblem, source: Source | None) -> None:
     for name, values, points, remedy in (
         ("load", step.b, there, DATA),
         ("guess", step.guess, there, "check the state that the step begins with, and the scheme"),
-        ("gap", np.where(np.isnan(step.bound), np.nan, 0.0), step.surface.points, "check how the obstacle moves"),
+        (
+            "gap",
+            np.where(np.isnan(step.bound), np.nan, 0.0),
+            step.surface.points,
+            "check how the obstacle moves",
+        ),
         ("slip", step.slip0, step.surface.points, "check how the obstacle slides, and the state"),
     ):
         if values is None:
@@ -94,9 +101,14 @@ def refuse_matrix(problem: ContactProblem, A: EffectiveMatrix) -> None:
         return
     system = problem.equations
     matrices = {"M": system.M, "C": system.C, "K": system.K}
-    names = [name for name, one in matrices.items()
-             if one is not None and largest(comm, not isfinite(max_abs(one @ ones)))]
+    names = [
+        name
+        for name, one in matrices.items()
+        if one is not None and largest(comm, not isfinite(max_abs(one @ ones)))
+    ]
     whose = f" ({' and '.join(names)})" if names else ""
     place = _place(comm, wrong, None if A.space is None else A.space.coordinates)
-    raise InputError(f"the matrix of the steps{whose} has NaN or infinite entries{place}: check materials, masses, "
-                     "damping, contact directions and the time step")
+    raise InputError(
+        f"the matrix of the steps{whose} has NaN or infinite entries{place}: check materials, masses, "
+        "damping, contact directions and the time step"
+    )

@@ -10,4 +10,14 @@ from .refinement import refine as refine
 from .report import comparisons as comparisons
 from .report import report as report
 
-__all__: list[str] = ['Case', 'IDA', 'comparisons', 'fragility_curve', 'read_case', 'record_set', 'refine', 'report', 'run_ida']
+__all__: list[str] = [
+    "Case",
+    "IDA",
+    "comparisons",
+    "fragility_curve",
+    "read_case",
+    "record_set",
+    "refine",
+    "report",
+    "run_ida",
+]

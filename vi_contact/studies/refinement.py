@@ -19,11 +19,17 @@ from .cases.toml_file import toml_value, with_settings
 
 FOLDER = "refined"  # in the run folder
 NAMES = {"h": "h/2", "dt": "dt/2"}
-UNSIZED = ("certificate", "energy_defect", "contact_active")  # columns without a size that mesh and step should leave
+UNSIZED = (
+    "certificate",
+    "energy_defect",
+    "contact_active",
+)  # columns without a size that mesh and step should leave
 NOISE = 1e-6  # of the largest peak in the same unit: columns that small are not compared
 
 
-def refine(folder: str | Path, comm: Any, *, allow: Sequence[str] = (), progress: bool = True) -> dict[str, str]:
+def refine(
+    folder: str | Path, comm: Any, *, allow: Sequence[str] = (), progress: bool = True
+) -> dict[str, str]:
     """Run the case of a finished run folder with h/2 and with dt/2, into refined/h and refined/dt. Return name -> why
     it failed. A finished run is kept, and an interrupted run is continued. Collective.
 
@@ -33,16 +39,22 @@ def refine(folder: str | Path, comm: Any, *, allow: Sequence[str] = (), progress
     check("refine", "folder", folder, str | Path)
     run, failed = read_run(folder), {}
     if not is_own(run.folder / COPY):
-        raise InputError(f"'{folder}' holds no {COPY}, the case that is to be refined: give the folder of a case's run")
+        raise InputError(
+            f"'{folder}' holds no {COPY}, the case that is to be refined: give the folder of a case's run"
+        )
     if run.facts.get("status") != "finished":
-        raise InputError(f"the run in '{folder}' has not finished: continue it with --restart, then refine it")
+        raise InputError(
+            f"the run in '{folder}' has not finished: continue it with --restart, then refine it"
+        )
     for name in NAMES:
         try:
             out = inner_folder(run.folder, FOLDER, name)
             same, settings = _same(run, name), [*copied_settings(run.folder), *_halved(run, name)]
             if not (same and _status(out) == "finished"):
                 case = read_case(run.folder / COPY, settings, allow=allow)
-                case.run(comm, out=out, restart=same and is_own(out / CHECKPOINT), progress=progress)
+                case.run(
+                    comm, out=out, restart=same and is_own(out / CHECKPOINT), progress=progress
+                )
         except ViContactError as error:
             failed[name] = str(error)
     return failed
@@ -61,11 +73,19 @@ def _halved(folder: RunFolder, name: str) -> Iterator[str]:
         yield "fields="
     if name == "h":
         size = tables["mesh"].get("divisions")  # numbers of elements, or their size
-        finer = [2 * one for one in size] if isinstance(size, list) else 0.5 * size if isinstance(size, float) else None
+        finer = (
+            [2 * one for one in size]
+            if isinstance(size, list)
+            else 0.5 * size
+            if isinstance(size, float)
+            else None
+        )
         refine = 1 + tables["mesh"].get("refine", 0)
         yield f"mesh.refine={refine}" if finer is None else f"mesh.divisions={toml_value(finer)}"
     elif not isinstance(dt, int | float):
-        raise InputError(f"the time step is not a number, {dt}: halve it in the case and compare the runs")
+        raise InputError(
+            f"the time step is not a number, {dt}: halve it in the case and compare the runs"
+        )
     else:
         yield f"run.dt={0.5 * dt!r}"
         for k, stage in enumerate([tables, *tables.get("stage", ())]):
@@ -80,7 +100,9 @@ def _plain(value: Any, key: str) -> Any:
     """A number of the case; InputError for one that is written as a text, which has no half."""
     if isinstance(value, int | float):
         return value
-    raise InputError(f"{key} is {shown(value)}, which has no half: write it as a number in the case, in SI units")
+    raise InputError(
+        f"{key} is {shown(value)}, which has no half: write it as a number in the case, in SI units"
+    )
 
 
 def _status(folder: Path) -> str:
@@ -101,16 +123,30 @@ def refinement(run: RunFolder, failed: Mapping[str, str]) -> Section:
     said = [f"The run with {NAMES[name]} failed: {why}." for name, why in failed.items()]
     if not found:
         return Section("Discretisation error", [*said, SAY["untried"]])
-    header = ["column", "unit", "this run"] + [text for one in found for text in (NAMES[one], "difference")]
+    header = ["column", "unit", "this run"] + [
+        text for one in found for text in (NAMES[one], "difference")
+    ]
     rows, own = [], [one for one in peaks(run.history, run.columns) if one.name not in UNSIZED]
     for one in own:
         base, like = _size(one), max(_size(other) for other in own if other.unit == one.unit)
         told = [_size(each[one.name]) if one.name in each else np.nan for each in found.values()]
         if base > NOISE * like:
-            pairs = [(number(other), f"{round(100.0 * (other / base - 1.0), 2) + 0.0:+g} %") for other in told]
+            pairs = [
+                (number(other), f"{round(100.0 * (other / base - 1.0), 2) + 0.0:+g} %")
+                for other in told
+            ]
             mark = ", raw: not convergent at impacts" if one.quantity.endswith(GROWS) else ""
-            rows.append([one.name + mark, one.unit, number(base), *(text for pair in pairs for text in pair)])
-    return Section("Discretisation error", [SAY["refined"], *said], [Table(header, rows, sortable=True)])
+            rows.append(
+                [
+                    one.name + mark,
+                    one.unit,
+                    number(base),
+                    *(text for pair in pairs for text in pair),
+                ]
+            )
+    return Section(
+        "Discretisation error", [SAY["refined"], *said], [Table(header, rows, sortable=True)]
+    )
 
 
 def _size(peak: Any) -> float:

@@ -30,9 +30,14 @@ WRITERS = {".html": write_web_page, ".pdf": write_pages}
 
 
 @checked
-def report(folder: str | Path, *, out: str | Path | None = None, title: str | None = None,
-           columns: Sequence[Sequence[str]] | None = None,
-           failed: Mapping[str, str] | None = None) -> tuple[Section, list[Path]]:
+def report(
+    folder: str | Path,
+    *,
+    out: str | Path | None = None,
+    title: str | None = None,
+    columns: Sequence[Sequence[str]] | None = None,
+    failed: Mapping[str, str] | None = None,
+) -> tuple[Section, list[Path]]:
     """Write the report on a run folder, and beside it the table peaks.csv and the pictures. Return what the report
     says of the discretisation error, and the paths of the files.
 
@@ -44,18 +49,33 @@ def report(folder: str | Path, *, out: str | Path | None = None, title: str | No
     case = read_copy(folder)
     run = read_run(folder)
     heading = str(title or case.get("title") or f"Run {folder.resolve().name}")
-    pages = [Path(out)] if out is not None else [folder / f"report.{end}" for end in ("pdf", "html")[: 1 + can_write()]]
+    pages = (
+        [Path(out)]
+        if out is not None
+        else [folder / f"report.{end}" for end in ("pdf", "html")[: 1 + can_write()]]
+    )
     if pages[0].suffix.lower() not in WRITERS:
         raise InputError(f"'{pages[0]}' is not an .html or .pdf file: give such a name")
-    if pages[0].suffix.lower() == ".html" and not can_write():  # before a picture is drawn over another one
+    if (
+        pages[0].suffix.lower() == ".html" and not can_write()
+    ):  # before a picture is drawn over another one
         raise InputError(MISSING)
     model, sketched = _model(folder, pages[0].with_name("model.png"))
-    sections, drawn = sections_of(run, model, columns), draw_run(run, pages[0].parent, title=heading)
+    sections, drawn = (
+        sections_of(run, model, columns),
+        draw_run(run, pages[0].parent, title=heading),
+    )
     sections[:0] = [replace(sections.pop(0), pictures=sketched)] if model else []
-    more = [_checks(folder), error := refinement(run, failed or {}), Section("Pictures", pictures=drawn)]
+    more = [
+        _checks(folder),
+        error := refinement(run, failed or {}),
+        Section("Pictures", pictures=drawn),
+    ]
     sections[-2:-2] = [one for one in more if one.sentences or one.tables or one.pictures]
     for page in pages:
-        WRITERS[page.suffix.lower()](page, heading, header_facts(run), sections, f"vi_contact {__version__}")
+        WRITERS[page.suffix.lower()](
+            page, heading, header_facts(run), sections, f"vi_contact {__version__}"
+        )
     table = write_peaks(pages[0].with_name("peaks.csv"), peaks(run.history, run.columns))
     return error, [*pages, table, *sketched, *drawn]
 
@@ -71,9 +91,17 @@ def _model(folder: Path, picture: Path) -> tuple[dict[str, Any], list[Path]]:
         raise
     except OSError as error:
         raise ViContactError(sentence(error)) from error
-    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:  # of what the file says
+    except (
+        KeyError,
+        TypeError,
+        ValueError,
+        IndexError,
+        AttributeError,
+    ) as error:  # of what the file says
         reason = " ".join(str(error).split())[:200]
-        raise InputError(f"'{folder / MODEL}' is damaged ({reason}): restore it, or delete it") from error
+        raise InputError(
+            f"'{folder / MODEL}' is damaged ({reason}): restore it, or delete it"
+        ) from error
     write_output(picture, image)
     return model, [picture]
 
@@ -83,8 +111,16 @@ def comparisons(folder: str | Path) -> tuple[Comparison, ...]:
     """Return the comparisons of a run folder, one for each [[check]] of the case it keeps; InputError without a run."""
     folder = Path(folder)
     table = read_copy(folder).get("check", [])
-    words = Words(folder, {Check: {name: callee(getattr(checks, name)) for name in checks.__all__}}, {}, (), {})
-    made = build(read(table, Check | Sequence[Check], Spot(str(folder / COPY), "", "check"), words), {})
+    words = Words(
+        folder,
+        {Check: {name: callee(getattr(checks, name)) for name in checks.__all__}},
+        {},
+        (),
+        {},
+    )
+    made = build(
+        read(table, Check | Sequence[Check], Spot(str(folder / COPY), "", "check"), words), {}
+    )
     each = made if isinstance(made, tuple) else (made,)
     history = read_run(folder).history if each else {}
     return tuple(one.compare(history) for one in each)
@@ -92,8 +128,21 @@ def comparisons(folder: str | Path) -> tuple[Comparison, ...]:
 
 def _checks(folder: Path) -> Section:
     """What the run found beside the formulas that its case names."""
-    rows = [[one.name, one.formula, ", ".join(f"{name} = {number(value)} {unit}" for name, (value, unit) in
-             one.inputs.items()), number(one.expected), number(one.found), one.unit,
-             f"does not apply: {one.applies}" if one.applies else number(one.ratio), one.source]
-            for one in comparisons(folder)]
-    return Section("Checks against formulas", tables=[Table(HEADERS["checks"], rows)] if rows else [])
+    rows = [
+        [
+            one.name,
+            one.formula,
+            ", ".join(
+                f"{name} = {number(value)} {unit}" for name, (value, unit) in one.inputs.items()
+            ),
+            number(one.expected),
+            number(one.found),
+            one.unit,
+            f"does not apply: {one.applies}" if one.applies else number(one.ratio),
+            one.source,
+        ]
+        for one in comparisons(folder)
+    ]
+    return Section(
+        "Checks against formulas", tables=[Table(HEADERS["checks"], rows)] if rows else []
+    )

@@ -3,4 +3,4 @@
 from .inequality import Result as Result
 from .inequality import solve as solve
 
-__all__: list[str] = ['Result', 'solve']
+__all__: list[str] = ["Result", "solve"]

@@ -32,22 +32,32 @@ def split(form: Any, u: Any, J: Any) -> tuple[Any, Any]:
         form = ufl.system(form)
     if isinstance(form, ufl.Form):
         if not contains(checked("F", form, 1, u), u):
-            raise refused("F does not depend on u: write it with the Function that is solved for, or give (a, L)")
+            raise refused(
+                "F does not depend on u: write it with the Function that is solved for, or give (a, L)"
+            )
         return form, checked("J", ufl.derivative(form, u) if J is None else J, 2, u)
     if not isinstance(form, tuple | list) or len(form) != 2 or J is not None:
         raise refused(f"the form is {shown(form)}, J {shown(J)}; {FORMS}, whose Jacobian is a")
     a, L = checked("a", form[0], 2, u), checked("L", form[1], 1, u)
     if contains(a, u) or contains(L, u):
-        raise refused("a or L contains u itself, so that the problem is not linear in it: give F(u; v)")
+        raise refused(
+            "a or L contains u itself, so that the problem is not linear in it: give F(u; v)"
+        )
     return ufl.action(a, u) - L, a
 
 
 def derivatives(energy: Any, u: Any) -> tuple[Any, Any]:
     """Return (F, J), the first and second derivative of a functional of u; InputError for others."""
     if not isinstance(energy, ufl.Form) or energy.arguments():
-        what = f"a form of rank {len(energy.arguments())}" if isinstance(energy, ufl.Form) else shown(energy)
-        raise refused(f"energy is {what}, and a functional is needed; give a UFL form of rank 0, such as "
-                      "0.5 * ufl.inner(ufl.grad(u), ufl.grad(u)) * ufl.dx, or the form F(u; v) in its place")
+        what = (
+            f"a form of rank {len(energy.arguments())}"
+            if isinstance(energy, ufl.Form)
+            else shown(energy)
+        )
+        raise refused(
+            f"energy is {what}, and a functional is needed; give a UFL form of rank 0, such as "
+            "0.5 * ufl.inner(ufl.grad(u), ufl.grad(u)) * ufl.dx, or the form F(u; v) in its place"
+        )
     if not contains(energy, u):
         raise refused("energy does not depend on u: write it with the Function that is solved for")
     F = ufl.derivative(energy, u)
@@ -57,10 +67,14 @@ def derivatives(energy: Any, u: Any) -> tuple[Any, Any]:
 def checked(name: str, form: Any, rank: int, u: Any) -> Any:
     """Return a form that has so many arguments, on the space of u; else InputError."""
     if not isinstance(form, ufl.Form) or len(form.arguments()) != rank:
-        what = f"a form of rank {len(form.arguments())}" if isinstance(form, ufl.Form) else shown(form)
+        what = (
+            f"a form of rank {len(form.arguments())}" if isinstance(form, ufl.Form) else shown(form)
+        )
         raise refused(f"{name} is {what}, and a {KINDS[rank]} is needed; {FORMS}")
     if any(one.ufl_function_space() != u.ufl_function_space() for one in form.arguments()):
-        raise refused(f"the test or trial function of {name} is on another space: make it of u.function_space")
+        raise refused(
+            f"the test or trial function of {name} is on another space: make it of u.function_space"
+        )
     return form
 
 
@@ -89,7 +103,9 @@ class Problem:
         self.comm = MpiComm(kept(space.mesh.comm))
         self.owned = space.dofmap.index_map_bs * space.dofmap.index_map.size_local
         if not isinstance(bcs, list | tuple) or not all(compat.constrains(bc, space) for bc in bcs):
-            raise refused("bcs is wrong: give a list of dirichletbc objects on the space of u or its components")
+            raise refused(
+                "bcs is wrong: give a list of dirichletbc objects on the space of u or its components"
+            )
         self.given = self._first = np.array(u.x.array)
         self._held, self._values = np.zeros(len(self.given), dtype=bool), np.zeros(len(self.given))
         for bc in bcs:
@@ -183,7 +199,9 @@ class Problem:
             whole = moved(compat.assemble_matrix(self._J), self.comm.mpi)
             if left:
                 gain = (PetscMatrix(whole) @ (left * self.change[: self.owned]))[self.free]
-            self._jacobian = as_petsc(PetscAlgebra(self.comm.mpi).block(PetscMatrix(whole), self.free))
+            self._jacobian = as_petsc(
+                PetscAlgebra(self.comm.mpi).block(PetscMatrix(whole), self.free)
+            )
             whole.destroy()
         return self._jacobian, gain
 
@@ -206,15 +224,27 @@ class Problem:
         What misses by rounding (``rounding``) contradicts nothing: a prescribed value that is beyond a bound stays as
         it is, and where lower is above upper the unknown is held at lower."""
         low, high = self._bound("lower", lower, -np.inf), self._bound("upper", upper, np.inf)
-        u, space = np.where(self._held, self._values, self.given)[: self.owned], self.u.function_space
+        u, space = (
+            np.where(self._held, self._values, self.given)[: self.owned],
+            self.u.function_space,
+        )
         self.size = size_of_field(np.nan_to_num(u, nan=np.inf), low, high, self.comm)
         off = OFF * self.size
         defects = (
             (~np.isfinite(u), "the first guess or bcs are NaN or infinite: correct them"),
-            (np.isnan(low) | np.isnan(high), "a bound is not a number: give None where there is none"),
+            (
+                np.isnan(low) | np.isnan(high),
+                "a bound is not a number: give None where there is none",
+            ),
             (low > high + off, "lower is above upper: give lower <= upper"),
-            ((low == np.inf) | (high == -np.inf), "no number is allowed: give finite bounds, or None"),
-            (~self.free & ((u < low - off) | (u > high + off)), "bcs prescribe a value beyond a bound: correct it"),
+            (
+                (low == np.inf) | (high == -np.inf),
+                "no number is allowed: give finite bounds, or None",
+            ),
+            (
+                ~self.free & ((u < low - off) | (u > high + off)),
+                "bcs prescribe a value beyond a bound: correct it",
+            ),
         )
 
         def said(i: int, words: str) -> str:
@@ -222,12 +252,14 @@ class Problem:
             where = f"component {component} at {at(space.tabulate_dof_coordinates()[node])}"
             return f"vi.solve: {where}, where u is {u[i]:g} in [{low[i]:g}, {high[i]:g}]: {words}"
 
-        refuse((said(int(np.argmax(wrong)), words) for wrong, words in defects if np.any(wrong)), self.comm)
+        refuse(
+            (said(int(np.argmax(wrong)), words) for wrong, words in defects if np.any(wrong)),
+            self.comm,
+        )
         return low[self.free], np.maximum(low, high)[self.free]
 
     def moves(self, low: Array, high: Array) -> bool:
-        """Say whether conditions or bounds change the first guess by more than rounding; after ``bounds``. Collective.
-        """
+        """Say whether conditions or bounds change the first guess by more than rounding; after ``bounds``. Collective."""
         x = self.given[: self.owned][self.free]
         most = max(max_abs(self.change), max_abs(x - np.clip(x, low, high)))
         return largest(self.comm, most) > OFF * self.size
@@ -244,8 +276,10 @@ class Problem:
             number = np.asarray(none if given is None else given, dtype=float)
             return np.tile(np.broadcast_to(number, (width,)), self.owned // width)
         except (TypeError, ValueError):
-            raise refused(f"{name} is {shown(given)}; give a Function on u.function_space itself, a number (or "
-                          f"{width}, one for a component), or None") from None
+            raise refused(
+                f"{name} is {shown(given)}; give a Function on u.function_space itself, a number (or "
+                f"{width}, one for a component), or None"
+            ) from None
 
 
 def given_alike(bound: Any) -> Any:

@@ -68,10 +68,21 @@ class Result:
     seconds: Mapping[str, float]
 
 
-def solve(form: Any = None, u: Any = None, *, energy: Any = None, lower: Any = None, upper: Any = None,
-          bcs: Sequence[Any] = (), J: Any = None, method: Method | None = None,
-          petsc_options: Mapping[str, object | None] | None = None, prefix: str = "vi_contact_vi_",
-          tolerance: float = 1e-9, iterations: int | None = None) -> Result:
+def solve(
+    form: Any = None,
+    u: Any = None,
+    *,
+    energy: Any = None,
+    lower: Any = None,
+    upper: Any = None,
+    bcs: Sequence[Any] = (),
+    J: Any = None,
+    method: Method | None = None,
+    petsc_options: Mapping[str, object | None] | None = None,
+    prefix: str = "vi_contact_vi_",
+    tolerance: float = 1e-9,
+    iterations: int | None = None,
+) -> Result:
     """Solve F(u; v - u) >= 0 for all v between the bounds, or find a local minimum of an energy between them; u holds
     the first guess, and the answer.
 
@@ -94,13 +105,29 @@ def solve(form: Any = None, u: Any = None, *, energy: Any = None, lower: Any = N
     refuse_complex("vi.solve")
     instance("vi.solve", "u", u, compat.fem.Function, "give the DOLFINx Function to solve for")
     if not compat.nodal(u.function_space):
-        raise refused("the unknowns of u are not values of one field at points: take Lagrange or DG0, not mixed")
+        raise refused(
+            "the unknowns of u are not values of one field at points: take Lagrange or DG0, not mixed"
+        )
     refuse_choices(form, energy, J, method)
-    agree(MpiComm(kept(u.function_space.mesh.comm)), "vi.solve", {
-        "lower": given_alike(lower), "upper": given_alike(upper), "J": J is None, "energy": energy is None,
-        "method": method, "number of bcs": len(bcs) if isinstance(bcs, list | tuple) else bcs,
-        "petsc_options": petsc_options, "prefix": prefix, "tolerance": tolerance, "iterations": iterations})
-    settings = Volume(method or TaoTron(), {} if petsc_options is None else petsc_options, prefix, tolerance)
+    agree(
+        MpiComm(kept(u.function_space.mesh.comm)),
+        "vi.solve",
+        {
+            "lower": given_alike(lower),
+            "upper": given_alike(upper),
+            "J": J is None,
+            "energy": energy is None,
+            "method": method,
+            "number of bcs": len(bcs) if isinstance(bcs, list | tuple) else bcs,
+            "petsc_options": petsc_options,
+            "prefix": prefix,
+            "tolerance": tolerance,
+            "iterations": iterations,
+        },
+    )
+    settings = Volume(
+        method or TaoTron(), {} if petsc_options is None else petsc_options, prefix, tolerance
+    )
 
     problem = Problem(form, u, bcs, J, energy)
     low, high = problem.bounds(lower, upper)
@@ -130,22 +157,38 @@ def solve(form: Any = None, u: Any = None, *, energy: Any = None, lower: Any = N
         reason += ", at a local minimum: no direction of negative curvature is found"
     active = [round(total(problem.comm, np.count_nonzero(push))) for push in best.push]
     pushes, seconds = [problem.spread(one) for one in best.push], time.process_time() - ready
-    return Result(u, pushes[0], pushes[1], (active[0], active[1]), best.certificate, found.steps, found.inner,
-                  found.method, reason, {"setup": ready - start, "solve": seconds})
+    return Result(
+        u,
+        pushes[0],
+        pushes[1],
+        (active[0], active[1]),
+        best.certificate,
+        found.steps,
+        found.inner,
+        found.method,
+        reason,
+        {"setup": ready - start, "solve": seconds},
+    )
 
 
 def refuse_choices(form: Any, energy: Any, J: Any, method: Any) -> None:
     """Raise InputError unless there is a form or an energy, and not both, nor what an energy has no use for."""
     if form is None and energy is None:
-        raise refused("there is nothing to solve: give the form F(u; v), or energy=, a functional of u")
+        raise refused(
+            "there is nothing to solve: give the form F(u; v), or energy=, a functional of u"
+        )
     if form is not None and energy is not None:
-        raise refused("both a form and energy= are given: give one of them, as the form is the "
-                      "derivative of the energy")
+        raise refused(
+            "both a form and energy= are given: give one of them, as the form is the "
+            "derivative of the energy"
+        )
     if energy is not None and J is not None:
         raise refused("J is given beside energy=, whose second derivative is J: leave J out")
     if energy is not None and method is not None:
-        raise refused(f"method is {shown(method)}, which solves the linear steps of a form; leave it "
-                      "out with energy=")
+        raise refused(
+            f"method is {shown(method)}, which solves the linear steps of a form; leave it "
+            "out with energy="
+        )
 
 
 def preconditioner(ranks: int) -> Mapping[str, object | None]:
@@ -160,7 +203,9 @@ def curves_down(found: Found, layers: OptionLayers) -> bool:
     if best.broken or problem.constant:
         return False
     problem.put(best.x, best.left)
-    point = Judged(problem, best.lower, best.upper, best.left)  # its Jacobian, which later points have replaced
+    point = Judged(
+        problem, best.lower, best.upper, best.left
+    )  # its Jacobian, which later points have replaced
     if not is_symmetric(point.A, problem.comm):
         return False
     model = Model(point, layers)

@@ -37,12 +37,18 @@ class LinearSteps:
     def methods(self, symmetric: bool) -> list[Method]:
         """Return the methods to try, in this order; InputError for one that does not suit A."""
         if self.given and isinstance(self.given[0], TaoTron) and not symmetric:
-            raise refused(f"{self.given[0]} minimises, and the form is not symmetric, so there is nothing to minimise: "
-                          "leave method out, or take ReducedNewton() or SemismoothNewton()")
-        suited: list[Method] = [TaoTron(), ReducedNewton()] if symmetric else [ReducedNewton(), SemismoothNewton()]
+            raise refused(
+                f"{self.given[0]} minimises, and the form is not symmetric, so there is nothing to minimise: "
+                "leave method out, or take ReducedNewton() or SemismoothNewton()"
+            )
+        suited: list[Method] = (
+            [TaoTron(), ReducedNewton()] if symmetric else [ReducedNewton(), SemismoothNewton()]
+        )
         return sorted(self.given or suited, key=lambda method: type(method).__name__ in self.failed)
 
-    def solve(self, A: PetscMatrix, b: Array, lower: Array, upper: Array, start: Array) -> tuple[Array, int, str]:
+    def solve(
+        self, A: PetscMatrix, b: Array, lower: Array, upper: Array, start: Array
+    ) -> tuple[Array, int, str]:
         """Return (x, iterations, name of the method) of the first method that finds x; StepFailure with what all said.
         Every unknown is the one of a contact condition. Collective."""
         numbers, comm = np.arange(A.rows), self.comm
@@ -56,7 +62,9 @@ class LinearSteps:
 
         # The problem as a step of a body whose every unknown is in contact, with obstacles on both sides.
         zero, none = np.zeros(A.rows), np.zeros(A.rows, dtype=bool)
-        surface = replace(empty_surface(comm, 1), owned=numbers, gap0=zero, compliance=zero, bilateral=none)
+        surface = replace(
+            empty_surface(comm, 1), owned=numbers, gap0=zero, compliance=zero, bilateral=none
+        )
         matrix = EffectiveMatrix(A, (PetscAlgebra if symmetric else UnsymmetricAlgebra)(comm.mpi))
         step = StepProblem(matrix, b, upper, surface, 1.0, start, none, 0.0, 0, lower=lower)
 
@@ -95,5 +103,7 @@ def reduced_step(point: Judged) -> Array:
     try:
         step[~held] = algebra.factor(algebra.block(point.A, ~held)).solve(right)
     except InputError:
-        raise StepFailure("the Jacobian is singular on the unknowns that are off their bounds") from None
+        raise StepFailure(
+            "the Jacobian is singular on the unknowns that are off their bounds"
+        ) from None
     return x + step

@@ -21,12 +21,18 @@ FIRST_RADIUS = 1e3  # steps of Jacobi's method: the first radius
 DIGITS = 1e-8  # of the energy: a smaller decrease is taken from forces, as energies cancel
 UNBOUNDED = 1e30  # times the first radius: no answer is so far away
 SHORTEST = 1e-14  # of the first radius, and of the whole change of the conditions
-NOT_A_NUMBER = "the energy or its derivatives are not a number there: check the energy and the first guess"
+NOT_A_NUMBER = (
+    "the energy or its derivatives are not a number there: check the energy and the first guess"
+)
 TOO_FEW = "the iterations are used up: give a better first guess in u, or more iterations"
-NO_DESCENT = "no step makes the energy smaller: check that it is smooth and bounded below between the bounds"
+NO_DESCENT = (
+    "no step makes the energy smaller: check that it is smooth and bounded below between the bounds"
+)
 
 
-def minimise(problem: Problem, lower: Array, upper: Array, tolerance: float, limit: int, layers: OptionLayers) -> Found:
+def minimise(
+    problem: Problem, lower: Array, upper: Array, tolerance: float, limit: int, layers: OptionLayers
+) -> Found:
     """Return where the descent ends: at a point whose certificate is below the tolerance and where no direction of
     negative curvature is found, or with a failure. ``layers``: options of the preconditioner. Collective."""
     found = Found(begin(problem, lower, upper), method="trust region")
@@ -53,7 +59,11 @@ def carry_conditions(found: Found, layers: OptionLayers) -> None:
                 problem.put(np.clip(problem.x, point.lower, point.upper))
             next_point = Judged(problem, point.lower, point.upper, point.left * (1.0 - length))
             if not next_point.broken:
-                found.best, found.inner, found.steps = next_point, found.inner + its, found.steps + 1
+                found.best, found.inner, found.steps = (
+                    next_point,
+                    found.inner + its,
+                    found.steps + 1,
+                )
                 return
         length *= 0.5
     found.failure = "Dirichlet conditions or bounds lead where the energy is not a number: take a smaller load step"

@@ -67,7 +67,10 @@ class Model:
             if size <= SMALLEST * first or not self.problem.count(free):
                 break
             # Superlinear convergence: the closer to the minimum, the more exact the step.
-            aim = min(FORCING, max(SMALLEST, self.point.certificate.worst if not self.point.left else FORCING))
+            aim = min(
+                FORCING,
+                max(SMALLEST, self.point.certificate.worst if not self.point.left else FORCING),
+            )
             w, its, ended = self._conjugate_gradients(free, s, residual, radius, aim)
             count += its
             s_next = self._search(s, w, residual)
@@ -91,7 +94,9 @@ class Model:
         energy = abs(self.problem.energy())
         curvature = -self.problem.dot(direction, self.J @ direction)
         length = np.sqrt(2.0 * PART * energy / curvature) * self.length(direction)
-        if length == 0.0:  # an energy of zero tells nothing: the size of the field, or of one where there is none
+        if (
+            length == 0.0
+        ):  # an energy of zero tells nothing: the size of the field, or of one where there is none
             length = self.length(np.full_like(self.x, self.problem.size or 1.0))
         s = direction * (share * length / self.length(direction))
         sides = [self._projected(one) for one in (s, -s)]
@@ -129,7 +134,10 @@ class Model:
         for _ in range(60):
             s = self._projected(start + alpha * direction)
             slope = -self.problem.dot(s - start, self.diagonal * direction)
-            if self.length(s) <= max(radius, self.length(start)) and self.value(s) - base <= DESCENT * slope:
+            if (
+                self.length(s) <= max(radius, self.length(start))
+                and self.value(s) - base <= DESCENT * slope
+            ):
                 return s
             alpha *= 0.5
         return start
@@ -153,8 +161,9 @@ class Model:
             self._kept = free, block, Preconditioner(block, self.layers)
         return self._kept[1], self._kept[2]
 
-    def _conjugate_gradients(self, free: Mask, s: Array, residual: Array, radius: float,
-                             aim: float) -> tuple[Array, int, bool]:
+    def _conjugate_gradients(
+        self, free: Mask, s: Array, residual: Array, radius: float, aim: float
+    ) -> tuple[Array, int, bool]:
         """(w, iterations, whether it ended early): w on the free unknowns, J w = -residual or as far towards it as the
         radius allows, counted from x. Directions of negative curvature are followed to the edge (T. Steihaug, 1983)."""
         block, precondition = self._block(free)
@@ -168,7 +177,11 @@ class Model:
             Jd = block @ d
             curvature = dot(d, Jd)
             # How far along d the edge of the region is: |s + w + tau d| = radius.
-            a, b, c = dot(d, D * d), dot(d, D * (s0 + w)), outside + dot(s0 + w, D * (s0 + w)) - radius**2
+            a, b, c = (
+                dot(d, D * d),
+                dot(d, D * (s0 + w)),
+                outside + dot(s0 + w, D * (s0 + w)) - radius**2,
+            )
             edge = (-b + np.sqrt(max(b * b - a * c, 0.0))) / a if np.isfinite(radius) else np.inf
             count += 1
             if curvature <= 0.0 or rz / curvature >= edge:
@@ -190,7 +203,11 @@ class Model:
     def _negative(self) -> tuple[Array | None, int]:
         """(A direction of negative curvature of J on the unknowns that no bound holds or None, iterations of conjugate
         gradients)."""
-        free = self._off_bounds(np.zeros_like(self.x)) & (self.point.push[0] == 0.0) & (self.point.push[1] == 0.0)
+        free = (
+            self._off_bounds(np.zeros_like(self.x))
+            & (self.point.push[0] == 0.0)
+            & (self.point.push[1] == 0.0)
+        )
         if not self.problem.count(free):
             return None, 0
         load = self.diagonal * _uneven(self.problem.places())

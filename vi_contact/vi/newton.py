@@ -26,11 +26,15 @@ ARMIJO = 1e-4  # the part of what the slope promises that a step must bring
 HALVINGS = 24  # of a step that brings too little
 SMALL_CHANGE = 2.0  # times the natural residual of the linear step that carries the change
 STEPS_OF_A_PART = 20  # at most
-SMALLEST_PART = 1.0 / 8.0  # of the change that Dirichlet conditions bring, when it is taken in parts
+SMALLEST_PART = (
+    1.0 / 8.0
+)  # of the change that Dirichlet conditions bring, when it is taken in parts
 REFINEMENTS = 5  # of a linear problem, at most
 
 NOT_A_NUMBER = "F or its Jacobian is not a number there: check the form and the first guess"
-NO_STEP = "no step of Newton's method improves u: take smaller load steps, or give a better first guess"
+NO_STEP = (
+    "no step of Newton's method improves u: take smaller load steps, or give a better first guess"
+)
 UNHELD = (
     "the linear problem is not solved: check that bcs or bounds hold u, that F is a(u, v) - L(v) "
     "with a(v, v) > 0, and that its coefficients are finite, or try another method="
@@ -72,8 +76,16 @@ def begin(problem: Problem, lower: Array, upper: Array, *, carry: bool = True) -
     return Judged(problem, lower, upper)
 
 
-def solve_in_parts(problem: Problem, lower: Array, upper: Array, settings: Volume, methods: Sequence[Method],
-                   limit: int, *, carry: bool = True) -> Found:
+def solve_in_parts(
+    problem: Problem,
+    lower: Array,
+    upper: Array,
+    settings: Volume,
+    methods: Sequence[Method],
+    limit: int,
+    *,
+    carry: bool = True,
+) -> Found:
     """Return where Newton's method ends. Where it fails as Dirichlet conditions change the first guess too much at
     once, they change it in parts, each from the answer of the part before. Collective."""
     moves = not problem.constant and problem.moves(lower, upper)
@@ -100,8 +112,16 @@ def solve_in_parts(problem: Problem, lower: Array, upper: Array, settings: Volum
     return whole
 
 
-def newton(problem: Problem, lower: Array, upper: Array, settings: Volume, methods: Sequence[Method],
-           limit: int, *, carry: bool = True) -> Found:
+def newton(
+    problem: Problem,
+    lower: Array,
+    upper: Array,
+    settings: Volume,
+    methods: Sequence[Method],
+    limit: int,
+    *,
+    carry: bool = True,
+) -> Found:
     """Return where Newton's method ends: below the tolerance of the settings, or with a failure. Collective."""
     point = begin(problem, lower, upper, carry=carry)
     found = Found(point, at_once=point.left == 0.0)

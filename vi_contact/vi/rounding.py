@@ -18,11 +18,14 @@ def size_of_field(values: Array, lower: Array, upper: Array, comm: Comm) -> floa
     numbers are left out for as long as they lie on the far side of zero (lower < 0 or upper > 0) and are more than
     ``FAR`` times as large as the next smaller number. ``values``, ``lower``, ``upper``: (n,) owned. Collective."""
     # Numbers that the field certainly reaches: its own values, and bounds that keep it away from zero.
-    reached = largest(comm, max(
-        max_abs(_finite(values)),
-        max_abs(_finite(np.maximum(lower, 0.0))),
-        max_abs(_finite(np.minimum(upper, 0.0))),
-    ))
+    reached = largest(
+        comm,
+        max(
+            max_abs(_finite(values)),
+            max_abs(_finite(np.maximum(lower, 0.0))),
+            max_abs(_finite(np.minimum(upper, 0.0))),
+        ),
+    )
 
     # Bounds on the far side of zero, the largest first, each with the next smaller number.
     walls = np.concatenate([_finite(np.maximum(-lower, 0.0)), _finite(np.maximum(upper, 0.0))])

@@ -10,4 +10,14 @@ from .racking_ratio import RackingRatio as RackingRatio
 from .shaken_block import Housner as Housner
 from .shaken_block import NewmarkBlock as NewmarkBlock
 
-__all__: list[str] = ['AtRest', 'Coulomb', 'Housner', 'MononobeOkabe', 'NewmarkBlock', 'RackingRatio', 'Rankine', 'VeletsosYounan', 'Wood']
+__all__: list[str] = [
+    "AtRest",
+    "Coulomb",
+    "Housner",
+    "MononobeOkabe",
+    "NewmarkBlock",
+    "RackingRatio",
+    "Rankine",
+    "VeletsosYounan",
+    "Wood",
+]

@@ -13,8 +13,12 @@ from ...core.checks import between, check_word, number
 
 History = Mapping[str, Array]  # column -> values (rows,)
 Inputs = Mapping[str, tuple[float, str]]  # name -> (value, unit)
-Numbers = tuple[float, float, str, Inputs]  # expected, found, why it does not apply, inputs taken from the run
-_SAID: Mapping[str, Mapping[str, Any]] = tomllib.loads(files(__package__).joinpath("checks.toml").read_text("utf-8"))
+Numbers = tuple[
+    float, float, str, Inputs
+]  # expected, found, why it does not apply, inputs taken from the run
+_SAID: Mapping[str, Mapping[str, Any]] = tomllib.loads(
+    files(__package__).joinpath("checks.toml").read_text("utf-8")
+)
 
 
 @dataclass(frozen=True)
@@ -61,7 +65,9 @@ class Check(ABC):
             if key in _SAID["limits"]:
                 angle = " radians; 30 degrees are 0.5236" if unit == "rad" else ""
                 low, high = _SAID["limits"][key]
-                between(f"{name}: {key}", value, low, high, f"give one from {low:g} to {high:g}{angle}")
+                between(
+                    f"{name}: {key}", value, low, high, f"give one from {low:g} to {high:g}{angle}"
+                )
             else:
                 number(name, key, value, positive=True, unit=unit)
 
@@ -71,15 +77,31 @@ class Check(ABC):
 
     def given(self) -> Inputs:
         """Return the fields that the formula takes."""
-        return {key: (it, unit) for key, unit in self.said["fields"].items() if (it := getattr(self, key)) is not None}
+        return {
+            key: (it, unit)
+            for key, unit in self.said["fields"].items()
+            if (it := getattr(self, key)) is not None
+        }
 
     def compare(self, history: History) -> Comparison:
         """Return the comparison for the history of a run: column -> values (rows,), as of a solution or run folder."""
-        lacking = [name for one in self.said["reads"] if (name := one.format(**vars(self))) not in history]
-        lack: Numbers = math.nan, math.nan, f"the run has no column {', '.join(lacking[:1])}: record it", {}
+        lacking = [
+            name for one in self.said["reads"] if (name := one.format(**vars(self))) not in history
+        ]
+        lack: Numbers = (
+            math.nan,
+            math.nan,
+            f"the run has no column {', '.join(lacking[:1])}: record it",
+            {},
+        )
         expected, found, why, more = lack if lacking else self.numbers(history)
         chosen = [name for name, value in vars(self).items() if value is True]
-        return Comparison(", ".join([type(self).__name__, *(one.replace("_", " ") for one in chosen)]),
-                          **{name: self.said[name] for name in ("formula", "source", "range")}, found=found,
-                          inputs={**self.given(), **dict.fromkeys(chosen, (1.0, "-")), **more}, applies=why,
-                          expected=math.nan if why else expected, unit=self.said["answers"][self.of])
+        return Comparison(
+            ", ".join([type(self).__name__, *(one.replace("_", " ") for one in chosen)]),
+            **{name: self.said[name] for name in ("formula", "source", "range")},
+            found=found,
+            inputs={**self.given(), **dict.fromkeys(chosen, (1.0, "-")), **more},
+            applies=why,
+            expected=math.nan if why else expected,
+            unit=self.said["answers"][self.of],
+        )

@@ -25,7 +25,10 @@ def smooth_wall(nu: float, length: float, terms: int = 2000) -> tuple[float, flo
     above: exact plane strain (Wood 1973). Q and its moment follow by equilibrium from the stresses on the rock."""
     n = 2.0 * np.arange(1, terms + 1) - 1.0
     k = n * math.pi / length
-    sinh, cosh = np.sinh(np.minimum(k, 300.0)), np.cosh(np.minimum(k, 300.0))  # whose ratios change no more
+    sinh, cosh = (
+        np.sinh(np.minimum(k, 300.0)),
+        np.cosh(np.minimum(k, 300.0)),
+    )  # whose ratios change no more
     scale = -4.0 / (n * math.pi * k) / ((3.0 - 4.0 * nu) * cosh**2 + k**2 + (1.0 - 2.0 * nu) ** 2)
     shear = scale * ((1.0 - 2.0 * nu) * (2.0 * sinh * (cosh - nu) + 2.0 * k) + 2.0 * nu * k * cosh)
     vertical = scale * (k**2 + sinh**2 - 2.0 * nu * k * sinh - 4.0 * nu * (1.0 - nu) * (cosh - 1.0))
@@ -64,12 +67,23 @@ class _Layer(EarthPressure):
         """Return the largest Q [N/m], its height [m], and why there is none; push: acceleration towards the wall."""
 
     def numbers(self, history: History) -> Numbers:
-        thrust, height, opened = (history[f"{name}_{self.part}"] for name in ("N", "height", "uplift"))
+        thrust, height, opened = (
+            history[f"{name}_{self.part}"] for name in ("N", "height", "uplift")
+        )
         push = history[self.acceleration] * (-1.0 if self.on_left else 1.0)
-        row, moment, peak = int(np.argmax(thrust)), thrust * np.nan_to_num(height), float(push.max())
+        row, moment, peak = (
+            int(np.argmax(thrust)),
+            thrust * np.nan_to_num(height),
+            float(push.max()),
+        )
         more, left = float(thrust[row] - thrust[0]), float(opened.max())
         if len(push) < 3 or peak <= 0.0 or more <= 0.0:
-            return math.nan, more, f"{self.acceleration} never presses the soil on the wall: check sign and side", {}
+            return (
+                math.nan,
+                more,
+                f"{self.acceleration} never presses the soil on the wall: check sign and side",
+                {},
+            )
         most, arm, why = self.added(history["t"], push)
         why = why or (f"up to {left:.0%} of the wall leaves the soil" if left > LIFTED else "")
         if self.of == "height":
@@ -87,11 +101,20 @@ class Wood(_Layer):
     length: float | None = None
 
     def added(self, t: Array, push: Array) -> tuple[float, float, str]:
-        factor, arm = smooth_wall(self.nu, 20.0 if self.length is None else self.length / self.height)
-        speed, lowest = 0.5 * float(np.ptp(cumulative_trapezoid(push, t, initial=0.0))), 0.25 * self.c_s / self.height
+        factor, arm = smooth_wall(
+            self.nu, 20.0 if self.length is None else self.length / self.height
+        )
+        speed, lowest = (
+            0.5 * float(np.ptp(cumulative_trapezoid(push, t, initial=0.0))),
+            0.25 * self.c_s / self.height,
+        )
         own = float(np.abs(push).max()) / (2.0 * math.pi * speed)
         why = f"the motion has {own:.3g} Hz, above {SLOW:g} of the layer's {lowest:.3g} Hz"
-        return factor * self.rho * push.max() * self.height**2, arm * self.height, why if own > SLOW * lowest else ""
+        return (
+            factor * self.rho * push.max() * self.height**2,
+            arm * self.height,
+            why if own > SLOW * lowest else "",
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,13 +128,25 @@ class VeletsosYounan(_Layer):
     def added(self, t: Array, push: Array) -> tuple[float, float, str]:
         steps, lowest = len(t) - 1, 0.5 * math.pi * self.c_s / self.height
         dt = float(t[-1] - t[0]) / steps
-        count = 2 * steps + math.ceil(min(8.0 / (self.damping * lowest * dt), 100.0 * steps))  # until all has died out
+        count = 2 * steps + math.ceil(
+            min(8.0 / (self.damping * lowest * dt), 100.0 * steps)
+        )  # until all has died out
         motion = np.fft.rfft(np.interp(t[0] + dt * np.arange(steps + 1), t, push), count)
-        w, thrust, moment = 2.0 * math.pi * np.fft.rfftfreq(count, dt) / lowest, 0.0 * motion, 0.0 * motion
+        w, thrust, moment = (
+            2.0 * math.pi * np.fft.rfftfreq(count, dt) / lowest,
+            0.0 * motion,
+            0.0 * motion,
+        )
         for n, sign in zip(range(1, 80, 2), 20 * (1.0, -1.0), strict=True):
             mode = motion / np.sqrt(1.0 - (w / n) ** 2 / (1.0 + 2j * self.damping))
-            thrust, moment = thrust + 16.0 / (n * math.pi) ** 3 * mode, moment + sign * 32.0 / (n * math.pi) ** 4 * mode
+            thrust, moment = (
+                thrust + 16.0 / (n * math.pi) ** 3 * mode,
+                moment + sign * 32.0 / (n * math.pi) ** 4 * mode,
+            )
         each = np.fft.irfft(thrust, count)[: steps + 1]
         row, kappa = int(np.argmax(each)), 2.0 / math.sqrt((1.0 - self.nu) * (2.0 - self.nu))
-        arm, most = np.fft.irfft(moment, count)[row] / each[row], kappa * self.rho * self.height**2 * each[row]
+        arm, most = (
+            np.fft.irfft(moment, count)[row] / each[row],
+            kappa * self.rho * self.height**2 * each[row],
+        )
         return float(most), self.height * float(arm), ""

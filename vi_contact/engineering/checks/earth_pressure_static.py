@@ -13,7 +13,15 @@ from ...core.units import STANDARD_GRAVITY
 from .comparison import Check, History, Numbers
 
 
-def wedge(phi: float, delta: float, slope: float, batter: float, *, psi: float = 0.0, passive: bool = False) -> float:
+def wedge(
+    phi: float,
+    delta: float,
+    slope: float,
+    batter: float,
+    *,
+    psi: float = 0.0,
+    passive: bool = False,
+) -> float:
     """Return K of the worst plane wedge, active or passive, under gravity turned by psi; nan where none is at rest.
 
     K = cos²(phi -+ batter - psi) / (cos psi cos² batter cos(delta +- batter + psi) (1 +- root)²),
@@ -23,9 +31,13 @@ def wedge(phi: float, delta: float, slope: float, batter: float, *, psi: float =
     lean, open_ = math.cos(delta + sign * batter + psi), phi - sign * slope - psi
     if open_ < 0.0 or lean <= 0.0 or math.cos(slope - batter) <= 0.0:
         return math.nan
-    root = 1.0 + sign * math.sqrt(math.sin(phi + delta) * math.sin(open_) / (lean * math.cos(slope - batter)))
+    root = 1.0 + sign * math.sqrt(
+        math.sin(phi + delta) * math.sin(open_) / (lean * math.cos(slope - batter))
+    )
     top = math.cos(phi - sign * batter - psi) ** 2
-    return top / (math.cos(psi) * math.cos(batter) ** 2 * lean * root**2) if root > 0.0 else math.nan
+    return (
+        top / (math.cos(psi) * math.cos(batter) ** 2 * lean * root**2) if root > 0.0 else math.nan
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,12 +65,22 @@ class EarthPressure(Check):
         """Compare N, or its height: that of rho g H²/2 at H/3 and of q H, times ``laden``, at H/2."""
         factor, why = self.coefficient()
         slope, batter = (getattr(self, angle, 0.0) for angle in ("slope", "batter"))
-        laden = math.cos(batter) * math.cos(slope) / math.cos(slope - batter)  # the ground of a wedge, by its size
-        own, extra = 0.5 * self.rho * self.gravity * self.height**2, laden * self.surcharge * self.height
+        laden = (
+            math.cos(batter) * math.cos(slope) / math.cos(slope - batter)
+        )  # the ground of a wedge, by its size
+        own, extra = (
+            0.5 * self.rho * self.gravity * self.height**2,
+            laden * self.surcharge * self.height,
+        )
         thrust, height = history[f"N_{self.part}"], history[f"height_{self.part}"]
         row = int(np.argmax(thrust)) if "largest" in self.said else 0  # the first is that of rest
         if self.of == "height":
-            return self.height * (own / 3.0 + extra / 2.0) / (own + extra), float(height[row]), why, {}
+            return (
+                self.height * (own / 3.0 + extra / 2.0) / (own + extra),
+                float(height[row]),
+                why,
+                {},
+            )
         return factor * (own + extra), float(thrust[row]) / self.width, why, {}
 
 
@@ -85,9 +107,13 @@ class Rankine(EarthPressure):
     passive: bool = False
 
     def coefficient(self) -> tuple[float, str]:
-        along = -self.slope if self.passive else self.slope  # the soil slides up: the same lines, friction turned round
+        along = (
+            -self.slope if self.passive else self.slope
+        )  # the soil slides up: the same lines, friction turned round
         found = wedge(self.phi, along, self.slope, 0.0, passive=self.passive) * math.cos(self.slope)
-        return found, "the ground is steeper than the friction angle" if abs(self.slope) > self.phi else ""
+        return found, "the ground is steeper than the friction angle" if abs(
+            self.slope
+        ) > self.phi else ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,6 +133,12 @@ class Coulomb(EarthPressure):
         most, sign = (0.5 * self.phi, "+") if self.passive else (self.phi, "-")
         k = wedge(self.phi, self.delta, self.slope, self.batter, psi=psi, passive=self.passive)
         why = "the ground is steeper than phi" if abs(self.slope) > self.phi else ""
-        why = f"phi {sign} slope - psi is below zero, psi = {psi:.4g}: no wedge is at rest" if math.isnan(k) else why
-        why = f"delta is above {most:.4g}: no plane wedge is the worst" if self.delta > most else why
+        why = (
+            f"phi {sign} slope - psi is below zero, psi = {psi:.4g}: no wedge is at rest"
+            if math.isnan(k)
+            else why
+        )
+        why = (
+            f"delta is above {most:.4g}: no plane wedge is the worst" if self.delta > most else why
+        )
         return k * math.cos(self.delta), why

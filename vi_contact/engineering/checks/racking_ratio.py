@@ -6,10 +6,15 @@ import numpy as np
 
 from .comparison import Check, History, Numbers
 
-LARGEST, SHALLOWEST = 10.0, 1.5  # ends of Wang's curves: F, and depth of the centre over the height of the box
+LARGEST, SHALLOWEST = (
+    10.0,
+    1.5,
+)  # ends of Wang's curves: F, and depth of the centre over the height of the box
 
 
-def flexibility(shear_modulus: float, width: float, height: float, wall: float, roof: float, invert: float) -> float:
+def flexibility(
+    shear_modulus: float, width: float, height: float, wall: float, roof: float, invert: float
+) -> float:
     """Return F = G W/(S H) [-] of a box, 0 if it is rigid; S: force at its roof for a unit racking; E I [N m²/m]."""
     a1, a2 = roof / invert, roof * height / (wall * width)
     psi = (3.0 * a2**2 + 2.0 * (1.0 + a1) * a2 + a1) / (1.0 + a1 + 6.0 * a2)
@@ -44,9 +49,18 @@ class RackingRatio(Check):
     def numbers(self, history: History) -> Numbers:
         shear = [history[f"racking_{one}"] for one in (self.box, self.free)]
         box, free = (float(np.abs(one - one[0]).max()) for one in shear)
-        ratio = flexibility(self.shear_modulus, self.width, self.height, self.wall, self.roof, self.invert)
-        why = f"F is {ratio:.4g}, beyond {LARGEST:g}, where the curves end" if ratio > LARGEST else ""
+        ratio = flexibility(
+            self.shear_modulus, self.width, self.height, self.wall, self.roof, self.invert
+        )
+        why = (
+            f"F is {ratio:.4g}, beyond {LARGEST:g}, where the curves end" if ratio > LARGEST else ""
+        )
         if self.depth < SHALLOWEST * self.height:
             why = f"the box lies {self.depth / self.height:.3g} of its heights deep, less than {SHALLOWEST:g}"
         why = why if free else "the free field does not shear"
-        return racking_ratio(ratio, self.nu), box / free if free else float("nan"), why, {"F": (ratio, "-")}
+        return (
+            racking_ratio(ratio, self.nu),
+            box / free if free else float("nan"),
+            why,
+            {"F": (ratio, "-")},
+        )

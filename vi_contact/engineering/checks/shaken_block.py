@@ -11,7 +11,9 @@ from ...core.units import STANDARD_GRAVITY
 from .comparison import Check, History, Numbers
 
 PARTS = 32  # CHOSEN: of a step of the run; a slide ends within one, which costs less than r h²/8 of slip, h = dt/32
-ROUNDED = 1e-9  # CHOSEN: share of alpha below which the first tilt is round-off of a block that stands
+ROUNDED = (
+    1e-9  # CHOSEN: share of alpha below which the first tilt is round-off of a block that stands
+)
 FINE = 2e-4  # CHOSEN: longest step of the rigid block, over 1/p: its angles are those of shorter steps to 0.1 %
 
 
@@ -54,10 +56,20 @@ class NewmarkBlock(Check):
         normal, drive = up * cosine + along * sine, up * sine - along * cosine
         found = float(abs(history[self.slip][-1] - history[self.slip][0]))
         side = math.copysign(1.0, self.towards or self.slope or 1.0)
-        why = "" if along.any() else f"the column {self.acceleration} is zero: name acceleration= that of the ground"
+        why = (
+            ""
+            if along.any()
+            else f"the column {self.acceleration} is zero: name acceleration= that of the ground"
+        )
         why = "the ground falls away below the block" if normal.min() < 0.0 else why
-        why = "the block slides under its weight: |slope| is above atan(mu)" if abs(sine) > self.mu * cosine else why
-        moved = sliding(history["t"], side * drive, self.mu * np.maximum(normal, 0.0), one_sided=self.one_sided)
+        why = (
+            "the block slides under its weight: |slope| is above atan(mu)"
+            if abs(sine) > self.mu * cosine
+            else why
+        )
+        moved = sliding(
+            history["t"], side * drive, self.mu * np.maximum(normal, 0.0), one_sided=self.one_sided
+        )
         return abs(float(moved[-1])), found, why, {"a": (float(np.abs(along).max()), "m/s²")}
 
 
@@ -82,9 +94,13 @@ class Housner(Check):
         alpha, angles, rate = math.atan(self.width / self.height), np.full(len(t), theta), 0.0
         inertia, kept = 1.5 / math.hypot(self.width, self.height), 1.0 - 1.5 * math.sin(alpha) ** 2
         for row, length in enumerate(np.diff(t)):
-            parts = min(math.ceil(length * math.sqrt(inertia * self.gravity) / FINE), 400)  # of sizes none has, fewer
+            parts = min(
+                math.ceil(length * math.sqrt(inertia * self.gravity) / FINE), 400
+            )  # of sizes none has, fewer
             share = (np.arange(parts) + 0.5) / parts
-            for push, pull in (ground[:, row, None] + np.diff(ground[:, row : row + 2]) * share).T.tolist():
+            for push, pull in (
+                ground[:, row, None] + np.diff(ground[:, row : row + 2]) * share
+            ).T.tolist():
                 lean, left = math.copysign(1.0, theta or rate or push), alpha - abs(theta)
                 falls = inertia * (push * math.cos(left) - lean * pull * math.sin(left))
                 if theta == rate == 0.0 and falls * lean <= 0.0 or left < 0.0:
@@ -100,11 +116,22 @@ class Housner(Check):
         ground = np.array([history[self.acceleration], self.gravity + history[self.vertical]])
         start = float(angle[0]) if abs(angle[0]) > ROUNDED * alpha else 0.0
         rigid = self.rocking(t, ground, start)
-        both = (float(np.abs(one).max()) if self.of == "angle" else landing(t, one) for one in (rigid, angle))
+        both = (
+            float(np.abs(one).max()) if self.of == "angle" else landing(t, one)
+            for one in (rigid, angle)
+        )
         expected, found = both
-        why = "" if self.width < math.sqrt(2.0) * self.height else "the first impact stops a block as wide as this"
+        why = (
+            ""
+            if self.width < math.sqrt(2.0) * self.height
+            else "the first impact stops a block as wide as this"
+        )
         why = why or ("" if ground[1].min() > 0.0 else "the ground falls away below the block")
-        why = why or ("" if rigid.any() else f"{self.acceleration} stays below (g + a_y) b/h: the block does not rock")
+        why = why or (
+            ""
+            if rigid.any()
+            else f"{self.acceleration} stays below (g + a_y) b/h: the block does not rock"
+        )
         why = why or ("" if np.abs(rigid).max() < alpha else "the rigid block overturns")
         why = why or ("the rigid block does not land in this time" if math.isnan(expected) else "")
         return expected, found, why, {"alpha": (alpha, "rad"), "theta0": (start, "rad")}

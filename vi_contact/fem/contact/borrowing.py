@@ -32,7 +32,9 @@ def borrowed(space: Any, facets: Any, without: Indices, having: Indices) -> Borr
     # A node has its condition on the rank that owns it: most boundaries end here, and nothing is gathered.
     if not largest(space.comm, len(np.setdiff1d(without, having))):
         return None
-    asking, lending = (np.unique(np.concatenate(from_each(space.comm, one))) for one in (without, having))
+    asking, lending = (
+        np.unique(np.concatenate(from_each(space.comm, one))) for one in (without, having)
+    )
     asking = np.setdiff1d(asking, lending)
     rows = space.corners_of_facets(facets.indices)
     if not (len(asking) and len(lending)):
@@ -48,4 +50,6 @@ def borrowed(space: Any, facets: Any, without: Indices, having: Indices) -> Borr
         shape=(len(numbers), len(lending)),
     )
     count = np.asarray(shares.sum(axis=1)).ravel()
-    return Borrowed(numbers, lending, sp.csr_matrix(sp.diags(1.0 / count) @ shares if len(count) else shares))
+    return Borrowed(
+        numbers, lending, sp.csr_matrix(sp.diags(1.0 / count) @ shares if len(count) else shares)
+    )

@@ -28,7 +28,9 @@ from .frames import Facing
 from .nodes import Nodes, Rows
 
 POINTS = 5  # of a rule in every direction: exact for degree 8 on flat facets
-OTHERS = np.array([[1, 2], [0, 2], [0, 1]])  # vertices of the edge opposite each vertex, in DOLFINx's order of edges
+OTHERS = np.array(
+    [[1, 2], [0, 2], [0, 1]]
+)  # vertices of the edge opposite each vertex, in DOLFINx's order of edges
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,44 +51,68 @@ def _bubbles(space: FemSpace, hierarchy: Hierarchy, facets: Facets, everywhere: 
     mesh, local = space.mesh, np.asarray(facets.indices)
     rows = facet_rows(space.V, local)
     cell_of = mesh.topology.connectivity(mesh.topology.dim - 1, mesh.topology.dim)
-    owner = cell_of.array[cell_of.offsets[:-1][local]] < mesh.topology.index_map(mesh.topology.dim).size_local
+    owner = (
+        cell_of.array[cell_of.offsets[:-1][local]]
+        < mesh.topology.index_map(mesh.topology.dim).size_local
+    )
     local, rows = local[owner], rows[owner]
     numbers, points = (hierarchy.with_ghosts(one) for one in (space.numbers, space.points))
     unknowns = numbers.astype(np.int64)[rows]
     wrong = (unknowns[:, 3:] < 0) & (unknowns[:, OTHERS] >= 0).any(axis=2)
     where = points[rows[:, 3:][wrong.any(axis=2)]][:1]
-    refuse([f"the mid-point {at(one)} on '{facets.name}' is prescribed and the ends of its edge are not: prescribe all "
-            "nodes of an edge, or none" for one in where], space.comm)
+    refuse(
+        [
+            f"the mid-point {at(one)} on '{facets.name}' is prescribed and the ends of its edge are not: prescribe all "
+            "nodes of an edge, or none"
+            for one in where
+        ],
+        space.comm,
+    )
     geometry = compat.entities_to_geometry(mesh, mesh.topology.dim - 1, local)
     nodes, normals = space.node_of_block[rows], outward(mesh, local, geometry)
     found = Bubbles(nodes[:, :3], nodes[:, 3:], unknowns[:, 3:], normals, *_integrals(points[rows]))
-    corners = np.hstack([found.vertices, space.leaders(found.vertices.ravel()).reshape(-1, 3)])  # tied ones count there
+    corners = np.hstack(
+        [found.vertices, space.leaders(found.vertices.ravel()).reshape(-1, 3)]
+    )  # tied ones count there
     away = everywhere | ~np.isin(corners, space.nodes).all(axis=1)
     parts = from_each(space.comm, found.pick(away))
     if not everywhere:
         parts[space.comm.rank] = found
-    return Bubbles(*(np.concatenate([getattr(part, name) for part in parts]) for name in Bubbles.__annotations__))
+    return Bubbles(
+        *(
+            np.concatenate([getattr(part, name) for part in parts])
+            for name in Bubbles.__annotations__
+        )
+    )
 
 
 def _integrals(x: Array) -> tuple[Array, Array]:
     """(∫ phi_i (k, 3), ∫ psi_i b_k (k, 3, 3)) of facets with these points of vertices and mid-points (k, 6, 3)."""
     place, weight = np.polynomial.legendre.leggauss(POINTS)
     s, t = (one.ravel() for one in np.meshgrid(0.5 + 0.5 * place, 0.5 + 0.5 * place, indexing="ij"))
-    weights = 0.25 * np.outer(weight, weight).ravel() * (1.0 - s)  # of a triangle: its point (s, (1 - s) t)
+    weights = (
+        0.25 * np.outer(weight, weight).ravel() * (1.0 - s)
+    )  # of a triangle: its point (s, (1 - s) t)
     hats = np.stack([1.0 - s - (1.0 - s) * t, s, (1.0 - s) * t])
     slopes = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
     bubbles = 4.0 * hats[OTHERS].prod(axis=1)
-    bent = np.einsum("kaq,kag->kgq", 4.0 * hats[OTHERS], slopes[OTHERS[:, ::-1]])  # slopes of bubbles
+    bent = np.einsum(
+        "kaq,kag->kgq", 4.0 * hats[OTHERS], slopes[OTHERS[:, ::-1]]
+    )  # slopes of bubbles
     straight = x[:, :3]
     e = x[:, 3:] - straight[:, OTHERS].mean(axis=2)
-    along = np.einsum("fix,ig->fxg", straight, slopes)[..., None] + np.einsum("fkx,kgq->fxgq", e, bent)
+    along = np.einsum("fix,ig->fxg", straight, slopes)[..., None] + np.einsum(
+        "fkx,kgq->fxgq", e, bent
+    )
     sizes = weights * np.linalg.norm(np.cross(along[:, :, 0], along[:, :, 1], axis=1), axis=1)
     areas = sizes @ hats.T
     gram, products = (np.einsum("fq,iq,jq->fij", sizes, hats, one) for one in (hats, bubbles))
     return areas, areas[:, :, None] * np.linalg.solve(gram, products)
 
 
-def averaged(space: FemSpace, facets: Facets, nodes: Nodes, share: sp.csr_matrix | None = None) -> tuple[Facing, ...]:
+def averaged(
+    space: FemSpace, facets: Facets, nodes: Nodes, share: sp.csr_matrix | None = None
+) -> tuple[Facing, ...]:
     """Return the bubbles that displacements of conditions contain, none but in a hierarchy: -c_ik of this rank's nodes
     with conditions or, where these face ``nodes``, the same on every rank, with ``share``, share times c_ik.
 
@@ -98,7 +124,9 @@ def averaged(space: FemSpace, facets: Facets, nodes: Nodes, share: sp.csr_matrix
     order = np.argsort(nodes.numbers, kind="stable")
     corner = found.vertices.ravel()
     corner = np.where(np.isin(corner, nodes.numbers), corner, space.leaders(corner))
-    starts, ends = (np.searchsorted(nodes.numbers, corner, side, sorter=order) for side in ("left", "right"))
+    starts, ends = (
+        np.searchsorted(nodes.numbers, corner, side, sorter=order) for side in ("left", "right")
+    )
     known = np.flatnonzero(ends > starts)
     best, row = np.full(len(known), -np.inf), np.zeros(len(known), dtype=np.int64)
     for k in range(int((ends - starts).max(initial=0))):

@@ -19,7 +19,9 @@ def cut(polygons: Array, start: Array, along: Array) -> Array:
     corners = np.stack([polygons, polygons + share[:, :, None] * (after - polygons)], axis=2)
     used = np.stack([left >= 0.0, crossed], axis=2).reshape(len(left), 2 * left.shape[1])
     count = used.sum(axis=1)
-    place = np.minimum(np.arange(max(3, int(count.max(initial=0)))), np.maximum(count - 1, 0)[:, None])
+    place = np.minimum(
+        np.arange(max(3, int(count.max(initial=0)))), np.maximum(count - 1, 0)[:, None]
+    )
     order = np.take_along_axis(np.argsort(~used, axis=1, kind="stable"), place, axis=1)
     return np.take_along_axis(corners.reshape(*used.shape, 2), order[:, :, None], axis=1)
 
@@ -54,7 +56,9 @@ def without(polygons: Array, others: Array, least: Array) -> tuple[Indices, Arra
 def stacked(parts: list[Array]) -> Array:
     """Return all polygons of the parts, of as many corners as the largest has."""
     width = max(part.shape[1] for part in parts)
-    return np.concatenate([np.pad(p, ((0, 0), (0, width - p.shape[1]), (0, 0)), "edge") for p in parts])
+    return np.concatenate(
+        [np.pad(p, ((0, 0), (0, width - p.shape[1]), (0, 0)), "edge") for p in parts]
+    )
 
 
 def areas(polygons: Array) -> Array:
@@ -77,7 +81,10 @@ def turns(polygons: Array) -> Array:
 def triangles(polygons: Array) -> tuple[Indices, Array]:
     """Return (number of its polygon, corners (n, 3, 2)) of triangles that make up the polygons."""
     k, m, _ = polygons.shape
-    fan = np.stack([np.broadcast_to(polygons[:, :1], (k, m - 2, 2)), polygons[:, 1:-1], polygons[:, 2:]], axis=2)
+    fan = np.stack(
+        [np.broadcast_to(polygons[:, :1], (k, m - 2, 2)), polygons[:, 1:-1], polygons[:, 2:]],
+        axis=2,
+    )
     owner, fan = np.repeat(np.arange(k), m - 2), fan.reshape(-1, 3, 2)
     real: Mask = areas(fan) > 0.0
     return owner[real], fan[real]

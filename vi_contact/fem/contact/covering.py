@@ -101,7 +101,8 @@ def extrapolation(corners: Array, points: Array) -> Array:
     middle = corners.mean(axis=1, keepdims=True)
     size = np.abs(corners - middle).max(axis=(1, 2))[:, None, None]
     known, wanted = (
-        np.concatenate([np.ones((*x.shape[:2], 1)), (x - middle) / size], axis=2) for x in (corners, points)
+        np.concatenate([np.ones((*x.shape[:2], 1)), (x - middle) / size], axis=2)
+        for x in (corners, points)
     )
     return np.asarray(wanted @ np.linalg.pinv(known))
 
@@ -135,7 +136,9 @@ class Coupled:
     share: Array
 
 
-def coupled(covered: Covered, assembled: Callable[[Carried], tuple[Array, sp.csr_matrix, Array]]) -> Coupled:
+def coupled(
+    covered: Covered, assembled: Callable[[Carried], tuple[Array, sp.csr_matrix, Array]]
+) -> Coupled:
     """Return the coupling in which whole facets carry the nodes that have little covered, as far as they can."""
     share = covered.share
     asked = share < LEAST_SHARE

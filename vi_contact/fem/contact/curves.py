@@ -17,7 +17,9 @@ from ...core.corners import FEATURE_ANGLE
 
 MARGIN = 2.0  # CHOSEN: dual functions take 5/3 of delta at most in a mean; the rest is for curvatures that vary
 FARTHER = 4.0  # CHOSEN: times as much where functions are carried on beyond their facet, to twice its length
-FLAT = 1e-2  # least over largest moment of the nodes of a facet: directions in which it has no extent
+FLAT = (
+    1e-2  # least over largest moment of the nodes of a facet: directions in which it has no extent
+)
 
 
 def curvatures(corners: Array, facets: Indices, normals: Array) -> Array:
@@ -44,7 +46,9 @@ def left_out(H: Array, weights: Array, corners: Array) -> Array:
     x = corners - corners.mean(axis=1, keepdims=True)
     nodal = np.einsum("kvi,kij,kvj->kv", x, H, x)
     points = weights @ x
-    return np.asarray((weights @ nodal[:, :, None])[:, :, 0] - np.einsum("kpi,kij,kpj->kp", points, H, points))
+    return np.asarray(
+        (weights @ nodal[:, :, None])[:, :, 0] - np.einsum("kpi,kij,kpj->kp", points, H, points)
+    )
 
 
 def may_overlap(H: Array, one: tuple[Array, Array], two: tuple[Array, Array]) -> Array:

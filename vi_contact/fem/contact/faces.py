@@ -24,7 +24,9 @@ from .nodes import Nodes
 log = logging.getLogger(__name__)
 LEANING = 0.9  # cosine of the angle (26°) up to which a normal counts as lying in a symmetry plane
 MID_POINTS = {  # the vertices around those of a facet of second order, by its number of nodes
-    3: [[0, 1]], 6: [[1, 2], [0, 2], [0, 1]], 9: [[0, 1], [0, 2], [1, 3], [2, 3], [0, 1, 2, 3]],
+    3: [[0, 1]],
+    6: [[1, 2], [0, 2], [0, 1]],
+    9: [[0, 1], [0, 2], [1, 3], [2, 3], [0, 1, 2, 3]],
 }
 NAMED = 4  # corners that the log names
 
@@ -69,7 +71,9 @@ def checked_angle(owner: str, value: Any) -> float:
     """Return the feature angle as a float; InputError for what is no angle above 0 and up to pi."""
     angle = number(owner, "feature_angle", value, positive=True, unit="radians")
     if angle > np.pi:
-        raise InputError(f"{owner}: feature_angle is {value}; give radians: with pi no edge counts as a corner")
+        raise InputError(
+            f"{owner}: feature_angle is {value}; give radians: with pi no edge counts as a corner"
+        )
     return angle
 
 
@@ -115,7 +119,11 @@ def _boxes(nodes: Indices, low: Array, high: Array) -> tuple[Indices, Array, Arr
         return nodes, low, high
     order = np.argsort(nodes, kind="stable")
     numbers, starts = np.unique(nodes[order], return_index=True)
-    return numbers, np.minimum.reduceat(low[order], starts), np.maximum.reduceat(high[order], starts)
+    return (
+        numbers,
+        np.minimum.reduceat(low[order], starts),
+        np.maximum.reduceat(high[order], starts),
+    )
 
 
 def outward(mesh: Any, facets: Any, geometry: Any) -> Array:
@@ -127,20 +135,30 @@ def outward(mesh: Any, facets: Any, geometry: Any) -> Array:
     cell_of = mesh.topology.connectivity(mesh.topology.dim - 1, mesh.topology.dim)
     cells = cell_of.array[cell_of.offsets[facets]]  # the first cell of each
     inside = mesh.geometry.x[compat.geometry_dofmap(mesh)[cells]][:, :, :d].mean(axis=1)
-    return np.asarray(np.where(np.sum((middle - inside) * normals, axis=1)[:, None] < 0.0, -normals, normals))
+    return np.asarray(
+        np.where(np.sum((middle - inside) * normals, axis=1)[:, None] < 0.0, -normals, normals)
+    )
 
 
 def _curved(space: FemSpace, facets: Any, plane: Array) -> Array:
     """Outward unit normals (k, n, d) at the nodes of curved facets; ``plane``: those of the planes of their vertices.
 
     At a vertex that of the tangents of its edges, at mid-points the mean of those of the vertices around."""
-    x = space.mesh.geometry.x[compat.dof_to_node(space.V)[facet_rows(space.V, facets)]][:, :, : space.dimension]
+    x = space.mesh.geometry.x[compat.dof_to_node(space.V)[facet_rows(space.V, facets)]][
+        :, :, : space.dimension
+    ]
     around = MID_POINTS[x.shape[1]]
     corners = x.shape[1] - len(around)
     normals = np.empty_like(x)
     for p in range(corners):
-        ends = [(corners + i, sum(one) - p) for i, one in enumerate(around) if p in one and len(one) == 2]
-        along = np.stack([4.0 * x[:, middle] - 3.0 * x[:, p] - x[:, end] for middle, end in ends], axis=1)
+        ends = [
+            (corners + i, sum(one) - p)
+            for i, one in enumerate(around)
+            if p in one and len(one) == 2
+        ]
+        along = np.stack(
+            [4.0 * x[:, middle] - 3.0 * x[:, p] - x[:, end] for middle, end in ends], axis=1
+        )
         normal = np.linalg.svd(along)[2][:, -1]
         normals[:, p] = np.where(np.sum(normal * plane, axis=1)[:, None] < 0.0, -normal, normal)
     for i, one in enumerate(around):
@@ -150,7 +168,9 @@ def _curved(space: FemSpace, facets: Any, plane: Array) -> Array:
 
 def _turn(one: Array, other: Array) -> Array:
     """Angles between unit vectors (k, d)."""
-    return np.asarray(2.0 * np.arctan2(np.linalg.norm(one - other, axis=1), np.linalg.norm(one + other, axis=1)))
+    return np.asarray(
+        2.0 * np.arctan2(np.linalg.norm(one - other, axis=1), np.linalg.norm(one + other, axis=1))
+    )
 
 
 def integrals(space: FemSpace, indices: Any) -> Array:
@@ -160,8 +180,12 @@ def integrals(space: FemSpace, indices: Any) -> Array:
     ds = compat.measure(mesh, mesh.topology.dim - 1, indices)
     V, blocks = (space.V, slice(None)) if space.hierarchy is None else space.hierarchy.vertices
     v = ufl.TestFunction(V)
-    one = compat.assemble_vector(compat.compile_form(sum(v[c] for c in range(d)) * ds)).array_r.reshape(-1, d)
-    normal = compat.assemble_vector(compat.compile_form(ufl.inner(ufl.FacetNormal(mesh), v) * ds)).array_r
+    one = compat.assemble_vector(
+        compat.compile_form(sum(v[c] for c in range(d)) * ds)
+    ).array_r.reshape(-1, d)
+    normal = compat.assemble_vector(
+        compat.compile_form(ufl.inner(ufl.FacetNormal(mesh), v) * ds)
+    ).array_r
     found = np.zeros((len(space.nodes), 1 + d))
     found[blocks] = np.column_stack([one[:, 0], normal.reshape(-1, d)])
     return found
@@ -173,7 +197,10 @@ def split(space: FemSpace, around: Boundary, nodes: Nodes, angle: float) -> tupl
     ``nodes``: of this rank or of all, the order is kept. Collective."""
     if not len(around.vertices):
         return nodes, np.full(len(nodes.numbers), -1)
-    corners, labels = nodes.numbers[np.isin(nodes.numbers, around.vertices)], around.corner_faces(angle)
+    corners, labels = (
+        nodes.numbers[np.isin(nodes.numbers, around.vertices)],
+        around.corner_faces(angle),
+    )
     known = np.isin(around.vertices, np.concatenate(from_each(space.comm, corners)))
     if not known.any():
         return nodes, np.full(len(nodes.numbers), -1)
@@ -191,7 +218,9 @@ def split(space: FemSpace, around: Boundary, nodes: Nodes, angle: float) -> tupl
     unit = values[:, 1:] / np.linalg.norm(values[:, 1:], axis=1)[:, None]
     normals = np.where(double[:, None], in_symmetry_planes(unit, found.held), found.normals)
     facet = np.unique(labels, return_index=True)[1] // labels.shape[1]
-    split_nodes = replace(found, normals=normals, weights=np.where(double, values[:, 0], found.weights))
+    split_nodes = replace(
+        found, normals=normals, weights=np.where(double, values[:, 0], found.weights)
+    )
     return split_nodes, np.where(double, facet[pairs[pair, 1]], -1)
 
 
@@ -219,8 +248,16 @@ def _classes(vertices: Indices, labels: Indices, corners: Indices) -> Indices:
     at_corner = np.isin(vertices, corners)
     around: dict[int, list[tuple[int, int]]] = {int(node): [] for node in corners}
     for facet in np.flatnonzero(at_corner.any(axis=1)):
-        own = [(int(vertices[facet, i]), int(labels[facet, i])) for i in np.flatnonzero(at_corner[facet])]
-        taken = {int(classes[other]) for node, label in own for other, face in around[node] if face != label}
+        own = [
+            (int(vertices[facet, i]), int(labels[facet, i]))
+            for i in np.flatnonzero(at_corner[facet])
+        ]
+        taken = {
+            int(classes[other])
+            for node, label in own
+            for other, face in around[node]
+            if face != label
+        }
         classes[facet] = next(c for c in range(len(taken) + 1) if c not in taken)
         for node, label in own:
             around[node].append((int(facet), label))
@@ -245,5 +282,11 @@ def tell_corners(space: FemSpace, name: str, nodes: Nodes, slots: Indices, angle
     if space.comm.rank == 0 and len(numbers):
         some = points[np.argsort(numbers)[:NAMED]]
         places = ", ".join(at(point) for point in some) + (", …" if len(numbers) > NAMED else "")
-        log.info("'%s' turns by more than %.4g degrees at %d contact nodes, which have one condition for every face: "
-                 "%s", name, np.degrees(angle), len(numbers), places)
+        log.info(
+            "'%s' turns by more than %.4g degrees at %d contact nodes, which have one condition for every face: "
+            "%s",
+            name,
+            np.degrees(angle),
+            len(numbers),
+            places,
+        )

@@ -16,7 +16,13 @@ from ...core.algebra import Array, Indices, Mask, Matrix, largest
 from ...core.checks import at
 from ...core.corners import PARALLEL, at_right_angles, corner_of
 from ...core.errors import InputError
-from ...core.surfaces import ContactSurface, nodal_blocks, nodal_frames, same_node, tangential_columns
+from ...core.surfaces import (
+    ContactSurface,
+    nodal_blocks,
+    nodal_frames,
+    same_node,
+    tangential_columns,
+)
 from ..nodal_space import NodalSpace
 from .borrowing import Borrowed
 from .nodes import Nodes, asked, joined_nodes
@@ -85,7 +91,9 @@ class NodalFrames:
         node = self.place[slots[0]]
         self.column[slots], block = corner_of(self.directions[slots])
         self.blocks[node] = block
-        self.turns[node] = block if at_right_angles(self.directions[slots]) else np.linalg.inv(block).T
+        self.turns[node] = (
+            block if at_right_angles(self.directions[slots]) else np.linalg.inv(block).T
+        )
         free = ~np.isin(np.arange(len(block)), self.column[slots])
         self.rubs[slots] = False
         self.rubs[slots[0]] = np.delete(free, self.column[slots[0]])
@@ -100,8 +108,10 @@ class NodalFrames:
 
     def _refuse_prescribed(self, held: Mask) -> None:
         for slot in np.flatnonzero(np.any(held & (self.directions != 0.0), axis=1)):
-            raise InputError(f"contact node {at(self.points[slot])} is also prescribed along its contact direction: "
-                             "free that component or leave the node out of the contact surface")
+            raise InputError(
+                f"contact node {at(self.points[slot])} is also prescribed along its contact direction: "
+                "free that component or leave the node out of the contact surface"
+            )
 
     def _refuse_dependent(self, slots: Indices) -> None:
         directions = self.directions[slots]
@@ -109,12 +119,16 @@ class NodalFrames:
         where = f"contact node {at(self.points[slots[0]])}"
         cosines = (directions @ directions.T)[np.triu_indices(k, 1)]
         if np.any(cosines > 1.0 - PARALLEL):
-            raise InputError(f"{where} is on several contact surfaces with one contact direction: list every boundary "
-                             "and every pair once, and join boundaries that continue one another in one group")
+            raise InputError(
+                f"{where} is on several contact surfaces with one contact direction: list every boundary "
+                "and every pair once, and join boundaries that continue one another in one group"
+            )
         if k > d or np.linalg.svd(directions, compute_uv=False)[-1] < INDEPENDENT:
-            raise InputError(f"{where} has {k} contact directions, {'more than' if k > d else 'not independent in'} "
-                             f"its {d} dimensions: treat the corner as smooth (a larger feature_angle=), or leave the "
-                             "node out of some of its surfaces (points=)")
+            raise InputError(
+                f"{where} has {k} contact directions, {'more than' if k > d else 'not independent in'} "
+                f"its {d} dimensions: treat the corner as smooth (a larger feature_angle=), or leave the "
+                "node out of some of its surfaces (points=)"
+            )
 
 
 def snapped(directions: Array) -> Array:
@@ -126,16 +140,27 @@ def snapped(directions: Array) -> Array:
 def given(parts: Sequence[NodalConditions]) -> tuple[Indices, Array, Array, Mask]:
     """Return what makes the frames of conditions: numbers and points of their nodes, directions, held components."""
     nodes = joined_nodes([part.nodes for part in parts])
-    return nodes.numbers, nodes.points, np.concatenate([part.directions for part in parts]), nodes.held
+    return (
+        nodes.numbers,
+        nodes.points,
+        np.concatenate([part.directions for part in parts]),
+        nodes.held,
+    )
 
 
 def surface_of(space: NodalSpace, parts: Sequence[NodalConditions], **data: Any) -> FemSurface:
     """Make the surface of these conditions, one part after the other. ``data``: gap0, weights and whatever else it
     holds of each condition of this rank. Collective."""
     comm, d = space.comm, space.dimension
-    starts = np.cumsum([0, *comm.sum(np.array([float(len(part.slots)) for part in parts]))]).astype(np.int64)
-    slots = np.concatenate([start + part.slots for start, part in zip(starts[:-1], parts, strict=True)])
-    frames: NodalFrames = asked(comm, slots, lambda *arrays: (NodalFrames(*arrays),), *given(parts))[0]
+    starts = np.cumsum([0, *comm.sum(np.array([float(len(part.slots)) for part in parts]))]).astype(
+        np.int64
+    )
+    slots = np.concatenate(
+        [start + part.slots for start, part in zip(starts[:-1], parts, strict=True)]
+    )
+    frames: NodalFrames = asked(
+        comm, slots, lambda *arrays: (NodalFrames(*arrays),), *given(parts)
+    )[0]
     index = space.free_index.reshape(-1, d)[space.blocks_of(frames.numbers)]
     place, column, count = frames.place, frames.column, len(slots)
     tangents = np.take_along_axis(index[place], tangential_columns(column, d), axis=1)
@@ -143,11 +168,21 @@ def surface_of(space: NodalSpace, parts: Sequence[NodalConditions], **data: Any)
     dual = _turn(space, frames.blocks, index) if largest(comm, frames.oblique) else None
     if space.hierarchy is not None:
         turn, dual = space.hierarchy.around(turn, turn if dual is None else dual)
-    return FemSurface(comm=comm, points=frames.points, normals=frames.directions, owned=index[place, column],
-                      slots=slots, tangents=np.where(frames.rubs, tangents, -1), basis=turn, dual=dual,
-                      nodes=frames.numbers[place], coupling=_coupling(space, parts, frames, index), space=space,
-                      parts=tuple(parts),
-                      **{"bilateral": np.zeros(count, dtype=bool), "compliance": np.zeros(count)} | data)
+    return FemSurface(
+        comm=comm,
+        points=frames.points,
+        normals=frames.directions,
+        owned=index[place, column],
+        slots=slots,
+        tangents=np.where(frames.rubs, tangents, -1),
+        basis=turn,
+        dual=dual,
+        nodes=frames.numbers[place],
+        coupling=_coupling(space, parts, frames, index),
+        space=space,
+        parts=tuple(parts),
+        **{"bilateral": np.zeros(count, dtype=bool), "compliance": np.zeros(count)} | data,
+    )
 
 
 def _turn(space: NodalSpace, blocks: Array, index: Indices) -> Matrix | None:
@@ -157,15 +192,18 @@ def _turn(space: NodalSpace, blocks: Array, index: Indices) -> Matrix | None:
         return None
     free = index >= 0
     used = free[:, :, None] & free[:, None, :]
-    rows, columns = (np.broadcast_to(way, used.shape)[used] for way in (index[:, :, None], index[:, None, :]))
+    rows, columns = (
+        np.broadcast_to(way, used.shape)[used] for way in (index[:, :, None], index[:, None, :])
+    )
     plain = np.setdiff1d(np.arange(n), index)
     entries = np.concatenate([rows, plain]), np.concatenate([columns, plain])
     values = np.concatenate([blocks[used], np.ones(len(plain))])
     return space.algebra.local(*entries, values, n)
 
 
-def _coupling(space: NodalSpace, parts: Sequence[NodalConditions], frames: NodalFrames,
-              index: Indices) -> Matrix | None:
+def _coupling(
+    space: NodalSpace, parts: Sequence[NodalConditions], frames: NodalFrames, index: Indices
+) -> Matrix | None:
     """R with û = R ǔ: to the unknowns of a node that faces others, q_c·u = ǔ_c + q_c·(sum_j P_sj u_j + sum_k P_sk e_k).
 
     At nodes with several conditions each one's own vectors only are relative to what it faces."""
@@ -182,15 +220,25 @@ def _coupling(space: NodalSpace, parts: Sequence[NodalConditions], frames: Nodal
         place, faced = frames.place[slots], []
         if part.facing is not None:
             faced.append((part.facing, _turns(space, frames, part.facing.nodes.numbers)))
-        faced += [(one, np.tile(np.eye(space.dimension), (len(one.nodes.numbers), 1, 1))) for one in part.bubbles]
+        faced += [
+            (one, np.tile(np.eye(space.dimension), (len(one.nodes.numbers), 1, 1)))
+            for one in part.bubbles
+        ]
         if not faced:
             continue
         for c in range(space.dimension):
             rows = np.flatnonzero(relative[slots, c] & (index[place, c] >= 0))
             own.append(index[place[rows], c])
-            diagonal = sp.csr_matrix((np.ones(len(rows)), (np.arange(len(rows)), first + own[-1])), (len(rows), total))
+            diagonal = sp.csr_matrix(
+                (np.ones(len(rows)), (np.arange(len(rows)), first + own[-1])), (len(rows), total)
+            )
             directions = frames.blocks[place[rows], :, c]
-            entries.append(sum((_faced(one, rows, turns, directions, total) for one, turns in faced), start=diagonal))
+            entries.append(
+                sum(
+                    (_faced(one, rows, turns, directions, total) for one, turns in faced),
+                    start=diagonal,
+                )
+            )
     return algebra.replaced_rows(n, np.concatenate(own), sp.csr_matrix(sp.vstack(entries)))
 
 
@@ -204,7 +252,9 @@ def _turns(space: NodalSpace, frames: NodalFrames, numbers: Indices) -> Array:
     return np.asarray(np.where(found[:, :1, None] > 0.0, found[:, 1:].reshape(-1, d, d), np.eye(d)))
 
 
-def _faced(facing: Facing, rows: Indices, turns: Array, directions: Array, total: int) -> sp.csr_matrix:
+def _faced(
+    facing: Facing, rows: Indices, turns: Array, directions: Array, total: int
+) -> sp.csr_matrix:
     """Coefficients (rows, ``total`` unknowns û) of direction·sum_j P_sj u_j."""
     shares = sp.csr_matrix(facing.P[rows])
     row, partners = np.repeat(np.arange(len(rows)), np.diff(shares.indptr)), shares.indices
@@ -224,13 +274,19 @@ def _refuse_chains(space: NodalSpace, parts: Sequence[NodalConditions]) -> None:
     for facing in (part.facing for part in parts if part.facing is not None):
         used = np.zeros(len(facing.nodes.numbers))
         used[facing.P.indices] = 1.0
-        both = np.flatnonzero(space.at_nodes(space.leaders(facing.nodes.numbers), first)[:, 0] * space.comm.max(used))
+        both = np.flatnonzero(
+            space.at_nodes(space.leaders(facing.nodes.numbers), first)[:, 0] * space.comm.max(used)
+        )
         if len(both):
             where = f"node {at(facing.nodes.points[both[0]])}"
             if space.hierarchy is not None:
-                raise InputError(f"{where} of P2 tetrahedra is on side 2 of a contact pair and of another "
-                                 "surface: leave it out of that surface (points=), or exchange the sides")
-            raise InputError(f"{where} is on side 1 of one contact pair and on side 2 of another: where cracks cross, "
-                             "give each arm a group and a cut of its own, with matching=NodeToNode() and sides that "
-                             "take turns round the crossing; else exchange the sides of one pair, or give it once if "
-                             "both are the same")
+                raise InputError(
+                    f"{where} of P2 tetrahedra is on side 2 of a contact pair and of another "
+                    "surface: leave it out of that surface (points=), or exchange the sides"
+                )
+            raise InputError(
+                f"{where} is on side 1 of one contact pair and on side 2 of another: where cracks cross, "
+                "give each arm a group and a cut of its own, with matching=NodeToNode() and sides that "
+                "take turns round the crossing; else exchange the sides of one pair, or give it once if "
+                "both are the same"
+            )

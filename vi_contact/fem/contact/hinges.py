@@ -36,12 +36,16 @@ def hinges(space: FemSpace, numbers: Indices) -> Indices:
     facets, side = np.unique(sides, return_inverse=True)
     nodes = names[compat.entities_to_geometry(mesh, d - 1, facets.astype(np.int32))]
     local = mesh.topology.index_map(d - 1)
-    known = local.local_to_global(facets.astype(np.int32)) if len(facets) else facets.astype(np.int64)
+    known = (
+        local.local_to_global(facets.astype(np.int32)) if len(facets) else facets.astype(np.int64)
+    )
     keys = nodes.astype(np.int64) * local.size_global + known[:, None]
 
     # The things of the wanted nodes, and of which cell each is.
     side = side.reshape(sides.shape)
-    cell = np.broadcast_to(np.arange(len(cells))[:, None, None], (*sides.shape, nodes.shape[1])).ravel()
+    cell = np.broadcast_to(
+        np.arange(len(cells))[:, None, None], (*sides.shape, nodes.shape[1])
+    ).ravel()
     node, key = nodes[side].ravel(), keys[side].ravel()
     wanted = np.isin(node, numbers)
     cell, node, key = cell[wanted], node[wanted], key[wanted]

@@ -27,40 +27,69 @@ def joined_surfaces(*surfaces: ContactSurface) -> ContactSurface:
         InputError: surfaces of different systems; directions of a node that are parallel (a boundary or a pair listed
             twice) or depend on one another; a node on side 1 of one pair and side 2 of another."""
     made = [surface for surface in surfaces if isinstance(surface, FemSurface)]
-    if not made or len(made) < len(surfaces) or any(surface.space is not made[0].space for surface in made):
-        raise InputError("joined_surfaces: give surfaces of fem.contact_surface and contact_pair of one system")
+    if (
+        not made
+        or len(made) < len(surfaces)
+        or any(surface.space is not made[0].space for surface in made)
+    ):
+        raise InputError(
+            "joined_surfaces: give surfaces of fem.contact_surface and contact_pair of one system"
+        )
     names = ("gap0", "weights", "bilateral", "compliance")
-    data: dict[str, Any] = {name: np.concatenate([getattr(surface, name) for surface in made]) for name in names}
+    data: dict[str, Any] = {
+        name: np.concatenate([getattr(surface, name) for surface in made]) for name in names
+    }
     if any(surface.uncovered is not None for surface in made):
-        data["uncovered"] = np.concatenate([
-            np.zeros(surface.count, dtype=bool) if surface.uncovered is None else surface.uncovered
-            for surface in made
-        ])
+        data["uncovered"] = np.concatenate(
+            [
+                np.zeros(surface.count, dtype=bool)
+                if surface.uncovered is None
+                else surface.uncovered
+                for surface in made
+            ]
+        )
     parts = [part for surface in made for part in surface.parts]
-    joined = surface_of(made[0].space, parts, motion=_joined([(surface.motion, (surface.count,)) for surface in made]),
-                        companions=tuple(one for surface in made for one in surface.companions),
-                        watched=tuple(one for surface in made for one in surface.watched),
-                        censuses=tuple(one for surface in made for one in surface.censuses), **data)
+    joined = surface_of(
+        made[0].space,
+        parts,
+        motion=_joined([(surface.motion, (surface.count,)) for surface in made]),
+        companions=tuple(one for surface in made for one in surface.companions),
+        watched=tuple(one for surface in made for one in surface.watched),
+        censuses=tuple(one for surface in made for one in surface.censuses),
+        **data,
+    )
     joined = replace(joined, slide=_slide(made))
-    return joined.with_frictionless_corners() if all(one.frictionless_corners for one in made) else joined
+    return (
+        joined.with_frictionless_corners()
+        if all(one.frictionless_corners for one in made)
+        else joined
+    )
 
 
 def _joined(motions: Sequence[tuple[Motion | None, tuple[int, ...]]]) -> Motion | None:
     """The motions of all conditions from those of the surfaces."""
     if all(motion is None for motion, _ in motions):
         return None
-    return lambda t: np.concatenate([np.zeros(shape) if motion is None else motion(t) for motion, shape in motions])
+    return lambda t: np.concatenate(
+        [np.zeros(shape) if motion is None else motion(t) for motion, shape in motions]
+    )
 
 
 def _slide(made: Sequence[FemSurface]) -> Motion | None:
     """The slides of all conditions, those of nodes with several along the vectors that are left to them."""
-    joined = _joined([(surface.slide, (surface.count, surface.tangents.shape[1])) for surface in made])
+    joined = _joined(
+        [(surface.slide, (surface.count, surface.tangents.shape[1])) for surface in made]
+    )
     frames = NodalFrames(*given([part for surface in made for part in surface.parts]))
     corners = np.flatnonzero(frames.double[frames.place])
     if joined is None or not len(corners):
         return joined
-    before = np.concatenate([tangent_vectors(surface.normals, surface.nodes) for surface in made])[corners]
-    after = tangent_vectors(frames.directions, frames.place)[corners] * frames.rubs[corners, None, :]
+    before = np.concatenate([tangent_vectors(surface.normals, surface.nodes) for surface in made])[
+        corners
+    ]
+    after = (
+        tangent_vectors(frames.directions, frames.place)[corners] * frames.rubs[corners, None, :]
+    )
     turn = np.einsum("kic,kie->kce", after, before)
 
     def slide(t: float) -> Array:

@@ -17,7 +17,9 @@ from .partners import Surface, one_of
 NEARBY = 8  # nodes of side 2 that are looked at first
 EDGE_ON = 0.01  # cosine of the angle between a normal and what it is seen from: under less no side faces another
 BESIDE = 0.01  # of the distance to the next node: how far beside a normal a partner may lie
-ONE_PLACE = 1e-6  # of the distance that a partner may lie beside a normal: nodes as close as this coincide
+ONE_PLACE = (
+    1e-6  # of the distance that a partner may lie beside a normal: nodes as close as this coincide
+)
 DISTANCES = 2**20  # in a table, where all nodes of side 2 are looked at
 
 
@@ -104,38 +106,63 @@ class NodeToNode:
         partner = self._partners(one, two, size)
         missing = np.flatnonzero(partner < 0)
         if len(missing):
-            raise InputError(f"{len(missing)} of {len(partner)} nodes of '{one.name}' have no node of '{two.name}' "
-                             f"opposite, the first at {at(one.nodes.points[missing[0]])}: mesh both sides alike, make "
-                             "the smaller side the first, or use matching=DualMortar()")
+            raise InputError(
+                f"{len(missing)} of {len(partner)} nodes of '{one.name}' have no node of '{two.name}' "
+                f"opposite, the first at {at(one.nodes.points[missing[0]])}: mesh both sides alike, make "
+                "the smaller side the first, or use matching=DualMortar()"
+            )
         first, counts = np.unique(partner, return_counts=True)
         if counts.max() > 1:
-            raise InputError(f"several nodes of '{one.name}' face the node of '{two.name}' at "
-                             f"{at(two.nodes.points[first[counts.argmax()]])}: mesh both sides alike, or use "
-                             "matching=DualMortar()")
+            raise InputError(
+                f"several nodes of '{one.name}' face the node of '{two.name}' at "
+                f"{at(two.nodes.points[first[counts.argmax()]])}: mesh both sides alike, or use "
+                "matching=DualMortar()"
+            )
         m = len(partner)
         P = sp.csr_matrix((np.ones(m), (np.arange(m), partner)), shape=(m, len(two.nodes.points)))
         return Matched(np.arange(m), P, one.nodes.weights, np.zeros(m))
 
     def _partners(self, one: Side, two: Side, size: float) -> Indices:
         """Place of the nearest node opposite among those of side 2, -1 for none."""
-        x, count, spacing = one.nodes.points, len(two.nodes.points), _spacing(one.nodes.points, size)
+        x, count, spacing = (
+            one.nodes.points,
+            len(two.nodes.points),
+            _spacing(one.nodes.points, size),
+        )
         reach, together = self.tolerance * spacing, 2.0 * min(self.tolerance, BESIDE) * spacing
         from scipy.spatial import cKDTree  # late: it takes a while
 
         away, nearby = cKDTree(two.nodes.points).query(x, k=np.arange(1, min(NEARBY, count) + 1))
-        partner, along, turned, crowds = _opposite(one.nodes, two.nodes, np.sort(nearby, axis=1), reach)
+        partner, along, turned, crowds = _opposite(
+            one.nodes, two.nodes, np.sort(nearby, axis=1), reach
+        )
         # what is as near along the normal, or nearer, lies in a ball of this size: unless all of it was looked at, all
         # nodes are
         unsure = np.flatnonzero((1.0 + 1e-9) * np.hypot(along + reach, reach) >= away[:, -1])
-        for rows in np.array_split(unsure, -(-len(unsure) * count // DISTANCES)) if len(unsure) else ():
+        for rows in (
+            np.array_split(unsure, -(-len(unsure) * count // DISTANCES)) if len(unsure) else ()
+        ):
             whole = np.arange(count)[None, :]
-            partner[rows], _, turned[rows], more = _opposite(one.nodes.pick(rows), two.nodes, whole, reach[rows])
+            partner[rows], _, turned[rows], more = _opposite(
+                one.nodes.pick(rows), two.nodes, whole, reach[rows]
+            )
             crowds |= {int(rows[row]): crowd for row, crowd in more.items()}
         surfaces = Surface(x, one.facets), Surface(two.nodes.points, two.facets)
         for row, (these, apart) in sorted(crowds.items()):
-            at_one_place = np.linalg.norm(two.nodes.points[these] - two.nodes.points[these[0]], axis=1) <= together[row]
+            at_one_place = (
+                np.linalg.norm(two.nodes.points[these] - two.nodes.points[these[0]], axis=1)
+                <= together[row]
+            )
             these, apart = these[at_one_place], apart[at_one_place]
-            chosen = one_of(surfaces[0], row, one.nodes.normals[row], surfaces[1], these, apart, ONE_PLACE * reach[row])
+            chosen = one_of(
+                surfaces[0],
+                row,
+                one.nodes.normals[row],
+                surfaces[1],
+                these,
+                apart,
+                ONE_PLACE * reach[row],
+            )
             if chosen < 0:
                 _refuse_several(one, two, row)
             partner[row] = chosen
@@ -149,7 +176,9 @@ class NodeToNode:
 Crowds = dict[int, tuple[Indices, Array]]
 
 
-def _opposite(one: Nodes, two: Nodes, places: Indices, reach: Array) -> tuple[Indices, Array, Mask, Crowds]:
+def _opposite(
+    one: Nodes, two: Nodes, places: Indices, reach: Array
+) -> tuple[Indices, Array, Mask, Crowds]:
     """Find what each node of side 1 faces among these ``places`` (m, k) on side 2.
 
     Returns (the first of the nearest nodes opposite each one, -1 for none; how far along the normal, infinite for none;
@@ -184,13 +213,17 @@ def _refuse_several(one: Side, two: Side, row: int) -> None:
     mortar = 'matching=DualMortar(), in a case file matching = {type = "DualMortar"}'
     if max(one.facets.shape[1], two.facets.shape[1]) > (2 if d == 2 else 4):
         mortar = f"degree=1 and {mortar}"
-    raise InputError(f"{where}, as a stone does on two stones, and no single one is its partner: use {mortar}")
+    raise InputError(
+        f"{where}, as a stone does on two stones, and no single one is its partner: use {mortar}"
+    )
 
 
 def refuse_same_way(one: str, two: str, point: Array) -> None:
     """Raise InputError for sides whose outward normals point the same way."""
-    raise InputError(f"'{two}' does not face '{one}' at {at(point)}, where both outward normals point the same way: "
-                     "choose the two boundaries between the bodies")
+    raise InputError(
+        f"'{two}' does not face '{one}' at {at(point)}, where both outward normals point the same way: "
+        "choose the two boundaries between the bodies"
+    )
 
 
 def _spacing(points: Array, size: float) -> Array:

@@ -54,10 +54,14 @@ class DualMortar:
     def match(self, one: Side, two: Side, size: float) -> Matched:
         d = one.nodes.points.shape[1]
         if d == 1:
-            raise InputError("DualMortar joins sides of plane and solid bodies: use matching=NodeToNode() for bars")
+            raise InputError(
+                "DualMortar joins sides of plane and solid bodies: use matching=NodeToNode() for bars"
+            )
         if max(one.facets.shape[1], two.facets.shape[1]) > (2 if d == 2 else 4):
-            raise InputError(f"DualMortar joins facets of first order and those of '{one.name}' and '{two.name}' have "
-                             "mid-points (degree=2): mesh both sides alike for matching=NodeToNode(), or use degree=1")
+            raise InputError(
+                f"DualMortar joins facets of first order and those of '{one.name}' and '{two.name}' have "
+                "mid-points (degree=2): mesh both sides alike for matching=NodeToNode(), or use degree=1"
+            )
         found = in_space(one, two) if d == 3 else _in_plane(one, two)
         D = found.D
         if not (D > 0.0).any():
@@ -69,11 +73,15 @@ class DualMortar:
 
 def _refuse(one: Side, two: Side) -> None:
     """Raise InputError for sides of which no part lies opposite the other."""
-    some, others = (side.nodes.normals[:: 1 + len(side.nodes.normals) // 1000] for side in (one, two))
+    some, others = (
+        side.nodes.normals[:: 1 + len(side.nodes.normals) // 1000] for side in (one, two)
+    )
     if np.all(some @ others.T > EDGE_ON):
         refuse_same_way(one.name, two.name, one.nodes.points[0])
-    raise InputError(f"no part of '{two.name}' lies opposite '{one.name}', along the normals of the latter: choose the "
-                     "two boundaries between the bodies")
+    raise InputError(
+        f"no part of '{two.name}' lies opposite '{one.name}', along the normals of the latter: choose the "
+        "two boundaries between the bodies"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +121,9 @@ def _in_plane(one: Side, two: Side) -> Coupled:
     return coupled(covered, lambda carried: _assembled(one, two, segments, carried))
 
 
-def _overlap(pieces: list[tuple[float, float, int, Array]], ends: Array, ends2: Array, H: Array) -> float:
+def _overlap(
+    pieces: list[tuple[float, float, int, Array]], ends: Array, ends2: Array, H: Array
+) -> float:
     """By how much the polygon of side 2, of curvature H at its segments, may overlap a segment of side 1 [m]."""
     segment = [piece[2] for piece in pieces]
     share = np.array([0.0, 0.5, 1.0])
@@ -126,8 +136,12 @@ def _overlap(pieces: list[tuple[float, float, int, Array]], ends: Array, ends2: 
 
 def _covered(segments: list[_Segment], common: Mask) -> Covered:
     """What is covered of these segments; ``common``: nodes (m,) of both sides."""
-    ends = np.array([[min(piece[0] for piece in one.pieces), max(piece[1] for piece in one.pieces)]
-                     for one in segments]).reshape(-1, 2)
+    ends = np.array(
+        [
+            [min(piece[0] for piece in one.pieces), max(piece[1] for piece in one.pieces)]
+            for one in segments
+        ]
+    ).reshape(-1, 2)
     corners = np.array([one.ends for one in segments]).reshape(-1, 2, 2)
     weights = np.array([one.own.sum(axis=1) for one in segments]).reshape(-1, 2)
     lengths = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
@@ -142,7 +156,9 @@ def _covered(segments: list[_Segment], common: Mask) -> Covered:
     )
 
 
-def _assembled(one: Side, two: Side, segments: list[_Segment], carried: Carried) -> tuple[Array, sp.csr_matrix, Array]:
+def _assembled(
+    one: Side, two: Side, segments: list[_Segment], carried: Carried
+) -> tuple[Array, sp.csr_matrix, Array]:
     """D (m,), M (m, n) and by how much polygons of one curve may overlap at each node of side 1 (m,) [m]."""
     m, n = len(one.nodes.points), len(two.nodes.points)
     D, M, overlap, partner = np.zeros(m), sp.lil_matrix((m, n)), np.zeros(m), common_nodes(one, two)
@@ -157,7 +173,9 @@ def _assembled(one: Side, two: Side, segments: list[_Segment], carried: Carried)
             continue
         dual = np.diag(own.sum(axis=1)) @ np.linalg.inv(own)
         common = partner[facet]
-        dual, own_D, forces = (a[0] for a in handed_over(dual[None], own.sum(axis=1)[None], common[None] >= 0))
+        dual, own_D, forces = (
+            a[0] for a in handed_over(dual[None], own.sum(axis=1)[None], common[None] >= 0)
+        )
         D[facet] += own_D
         for segment, values in part.mixed.items():
             for j, column in zip(two.facets[segment], (dual @ values).T, strict=True):
@@ -168,8 +186,15 @@ def _assembled(one: Side, two: Side, segments: list[_Segment], carried: Carried)
     return D, sp.csr_matrix(M), overlap
 
 
-def _carry(D: Array, M: sp.lil_matrix, points: Array, facets2: Indices, part: _Segment, by: Indices,
-           carried: Mask) -> None:
+def _carry(
+    D: Array,
+    M: sp.lil_matrix,
+    points: Array,
+    facets2: Indices,
+    part: _Segment,
+    by: Indices,
+    carried: Mask,
+) -> None:
     """Add to D and M what a segment adds of which some node is carried by the nodes of another (``covering``)."""
     weights, inverse = part.own.sum(axis=1), np.linalg.inv(part.own)
     there = part.places(points[by])[None, :, None]
@@ -178,7 +203,9 @@ def _carry(D: Array, M: sp.lil_matrix, points: Array, facets2: Indices, part: _S
         for k, share in zip(by, shares[i], strict=True) if carried[node] else ((node, 1.0),):
             place = float(part.places(points[k]))
             D[k] += share * weight
-            psi = share * weight * _hats(place) @ inverse  # of the functions of the segment, which span (1, x)
+            psi = (
+                share * weight * _hats(place) @ inverse
+            )  # of the functions of the segment, which span (1, x)
             for segment, values in part.mixed.items():
                 M[k, facets2[segment]] = M[k, facets2[segment]].toarray().ravel() + psi @ values
 
@@ -191,7 +218,9 @@ def _normals(side: Side, ends: Array) -> Array:
     return np.asarray(np.where(outward[:, None] < 0.0, -normals, normals))
 
 
-def _pieces(ends: Array, normal: Array, ends2: Array, normals2: Array) -> Iterator[tuple[float, float, int, Array]]:
+def _pieces(
+    ends: Array, normal: Array, ends2: Array, normals2: Array
+) -> Iterator[tuple[float, float, int, Array]]:
     """(low, high, segment of side 2, its coordinates at low and high) of each piece of a segment of side 1, in its
     coordinate from 0 to 1: where several segments lie opposite, the nearest."""
     along = ends[1] - ends[0]
@@ -212,7 +241,9 @@ def _pieces(ends: Array, normal: Array, ends2: Array, normals2: Array) -> Iterat
             yield start, end, segment, (np.array([start, end]) - place[segment, 0]) / slope[nearest]
 
 
-def _integrals(pieces: list[tuple[float, float, int, Array]], length: float) -> tuple[Array, dict[int, Array]]:
+def _integrals(
+    pieces: list[tuple[float, float, int, Array]], length: float
+) -> tuple[Array, dict[int, Array]]:
     """∫ phi phiᵀ (2, 2) over the pieces, and by segment of side 2 ∫ phi_i phi_j (2, 2)."""
     own, mixed = np.zeros((2, 2)), dict[int, Array]()
     for low, high, segment, across in pieces:

@@ -36,14 +36,23 @@ def integrals(looks: Looks, pieces: Pieces) -> tuple[Array, Array]:
     k, v, w = len(looks.nodes), looks.polygons.shape[1], pieces.seen.shape[1]
     own, mixed = np.zeros((len(pieces.look), v * v)), np.zeros((len(pieces.look), v * w))
     orders = np.maximum(order_of(looks.polygons)[pieces.look], order_of(pieces.seen))
-    groups = [group for order in np.unique(orders) for same in [np.flatnonzero(orders == order)]
-              for group in np.array_split(same, 1 + len(same) * order**2 // POINTS)]
+    groups = [
+        group
+        for order in np.unique(orders)
+        for same in [np.flatnonzero(orders == order)]
+        for group in np.array_split(same, 1 + len(same) * order**2 // POINTS)
+    ]
     for group in groups:
         piece, corners = triangles(pieces.polygons[group])
         piece, (places, weights) = group[piece], rule(int(orders[group[0]]))
         points = np.einsum("qc,kcx->kqx", places, corners)
-        phi, other = hats(looks.polygons[pieces.look[piece]], points), hats(pieces.seen[piece], points)
-        weighted = phi * (weights[:, None] * (areas(corners) / looks.slant[pieces.look[piece]])[:, None, None])
+        phi, other = (
+            hats(looks.polygons[pieces.look[piece]], points),
+            hats(pieces.seen[piece], points),
+        )
+        weighted = phi * (
+            weights[:, None] * (areas(corners) / looks.slant[pieces.look[piece]])[:, None, None]
+        )
         weighted = weighted.swapaxes(1, 2)
         own += summed(piece, weighted @ phi, len(own))
         mixed += summed(piece, weighted @ other, len(own))
@@ -59,12 +68,16 @@ def order_of(polygons: Array) -> Indices:
     low, high = corner.min(axis=1), corner.max(axis=1)
     distorted = np.maximum((high - low) / (high + low), 1e-16)
     # measured: an error of 1e-11 of the integrals where a piece is a whole facet, less on smaller pieces
-    return np.asarray(np.clip(np.ceil(2.0 - 8.5 / np.log(distorted)), 3, MOST_POINTS).astype(np.int64))
+    return np.asarray(
+        np.clip(np.ceil(2.0 - 8.5 / np.log(distorted)), 3, MOST_POINTS).astype(np.int64)
+    )
 
 
 def summed(place: Indices, values: Array, count: int) -> Array:
     """Return sums (count, ...) of rows of values that have the same place, as rows of numbers."""
-    ones = sp.csr_matrix((np.ones(len(place)), (place, np.arange(len(place)))), shape=(count, len(place)))
+    ones = sp.csr_matrix(
+        (np.ones(len(place)), (place, np.arange(len(place)))), shape=(count, len(place))
+    )
     return np.asarray(ones @ values.reshape(len(place), int(np.prod(values.shape[1:]))))
 
 
@@ -90,7 +103,9 @@ def entries(values: Array, rows: Indices, columns: Indices, m: int, n: int) -> s
     """Return values (k, v, w) summed at their rows (k, v) and columns (k, w); column -1 stands for none."""
     places = [place.ravel() for place in np.broadcast_arrays(rows[:, :, None], columns[:, None, :])]
     used = places[1] >= 0
-    return sp.csr_matrix((values.ravel()[used], tuple(place[used] for place in places)), shape=(m, n)).tocoo()
+    return sp.csr_matrix(
+        (values.ravel()[used], tuple(place[used] for place in places)), shape=(m, n)
+    ).tocoo()
 
 
 def handed_over(functions: Array, D: Array, common: Mask) -> tuple[Array, Array, Array]:
@@ -101,7 +116,11 @@ def handed_over(functions: Array, D: Array, common: Mask) -> tuple[Array, Array,
     share = ~common / np.maximum(np.sum(~common, axis=1), 1)[:, None]
     lost = np.sum(functions * common[:, :, None], axis=1)
     forces = share[:, :, None] * (D * common)[:, None, :]
-    return functions * ~common[:, :, None] + share[:, :, None] * lost[:, None, :], D * ~common, forces
+    return (
+        functions * ~common[:, :, None] + share[:, :, None] * lost[:, None, :],
+        D * ~common,
+        forces,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +144,9 @@ class _Block:
     def middles(self) -> Array:
         """Return the middles (looks, 3) of the covered parts: means of those of the pieces, weighted with areas."""
         size, looks = areas(self.pieces.polygons), self.looks
-        seen = summed(self.pieces.look, size[:, None] * self.pieces.polygons.mean(axis=1), len(looks.nodes))
+        seen = summed(
+            self.pieces.look, size[:, None] * self.pieces.polygons.mean(axis=1), len(looks.nodes)
+        )
         seen /= summed(self.pieces.look, size[:, None], len(looks.nodes))
         return looks.middles + np.einsum("kic,kc->ki", looks.frames, seen)
 
@@ -186,8 +207,9 @@ def _whole_weights(looks: Looks) -> Array:
     return summed(piece, np.einsum("q,kqv,k->kv", weights, phi, sizes), k).reshape(k, v)
 
 
-def _assembled(one: Side, two: Side, theirs: Facets, blocks: Sequence[_Block],
-               carried: Carried) -> tuple[Array, sp.csr_matrix, Array]:
+def _assembled(
+    one: Side, two: Side, theirs: Facets, blocks: Sequence[_Block], carried: Carried
+) -> tuple[Array, sp.csr_matrix, Array]:
     """D (m,), M (m, n) and by how much facets of one curved face may overlap at each node of side 1 (m,) [m]."""
     m, n, partner = len(one.nodes.points), len(two.nodes.points), common_nodes(one, two)
     D, overlap, parts, start = np.zeros(m), np.zeros(m), [sp.coo_matrix((m, n))], 0
@@ -210,10 +232,14 @@ def _assembled(one: Side, two: Side, theirs: Facets, blocks: Sequence[_Block],
         if curved:
             piece = _overlap(points[some.nodes], theirs, H, block)[:, None]
             np.maximum.at(overlap, some.nodes[pieces.look], piece * some.asking[pieces.look])
-            np.maximum.at(overlap, by[pieces.look], FARTHER * piece * borne.any(axis=1)[pieces.look, None])
+            np.maximum.at(
+                overlap, by[pieces.look], FARTHER * piece * borne.any(axis=1)[pieces.look, None]
+            )
         if borne.any():
             parts.append(_carry(D, one.nodes.points, theirs, block, by, borne, n))
-    values, *places = (np.concatenate([getattr(part, name) for part in parts]) for name in ("data", "row", "col"))
+    values, *places = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("data", "row", "col")
+    )
     return D, sp.csr_matrix((values, tuple(places)), shape=(m, n)), overlap
 
 
@@ -227,7 +253,9 @@ def _overlap(corners: Array, theirs: Facets, H: Array, block: _Block) -> Array:
     return may_overlap(H[pieces.facet], one, two)
 
 
-def _carry(D: Array, points: Array, theirs: Facets, block: _Block, by: Indices, borne: Mask, n: int) -> sp.coo_matrix:
+def _carry(
+    D: Array, points: Array, theirs: Facets, block: _Block, by: Indices, borne: Mask, n: int
+) -> sp.coo_matrix:
     """Add to D what the nodes ``by`` (looks, v) of other facets carry of nodes (looks, v) that are ``borne``, and
     return what belongs to it in M (``covering``)."""
     looks, pieces = block.looks, block.pieces
@@ -241,7 +269,9 @@ def _carry(D: Array, points: Array, theirs: Facets, block: _Block, by: Indices, 
     np.add.at(D, by[rows], weights)
     # psi_k = D_k b(x)ᵀ G⁻¹ b(x_k), in the functions of the facet: b(x) = sum_i b(x_i) phi_i
     nodal, inverse, offset = linear_functions(some, own)
-    beyond = np.concatenate([np.ones((*seen.shape[:2], 1)), (seen - offset) / some.reach[:, None, None]], axis=2)
+    beyond = np.concatenate(
+        [np.ones((*seen.shape[:2], 1)), (seen - offset) / some.reach[:, None, None]], axis=2
+    )
     functions = weights[:, :, None] * (beyond @ inverse @ nodal.swapaxes(1, 2))
     among = np.flatnonzero(place[pieces.look] >= 0)
     look = place[pieces.look[among]]

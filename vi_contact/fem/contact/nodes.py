@@ -38,7 +38,9 @@ class Nodes(Rows):
 
 def joined_nodes(parts: Sequence[Nodes]) -> Nodes:
     """Return the nodes of all parts, one part after the other."""
-    return Nodes(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(Nodes)))
+    return Nodes(
+        *(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(Nodes))
+    )
 
 
 def everywhere(comm: Comm, nodes: Nodes) -> Nodes:
@@ -50,10 +52,14 @@ def everywhere(comm: Comm, nodes: Nodes) -> Nodes:
 def slots_of(comm: Comm, keys: Indices) -> Indices:
     """Return the places (m,) of this rank's ascending keys among all; equal ones are of one rank. Collective."""
     every = np.sort(np.concatenate(from_each(comm, keys)))
-    return np.asarray(np.searchsorted(every, keys) + np.arange(len(keys)) - np.searchsorted(keys, keys))
+    return np.asarray(
+        np.searchsorted(every, keys) + np.arange(len(keys)) - np.searchsorted(keys, keys)
+    )
 
 
-def asked(comm: Comm, slots: Indices, ask: Callable[..., tuple[Any, ...]], *values: Any) -> tuple[Any, ...]:
+def asked(
+    comm: Comm, slots: Indices, ask: Callable[..., tuple[Any, ...]], *values: Any
+) -> tuple[Any, ...]:
     """Return what ``ask`` answers for this rank's rows of the values. Where it raises on some rank it is asked for the
     rows of all, in the order of their slots, so that all ranks raise what one rank alone would. Collective."""
     if comm.size == 1:
@@ -68,6 +74,8 @@ def asked(comm: Comm, slots: Indices, ask: Callable[..., tuple[Any, ...]], *valu
     parts = from_each(comm, (slots, *values))
     order = np.argsort(np.concatenate([part[0] for part in parts]))
     rows = [np.concatenate([part[i] for part in parts])[order] for i in range(1, 1 + len(values))]
-    with together(comm):  # a function that depends on the rank may fail on one, and not on the others
+    with together(
+        comm
+    ):  # a function that depends on the rank may fail on one, and not on the others
         whole = ask(*rows)
     return tuple(one[slots] for one in whole)

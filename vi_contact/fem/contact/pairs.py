@@ -44,9 +44,16 @@ log = logging.getLogger(__name__)
 
 
 @stage("contact")
-def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *, matching: Matching | None = None,
-                 points: Sequence[Sequence[float]] | None = None, feature_angle: float = FEATURE_ANGLE,
-                 hinges: bool = False) -> ContactSurface:
+def contact_pair(
+    system: SemiDiscreteSystem,
+    facets1: Facets,
+    facets2: Facets,
+    *,
+    matching: Matching | None = None,
+    points: Sequence[Sequence[float]] | None = None,
+    feature_angle: float = FEATURE_ANGLE,
+    hinges: bool = False,
+) -> ContactSurface:
     """Make the contact conditions between two boundaries of deformable bodies, or two faces of a crack.
 
     Each node of side 1 has a condition, with the normals, weights (times the section's thickness) and forces of side 1;
@@ -73,19 +80,36 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
         InputError: nodes that only glue two bodies together, sides that do not pair or do not face each other, bodies
             that overlap, sides of one and the same
             boundary, contact directions that are partly prescribed, clamped nodes that face free ones."""
-    space = contact_space("contact_pair", system, {"facets1": facets1, "facets2": facets2}, points, matching=matching,
-                          feature_angle=feature_angle)
-    optional(provides, "contact_pair", "matching", matching, ("match",), "give NodeToNode() or DualMortar(), or None")
+    space = contact_space(
+        "contact_pair",
+        system,
+        {"facets1": facets1, "facets2": facets2},
+        points,
+        matching=matching,
+        feature_angle=feature_angle,
+    )
+    optional(
+        provides,
+        "contact_pair",
+        "matching",
+        matching,
+        ("match",),
+        "give NodeToNode() or DualMortar(), or None",
+    )
     angle = checked_angle("contact_pair", feature_angle)
     flag("contact_pair", "hinges", hinges)
     if space.hierarchy is not None and not isinstance(matching or NodeToNode(), NodeToNode):
-        raise InputError("contact_pair: sides of P2 tetrahedra are matched by matching=NodeToNode() only: mesh both "
-                         "sides alike, or use degree=1")
+        raise InputError(
+            "contact_pair: sides of P2 tetrahedra are matched by matching=NodeToNode() only: mesh both "
+            "sides alike, or use degree=1"
+        )
     one, two = side_of(space, facets1), side_of(space, facets2)
     shared = np.isin(one.nodes.numbers, two.nodes.numbers)
     if shared.all():
-        raise InputError(f"'{one.name}' and '{two.name}' are the same nodes, so that nothing can part there: mesh the "
-                         "bodies one by one, or cut the mesh open (meshes.cut.CutOpen)")
+        raise InputError(
+            f"'{one.name}' and '{two.name}' are the same nodes, so that nothing can part there: mesh the "
+            "bodies one by one, or cut the mesh open (meshes.cut.CutOpen)"
+        )
     _refuse_common(one, two)
     hinge = _hinges(space, one, two, shared, allowed=hinges)
     places = _tied_over(space, one, two)
@@ -94,7 +118,9 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
     around = boundary(space, facets1, beyond=angle)
     faces = _faces(space, one, boundary(space, facets1) if len(around.vertices) else around, angle)
     with together(space.comm):  # a matching of the user's may fail on one rank
-        nodes, matched = _by_face(faces, two, NodeToNode() if matching is None else matching, space.size)
+        nodes, matched = _by_face(
+            faces, two, NodeToNode() if matching is None else matching, space.size
+        )
     opposite = np.concatenate([nodes.numbers, matched.carried])
     carried = np.setdiff1d(matched.carried, nodes.numbers)
     kept = ~np.isin(nodes.numbers, np.union1d(two.nodes.numbers, tied))
@@ -102,7 +128,9 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
     free = _unclamped(space, one.name, nodes, two, matched)
     kinds = _kinds(one, shared, opposite, nodes.numbers[~free])
     kinds |= _sorted_out(space, one, kinds["clamped"])
-    watched = _watched(space, one, two, nodes.pick(~free), matched.pick(~free)) if points is None else ()
+    watched = (
+        _watched(space, one, two, nodes.pick(~free), matched.pick(~free)) if points is None else ()
+    )
     kinds["partly covered"] = np.isin(one.nodes.numbers, carried)
     little = nodes.numbers[free & (matched.shares < LEAST_SHARE)]
     kinds["hardly covered"] = np.isin(one.nodes.numbers, little)
@@ -126,14 +154,20 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
     uncovered = np.isin(nodes.numbers, little)
     census = census_of_all(one.name, one.nodes, kinds, len(nodes.numbers))
     tell(space.comm, census)
-    slots = np.flatnonzero(space.blocks_of(nodes.numbers) >= 0)  # from here on every rank has its own nodes of side 1
+    slots = np.flatnonzero(
+        space.blocks_of(nodes.numbers) >= 0
+    )  # from here on every rank has its own nodes of side 1
     nodes = nodes.pick(slots)
     tell_corners(space, one.name, nodes, slots, angle)
     bubbles = averaged(space, facets1, nodes) + averaged(space, facets2, two.nodes, P[slots])
     beside = _borrowed(space, facets1, one, kinds, nodes.numbers[~uncovered[slots]])
-    conditions = NodalConditions(nodes, directions[slots], slots, Facing(two.nodes, P[slots]), bubbles, beside)
+    conditions = NodalConditions(
+        nodes, directions[slots], slots, Facing(two.nodes, P[slots]), bubbles, beside
+    )
     weights = nodes.weights * space.forms.section.thickness
-    surface = surface_of(space, [conditions], gap0=gap[slots], weights=weights, censuses=(census,), watched=watched)
+    surface = surface_of(
+        space, [conditions], gap0=gap[slots], weights=weights, censuses=(census,), watched=watched
+    )
     if uncovered.any():
         surface = replace(surface, uncovered=uncovered[slots])
     return replace(surface, **prescribed_motion(space, conditions))
@@ -142,7 +176,9 @@ def contact_pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *
 def side_of(space: FemSpace, facets: Facets) -> Side:
     """Gather all nodes and facets of a boundary, on every rank, in the order of the mesh's numbers. Collective."""
     nodes = everywhere(space.comm, nodes_on(space, facets))
-    rows = np.concatenate(space.comm.bcast(space.comm.gather(space.corners_of_facets(facets.indices))))
+    rows = np.concatenate(
+        space.comm.bcast(space.comm.gather(space.corners_of_facets(facets.indices)))
+    )
     _, first = np.unique(np.sort(rows, axis=1), axis=0, return_index=True)
     return Side(facets.name, nodes, np.searchsorted(nodes.numbers, rows[first]))
 
@@ -162,9 +198,17 @@ def _warn_of_coarse(space: FemSpace, one: Side, two: Side, little: Indices) -> N
     """Warn, on rank 0, of nodes with a condition around which little of side 1 is covered."""
     if len(little) and space.comm.rank == 0:
         where = at(one.nodes.points[np.searchsorted(one.nodes.numbers, little[0])])
-        log.warning("%d contact nodes of '%s', the first at %s, have hardly anything of '%s' in front of their facets, "
-                    "and no whole facet is near: their pressures are left out of the largest ones; make '%s' the first "
-                    "side, or mesh '%s' finer", len(little), one.name, where, two.name, two.name, one.name)
+        log.warning(
+            "%d contact nodes of '%s', the first at %s, have hardly anything of '%s' in front of their facets, "
+            "and no whole facet is near: their pressures are left out of the largest ones; make '%s' the first "
+            "side, or mesh '%s' finer",
+            len(little),
+            one.name,
+            where,
+            two.name,
+            two.name,
+            one.name,
+        )
 
 
 def _sorted_out(space: FemSpace, one: Side, clamped: Mask) -> dict[str, Mask]:
@@ -174,7 +218,9 @@ def _sorted_out(space: FemSpace, one: Side, clamped: Mask) -> dict[str, Mask]:
     return {"clamped": clamped & ~moved, "prescribed": clamped & moved}
 
 
-def _watched(space: FemSpace, one: Side, two: Side, nodes: Nodes, matched: Matched) -> tuple[Watched, ...]:
+def _watched(
+    space: FemSpace, one: Side, two: Side, nodes: Nodes, matched: Matched
+) -> tuple[Watched, ...]:
     """What watches nodes of side 1, given of all ranks, that are held in every component in front of others that are.
     Collective."""
     known = np.asarray(matched.P @ (~two.nodes.held.all(axis=1)).astype(float)) == 0.0
@@ -185,12 +231,18 @@ def _watched(space: FemSpace, one: Side, two: Side, nodes: Nodes, matched: Match
     gap = _gap(space, one.name, two, nodes, directions, matched)
     own = np.flatnonzero(space.blocks_of(nodes.numbers) >= 0)
     opposite = Facing(two.nodes, sp.csr_matrix(matched.P[own]))
-    return watched_nodes(space, one.name, nodes.pick(own), directions[own], gap[own], opposite, two.name)
+    return watched_nodes(
+        space, one.name, nodes.pick(own), directions[own], gap[own], opposite, two.name
+    )
 
 
-def _borrowed(space: FemSpace, facets: Facets, one: Side, kinds: dict[str, Mask], having: Indices) -> Borrowed | None:
+def _borrowed(
+    space: FemSpace, facets: Facets, one: Side, kinds: dict[str, Mask], having: Indices
+) -> Borrowed | None:
     """What nodes of side 1 without a pressure of their own take of neighbours, not those in front of nothing."""
-    nothing = [mask for kind, mask in kinds.items() if kind not in ("in front of nothing", "not listed")]
+    nothing = [
+        mask for kind, mask in kinds.items() if kind not in ("in front of nothing", "not listed")
+    ]
     return borrowed(space, facets, one.nodes.numbers[np.any(nothing, axis=0)], having)
 
 
@@ -203,7 +255,9 @@ def _hinges(space: FemSpace, one: Side, two: Side, shared: Mask, *, allowed: boo
     if not allowed:
         refuse_hinges("contact_pair", (one.name, two.name), one.nodes.points[here & shared])
         for side in (one, two):
-            refuse_hinges("contact_pair", (side.name,), side.nodes.points[np.isin(side.nodes.numbers, found)])
+            refuse_hinges(
+                "contact_pair", (side.name,), side.nodes.points[np.isin(side.nodes.numbers, found)]
+            )
     return np.asarray(here)
 
 
@@ -214,7 +268,9 @@ def _tied_over(space: FemSpace, one: Side, two: Side) -> Indices:
     if not len(space.tied_nodes):
         return places
     own, others = space.leaders(one.nodes.numbers), space.leaders(two.nodes.numbers)
-    for row in np.flatnonzero(np.isin(one.nodes.numbers, space.tied_nodes) & (own >= 0) & np.isin(own, others)):
+    for row in np.flatnonzero(
+        np.isin(one.nodes.numbers, space.tied_nodes) & (own >= 0) & np.isin(own, others)
+    ):
         alike = np.flatnonzero(others == own[row])
         apart = np.linalg.norm(two.nodes.points[alike] - one.nodes.points[row], axis=1)
         places[row] = alike[np.argmin(apart)]
@@ -226,8 +282,10 @@ def _refuse_common(one: Side, two: Side) -> None:
     own, others = number_alike(*(side.nodes.numbers[side.facets] for side in (one, two)))
     for facet in np.flatnonzero(np.isin(own, others))[:1]:
         where = at(one.nodes.points[one.facets[facet]].mean(axis=0))
-        raise InputError(f"a facet of both '{one.name}' and '{two.name}' at {where}: a facet cannot touch itself, "
-                         "so list it on one side only")
+        raise InputError(
+            f"a facet of both '{one.name}' and '{two.name}' at {where}: a facet cannot touch itself, "
+            "so list it on one side only"
+        )
 
 
 def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[tuple[Side, Array]]:
@@ -239,18 +297,26 @@ def _faces(space: FemSpace, one: Side, around: Boundary, angle: float) -> list[t
     for face in range(int(face_of.max()) + 1):
         facets = one.facets[face_of == face]
         used = np.unique(facets)
-        inside = np.isin(nodes.numbers, one.nodes.numbers[used]) & ((facet < 0) | (face_of[facet] == face))
+        inside = np.isin(nodes.numbers, one.nodes.numbers[used]) & (
+            (facet < 0) | (face_of[facet] == face)
+        )
         own = nodes.pick(inside)
         if len(own.numbers) > len(used):
             again = own.points[1:][np.diff(own.numbers) == 0][0]
-            raise InputError(f"'{one.name}' turns round and meets itself at {at(again)}: give it as two boundaries "
-                             "(fem.joined_surfaces), or treat the corner as smooth (a larger feature_angle=)")
+            raise InputError(
+                f"'{one.name}' turns round and meets itself at {at(again)}: give it as two boundaries "
+                "(fem.joined_surfaces), or treat the corner as smooth (a larger feature_angle=)"
+            )
         tied = None if one.tied is None else one.tied[used]
-        found.append((Side(one.name, own, np.searchsorted(used, facets), tied), one.nodes.normals[used]))
+        found.append(
+            (Side(one.name, own, np.searchsorted(used, facets), tied), one.nodes.normals[used])
+        )
     return found
 
 
-def _by_face(faces: Sequence[tuple[Side, Array]], two: Side, matching: Matching, size: float) -> tuple[Nodes, Matched]:
+def _by_face(
+    faces: Sequence[tuple[Side, Array]], two: Side, matching: Matching, size: float
+) -> tuple[Nodes, Matched]:
     """(nodes with the normals and weights of their faces, what they face), ordered by number; ``carried`` are numbers
     of nodes then.
 
@@ -264,14 +330,25 @@ def _by_face(faces: Sequence[tuple[Side, Array]], two: Side, matching: Matching,
                 raise
             refusal = refusal or error
         else:
-            found.append((side.nodes.pick(matched.rows), replace(matched, carried=side.nodes.numbers[matched.carried])))
+            found.append(
+                (
+                    side.nodes.pick(matched.rows),
+                    replace(matched, carried=side.nodes.numbers[matched.carried]),
+                )
+            )
     if refusal is not None and not found:
         raise refusal
     nodes = joined_nodes([nodes for nodes, _ in found])
-    order = np.argsort(nodes.numbers, kind="stable") if len(found) > 1 else np.arange(len(nodes.numbers))
+    order = (
+        np.argsort(nodes.numbers, kind="stable")
+        if len(found) > 1
+        else np.arange(len(nodes.numbers))
+    )
     P = sp.csr_matrix(sp.vstack([matched.P for _, matched in found]))
-    weights, overlap, shares, carried = (np.concatenate([getattr(matched, name) for _, matched in found])
-                                         for name in ("weights", "overlap", "shares", "carried"))
+    weights, overlap, shares, carried = (
+        np.concatenate([getattr(matched, name) for _, matched in found])
+        for name in ("weights", "overlap", "shares", "carried")
+    )
     whole = Matched(np.arange(len(order)), P, weights, overlap, shares, carried)
     return replace(nodes, weights=weights).pick(order), whole.pick(order)
 
@@ -298,26 +375,39 @@ def _unclamped(space: FemSpace, name: str, nodes: Nodes, two: Side, matched: Mat
     facing = np.asarray(matched.P.argmax(axis=1)).ravel()
     lost = np.flatnonzero(clamped & ~two.nodes.held[facing].all(axis=1))
     if len(lost):
-        raise InputError(f"contact node {at(nodes.points[lost[0]])} of '{name}' is clamped but faces a free node of "
-                         f"'{two.name}': make '{two.name}' the first side, or clamp less")
+        raise InputError(
+            f"contact node {at(nodes.points[lost[0]])} of '{name}' is clamped but faces a free node of "
+            f"'{two.name}': make '{two.name}' the first side, or clamp less"
+        )
     if clamped.all():
-        raise InputError(f"no contact nodes: every node of '{name}' that faces '{two.name}' is clamped, on both "
-                         "sides or tied to the other side; clamp or tie less")
+        raise InputError(
+            f"no contact nodes: every node of '{name}' that faces '{two.name}' is clamped, on both "
+            "sides or tied to the other side; clamp or tie less"
+        )
     if clamped.any() and space.comm.rank == 0:
         log.info("%d clamped nodes of '%s' are left out of the contact", clamped.sum(), name)
     return np.asarray(~clamped)
 
 
-def _gap(space: FemSpace, name: str, two: Side, nodes: Nodes, directions: Array, matched: Matched) -> Array:
+def _gap(
+    space: FemSpace, name: str, two: Side, nodes: Nodes, directions: Array, matched: Matched
+) -> Array:
     """Initial gaps n·(P x_2 - x_1) >= 0; overlaps of round-off (1e-12 of the mesh's size) or of polygons count as 0."""
     gap = np.sum((matched.P @ two.nodes.points - nodes.points) * directions, axis=1)
     behind = -gap - np.maximum(matched.overlap, 1e-12 * space.size)
     if behind.max() > 0.0:
         worst = int(np.argmax(behind))
-        raise InputError(f"'{two.name}' lies {-gap[worst]:.3g} m behind '{name}' at {at(nodes.points[worst])}: the "
-                         "bodies overlap there, or these are not the boundaries between them; choose the sides that "
-                         "face, or draw the bodies in touch and make a press fit by fem.InitialStrain, the strain of "
-                         "the body that is too large, or by quasi_static on surface.moving(towards=…), its overlap")
+        raise InputError(
+            f"'{two.name}' lies {-gap[worst]:.3g} m behind '{name}' at {at(nodes.points[worst])}: the "
+            "bodies overlap there, or these are not the boundaries between them; choose the sides that "
+            "face, or draw the bodies in touch and make a press fit by fem.InitialStrain, the strain of "
+            "the body that is too large, or by quasi_static on surface.moving(towards=…), its overlap"
+        )
     if gap.min() < -1e-12 * space.size and space.comm.rank == 0:
-        log.warning("'%s' and '%s' overlap by up to %.3g m: they count as touching there", name, two.name, -gap.min())
+        log.warning(
+            "'%s' and '%s' overlap by up to %.3g m: they count as touching there",
+            name,
+            two.name,
+            -gap.min(),
+        )
     return np.maximum(gap, 0.0)

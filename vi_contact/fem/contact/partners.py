@@ -40,7 +40,13 @@ def in_front(one: Surface, node: int, normal: Array, two: Surface, partner: int)
 
 
 def one_of(
-    one: Surface, node: int, normal: Array, two: Surface, partners: Indices, apart: Array, close: float
+    one: Surface,
+    node: int,
+    normal: Array,
+    two: Surface,
+    partners: Indices,
+    apart: Array,
+    close: float,
 ) -> int:
     """Return which of several partners a node of side 1 faces; -1 where no single one is right.
 
@@ -68,7 +74,9 @@ def _within(ways: Array, arm: Array) -> Mask:
         return np.zeros(len(ways), dtype=bool)
     arm = arm[seen] / length[seen, None]
     if arm.shape[1] == 1:
-        return np.asarray((ways * arm[:, 0] > 0.0).any(axis=1) | ((arm > 0.0).any() and (arm < 0.0).any()))
+        return np.asarray(
+            (ways * arm[:, 0] > 0.0).any(axis=1) | ((arm > 0.0).any() and (arm < 0.0).any())
+        )
     middle = arm.sum(axis=0)
     if np.linalg.norm(middle) < FLAT:  # the node is in the middle of its facet
         return np.ones(len(ways), dtype=bool)

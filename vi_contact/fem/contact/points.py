@@ -19,8 +19,16 @@ from .nodes import Nodes
 OWNER = "contact_points"
 
 
-def contact_points(system: SemiDiscreteSystem, nodes: Any, normals: Any, *, weights: Any = None, gap0: Any = None,
-                   obstacle: Obstacle | None = None, opposite: Any = None) -> ContactSurface:
+def contact_points(
+    system: SemiDiscreteSystem,
+    nodes: Any,
+    normals: Any,
+    *,
+    weights: Any = None,
+    gap0: Any = None,
+    obstacle: Obstacle | None = None,
+    opposite: Any = None,
+) -> ContactSurface:
     """Make one contact condition gap0 - u·n >= 0 at each listed node, in this order; also node against node.
 
     All ranks give the same. Nodes at which the normal is oblique get frames of their own, and tangents for friction.
@@ -37,15 +45,37 @@ def contact_points(system: SemiDiscreteSystem, nodes: Any, normals: Any, *, weig
     Raises:
         InputError: a system of another kind, nodes that do not exist, normals of no length or along components that
             stand still, gaps below zero, directions of one node that depend on one another."""
-    instance(OWNER, "system", system, SemiDiscreteSystem, "give a system, such as system_from_arrays returns")
+    instance(
+        OWNER,
+        "system",
+        system,
+        SemiDiscreteSystem,
+        "give a system, such as system_from_arrays returns",
+    )
     space = system.space
     if not isinstance(space, MatrixSpace):
-        raise InputError(f"{OWNER} is for systems of own matrices; use fem.contact_surface(points=…) here")
-    agree(space.comm, OWNER, {"nodes": nodes, "normals": normals, "weights": weights, "gap0": gap0,
-                              "obstacle": obstacle, "opposite": opposite})
-    optional(provides, OWNER, "obstacle", obstacle, ("directions", "gap"), "give HalfSpace(…) or another")
+        raise InputError(
+            f"{OWNER} is for systems of own matrices; use fem.contact_surface(points=…) here"
+        )
+    agree(
+        space.comm,
+        OWNER,
+        {
+            "nodes": nodes,
+            "normals": normals,
+            "weights": weights,
+            "gap0": gap0,
+            "obstacle": obstacle,
+            "opposite": opposite,
+        },
+    )
+    optional(
+        provides, OWNER, "obstacle", obstacle, ("directions", "gap"), "give HalfSpace(…) or another"
+    )
     if obstacle is not None and (gap0 is not None or opposite is not None):
-        raise InputError(f"{OWNER}: the obstacle gives the gaps; leave out gap0 and opposite, or the obstacle")
+        raise InputError(
+            f"{OWNER}: the obstacle gives the gaps; leave out gap0 and opposite, or the obstacle"
+        )
     numbers = integers(OWNER, "nodes", nodes, (None,))
     m, d = len(numbers), space.dimension
     if not m:
@@ -53,7 +83,9 @@ def contact_points(system: SemiDiscreteSystem, nodes: Any, normals: Any, *, weig
     outward = _spread("normals", normals, (m, d))
     length = np.linalg.norm(outward, axis=1)
     if not length.all():
-        raise InputError(f"{OWNER}: the normal of node {numbers[np.argmin(length)]} is zero; give its direction")
+        raise InputError(
+            f"{OWNER}: the normal of node {numbers[np.argmin(length)]} is zero; give its direction"
+        )
     area = _spread("weights", 1.0 if weights is None else weights, (m,), "m²")
     every = _nodes(space, "nodes", numbers, outward / length[:, None], area)
     directions, faced = every.normals, None
@@ -62,8 +94,12 @@ def contact_points(system: SemiDiscreteSystem, nodes: Any, normals: Any, *, weig
         with together(space.comm):  # an obstacle of the user's may fail on one rank
             directions, gap = facing(obstacle, every.points, every.normals)
     if opposite is not None:
-        faced = _nodes(space, "opposite", integers(OWNER, "opposite", opposite, (m,)), -every.normals, area)
-        gap = gap if gap0 is not None else np.sum((faced.points - every.points) * directions, axis=1)
+        faced = _nodes(
+            space, "opposite", integers(OWNER, "opposite", opposite, (m,)), -every.normals, area
+        )
+        gap = (
+            gap if gap0 is not None else np.sum((faced.points - every.points) * directions, axis=1)
+        )
     with together(space.comm):
         gap = admissible_gap(gap, every.points, space.size)
     own = np.flatnonzero(space.blocks_of(numbers) >= 0)
@@ -78,12 +114,19 @@ def _spread(meaning: str, value: Any, shape: tuple[int, ...], unit: str = "") ->
     return np.array(np.broadcast_to(array(OWNER, meaning, value, once, unit=unit), shape))
 
 
-def _nodes(space: MatrixSpace, meaning: str, numbers: Indices, normals: Array, weights: Array) -> Nodes:
+def _nodes(
+    space: MatrixSpace, meaning: str, numbers: Indices, normals: Array, weights: Array
+) -> Nodes:
     """What all ranks need to know of nodes. Collective."""
-    d, own = space.dimension, np.column_stack([np.ones(len(space.nodes)), space.points, space.held, space.numbers])
+    d, own = (
+        space.dimension,
+        np.column_stack([np.ones(len(space.nodes)), space.points, space.held, space.numbers]),
+    )
     found = space.at_nodes(numbers, own)
     for number in numbers[found[:, 0] == 0.0]:
-        raise InputError(f"{OWNER}: {meaning} has node {number}, which the system does not have; give numbers from 0 "
-                         "on, in the order of its coordinates")
+        raise InputError(
+            f"{OWNER}: {meaning} has node {number}, which the system does not have; give numbers from 0 "
+            "on, in the order of its coordinates"
+        )
     points, held, unknowns = np.split(found[:, 1:], [d, 2 * d], axis=1)
     return Nodes(numbers, points, normals, weights, held > 0.0, unknowns.astype(np.int64))

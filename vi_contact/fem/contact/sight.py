@@ -51,11 +51,19 @@ def facets_of(side: Side, sense: int) -> Facets:
     angle = np.arctan2(cross(seen[:, :1], seen), np.sum(seen[:, :1] * seen, axis=2)) % (2.0 * np.pi)
     angle[:, 0] = 0.0
     order = np.argsort(angle, axis=1)
-    nodes, corners = np.take_along_axis(nodes, order, axis=1), np.take_along_axis(corners, order[:, :, None], axis=1)
-    seen, reach = np.take_along_axis(seen, order[:, :, None], axis=1), np.linalg.norm(spokes, axis=2).max(axis=1)
+    nodes, corners = (
+        np.take_along_axis(nodes, order, axis=1),
+        np.take_along_axis(corners, order[:, :, None], axis=1),
+    )
+    seen, reach = (
+        np.take_along_axis(seen, order[:, :, None], axis=1),
+        np.linalg.norm(spokes, axis=2).max(axis=1),
+    )
     for bad in np.flatnonzero((turns(seen) <= SLIVER * reach[:, None] ** 2).any(axis=1)):
-        raise InputError(f"a facet of '{side.name}' at {at(middles[bad])} is a sliver or not convex: its normal cannot "
-                         "be trusted, so mesh this boundary again")
+        raise InputError(
+            f"a facet of '{side.name}' at {at(middles[bad])} is a sliver or not convex: its normal cannot "
+            "be trusted, so mesh this boundary again"
+        )
     return Facets(nodes[:, ::sense], corners[:, ::sense], middles, normals, reach)
 
 
@@ -85,11 +93,22 @@ def looks_of(ours: Facets, nodes: Nodes) -> Looks:
     normals = nodes.normals[ours.nodes]
     plane = np.linalg.norm(normals - ours.normals[:, None, :], axis=2).max(axis=1) < 1e-12
     facet = np.concatenate([np.flatnonzero(plane), np.repeat(np.flatnonzero(~plane), v)])
-    asking = np.concatenate([np.ones((plane.sum(), v)), np.tile(np.eye(v), ((~plane).sum(), 1))]) > 0.0
+    asking = (
+        np.concatenate([np.ones((plane.sum(), v)), np.tile(np.eye(v), ((~plane).sum(), 1))]) > 0.0
+    )
     along = np.concatenate([ours.normals[plane], normals[~plane].reshape(-1, 3)])
     frames, slant = nodal_frames(along)[:, :, 1:], np.sum(along * ours.normals[facet], axis=1)
     polygons = np.einsum("kvi,kic->kvc", ours.corners[facet] - ours.middles[facet, None, :], frames)
-    looks = Looks(ours.nodes[facet], ours.middles[facet], ours.reach[facet], along, frames, polygons, slant, asking)
+    looks = Looks(
+        ours.nodes[facet],
+        ours.middles[facet],
+        ours.reach[facet],
+        along,
+        frames,
+        polygons,
+        slant,
+        asking,
+    )
     return looks.pick(np.flatnonzero((slant > EDGE_ON) & (turns(polygons) > 0.0).all(axis=1)))
 
 
@@ -111,8 +130,11 @@ class Pieces(Rows):
 
 def joined(parts: list[Pieces]) -> Pieces:
     """Return the pieces of all parts, one part after the other."""
-    fields = {name: np.concatenate([getattr(part, name) for part in parts])
-              for name in Pieces.__dataclass_fields__ if name != "polygons"}
+    fields = {
+        name: np.concatenate([getattr(part, name) for part in parts])
+        for name in Pieces.__dataclass_fields__
+        if name != "polygons"
+    }
     return Pieces(polygons=stacked([part.polygons for part in parts]), **fields)
 
 
@@ -127,7 +149,9 @@ def shared(looks: Looks, theirs: Facets, look: Indices, facet: Indices) -> Piece
     seen = np.einsum("kvi,kic->kvc", theirs.corners[facet] - looks.middles[look, None, :], frames)
     polygons = overlaps(seen, looks.polygons[look])
     normals = theirs.normals[facet]
-    height = np.column_stack([np.sum(offset * normals, axis=1), -np.einsum("kic,ki->kc", frames, normals)])
+    height = np.column_stack(
+        [np.sum(offset * normals, axis=1), -np.einsum("kic,ki->kc", frames, normals)]
+    )
     found = Pieces(look, facet, polygons, seen, height / slope[:, None])
     large = areas(polygons) > SHARED * areas(looks.polygons)[look]
     return found.pick(np.flatnonzero(large & (turns(seen) > 0.0).all(axis=1)))
@@ -139,7 +163,12 @@ def opposite(looks: Looks, theirs: Facets, tree: Any) -> tuple[Pieces, Array]:
     k, size = len(looks.nodes), areas(looks.polygons)
     found, radius = nearby(looks, theirs, tree)
     sure = complete(found, looks, theirs, radius)
-    found = joined([found.pick(np.flatnonzero(sure[found.look])), *everything(looks, np.flatnonzero(~sure), theirs)])
+    found = joined(
+        [
+            found.pick(np.flatnonzero(sure[found.look])),
+            *everything(looks, np.flatnonzero(~sure), theirs),
+        ]
+    )
     twice = np.bincount(found.look, areas(found.polygons), k) > (1.0 + WHOLE) * size
     found = nearest(found, twice | (layers(found, theirs, k) > 1), size)
     return found, np.bincount(found.look, areas(found.polygons), k) / size
@@ -148,7 +177,9 @@ def opposite(looks: Looks, theirs: Facets, tree: Any) -> tuple[Pieces, Array]:
 def nearby(looks: Looks, theirs: Facets, tree: Any) -> tuple[Pieces, Array]:
     """Return (what looks share with facets of side 2 in a ball around each, the balls' radii [m]): large enough for the
     facets next to the one with the nearest middle; where it holds too many nothing is looked at."""
-    radius = (tree.query(looks.middles)[0] + looks.reach + float(theirs.reach.max())) * (1.0 + WHOLE)
+    radius = (tree.query(looks.middles)[0] + looks.reach + float(theirs.reach.max())) * (
+        1.0 + WHOLE
+    )
     few = tree.query_ball_point(looks.middles, radius, return_length=True) <= NEARBY
     near = tree.query_ball_point(looks.middles, np.where(few, radius, 0.0))
     look = np.repeat(np.arange(len(radius)), [len(one) for one in near])
@@ -160,7 +191,10 @@ def complete(found: Pieces, looks: Looks, theirs: Facets, radius: Array) -> Mask
 
     Where one layer, at most h away along the normal, covers all of a look, a nearer facet has its middle at most h
     along the normal and reach_1 + reach_2 beside it: within sqrt(h² + (reach_1 + reach_2)²) of the look's middle."""
-    covered, farthest = np.bincount(found.look, areas(found.polygons), len(radius)), np.zeros(len(radius))
+    covered, farthest = (
+        np.bincount(found.look, areas(found.polygons), len(radius)),
+        np.zeros(len(radius)),
+    )
     np.maximum.at(farthest, found.look, found.distances(found.polygons).max(axis=1, initial=0.0))
     whole = np.abs(covered / areas(looks.polygons) - 1.0) <= WHOLE
     inside = np.hypot(farthest, looks.reach + float(theirs.reach.max())) <= radius
@@ -171,9 +205,15 @@ def everything(looks: Looks, rows: Indices, theirs: Facets) -> Iterator[Pieces]:
     """Yield what these rows of looks share with any facet of side 2, without those whose normal misses a ball around
     all of it."""
     middle = 0.5 * (theirs.middles.min(axis=0) + theirs.middles.max(axis=0))
-    span = looks.reach + float(theirs.reach.max()) + np.linalg.norm(theirs.middles - middle, axis=1).max()
+    span = (
+        looks.reach
+        + float(theirs.reach.max())
+        + np.linalg.norm(theirs.middles - middle, axis=1).max()
+    )
     rows = rows[beside(looks, rows, middle) <= (1.0 + WHOLE) * span[rows]]
-    for some in np.array_split(rows, -(-len(rows) * len(theirs.nodes) // DISTANCES)) if len(rows) else ():
+    for some in (
+        np.array_split(rows, -(-len(rows) * len(theirs.nodes) // DISTANCES)) if len(rows) else ()
+    ):
         away = beside(looks, some[:, None], theirs.middles)
         look, facet = np.nonzero(away <= (1.0 + WHOLE) * (looks.reach[some, None] + theirs.reach))
         yield shared(looks, theirs, some[look], facet)
@@ -206,11 +246,15 @@ def nearest(pieces: Pieces, several: Mask, size: Array) -> Pieces:
         one, two = ours.pick(piece[rows]), ours.pick(other[rows])
         common = overlaps(one.polygons, two.polygons)
         middles, shares = common.mean(axis=1, keepdims=True), areas(common)
-        hides[rows] = (shares > least[piece[rows]]) & (two.distances(middles) < one.distances(middles))[:, 0]
+        hides[rows] = (shares > least[piece[rows]]) & (
+            two.distances(middles) < one.distances(middles)
+        )[:, 0]
     piece, other = piece[hides], other[hides]
     turn = np.arange(len(piece)) - np.searchsorted(piece, piece)
     owner, left = np.arange(len(ours.look)), ours.polygons
-    for k in range(int(turn.max(initial=-1)) + 1):  # what is left of each, without the next that hides it
+    for k in range(
+        int(turn.max(initial=-1)) + 1
+    ):  # what is left of each, without the next that hides it
         hider = np.full(len(ours.look), -1)
         hider[piece[turn == k]] = other[turn == k]
         cut_now = hider[owner] >= 0

@@ -34,9 +34,15 @@ log = logging.getLogger(__name__)
 
 
 @stage("contact")
-def contact_surface(system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obstacle | None = None,
-                    points: Sequence[Sequence[float]] | None = None, feature_angle: float = FEATURE_ANGLE,
-                    hinges: bool = False) -> ContactSurface:
+def contact_surface(
+    system: SemiDiscreteSystem,
+    facets: Facets,
+    *,
+    obstacle: Obstacle | None = None,
+    points: Sequence[Sequence[float]] | None = None,
+    feature_angle: float = FEATURE_ANGLE,
+    hinges: bool = False,
+) -> ContactSurface:
     """Make the contact conditions of a part of the boundary, or of listed points of it only.
 
     Nodal weights are ∫ phi_i times the thickness of the section, so that r_n / weights is in Pa. Nodal normals have the
@@ -59,9 +65,22 @@ def contact_surface(system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obs
         InputError: no contact nodes, nodes that only glue two bodies together, a listed point that is clamped or not on
             the facets, a contact direction that is
             partly prescribed, initial penetration, a node with more faces than the body has dimensions."""
-    space = contact_space("contact_surface", system, {"facets": facets}, points, obstacle=obstacle,
-                          feature_angle=feature_angle)
-    optional(provides, "contact_surface", "obstacle", obstacle, ("directions", "gap"), "give HalfSpace(…) or another")
+    space = contact_space(
+        "contact_surface",
+        system,
+        {"facets": facets},
+        points,
+        obstacle=obstacle,
+        feature_angle=feature_angle,
+    )
+    optional(
+        provides,
+        "contact_surface",
+        "obstacle",
+        obstacle,
+        ("directions", "gap"),
+        "give HalfSpace(…) or another",
+    )
     angle = checked_angle("contact_surface", feature_angle)
     flag("contact_surface", "hinges", hinges)
     comm, every = space.comm, nodes_on(space, facets)
@@ -69,7 +88,11 @@ def contact_surface(system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obs
     if not hinges:
         refuse_hinges("contact_surface", (facets.name,), gathered_points(comm, every, hinge))
     chosen = None if points is None else listed(space, everywhere(comm, whole), points, facets.name)
-    whole = free_nodes(space, whole, facets.name) if chosen is None else whole.pick(_rows_of(whole, chosen))
+    whole = (
+        free_nodes(space, whole, facets.name)
+        if chosen is None
+        else whole.pick(_rows_of(whole, chosen))
+    )
     around = boundary(space, facets, beyond=angle)
     nodes, _ = split(space, around, whole, angle)
     slots = slots_of(comm, _places(nodes, chosen))
@@ -82,13 +105,18 @@ def contact_surface(system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obs
     slots = slots_of(comm, _places(nodes, chosen))
     weights = nodes.weights * space.forms.section.thickness
     tell_corners(space, facets.name, nodes, slots, angle)
-    beside = borrowed(space, facets, every.numbers if chosen is None else every.numbers[:0], nodes.numbers)
+    beside = borrowed(
+        space, facets, every.numbers if chosen is None else every.numbers[:0], nodes.numbers
+    )
     conditions = NodalConditions(
         nodes, directions, slots, bubbles=averaged(space, facets, nodes), borrowed=beside
     )
     held, kept = every.held.all(axis=1), np.isin(every.numbers, whole.numbers)
     kinds = dict(clamped_or_prescribed(space, every, held))
-    kinds |= {"not listed": ~(held | kept), "tied to another": kept & ~np.isin(every.numbers, nodes.numbers)}
+    kinds |= {
+        "not listed": ~(held | kept),
+        "tied to another": kept & ~np.isin(every.numbers, nodes.numbers),
+    }
     watched: tuple[Watched, ...] = ()
     if chosen is None:
         lost, _ = split(space, around, every.pick(held), angle)
@@ -96,7 +124,9 @@ def contact_surface(system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obs
     kinds["shared with another body"] = hinge
     census = census_on_ranks(comm, facets.name, every, kinds, len(slots))
     tell(comm, census)
-    surface = surface_of(space, [conditions], gap0=gap, weights=weights, censuses=(census,), watched=watched)
+    surface = surface_of(
+        space, [conditions], gap0=gap, weights=weights, censuses=(census,), watched=watched
+    )
     return replace(surface, **prescribed_motion(space, conditions))
 
 
@@ -112,62 +142,101 @@ def prescribed_motion(space: FemSpace, conditions: NodalConditions) -> dict[str,
     return {"motion": lambda t: moved(values(t))[0], "slide": lambda t: moved(values(t))[1]}
 
 
-def moved_by_held(space: FemSpace, conditions: Sequence[NodalConditions]) -> Callable[[Array], tuple[Array, Array]]:
+def moved_by_held(
+    space: FemSpace, conditions: Sequence[NodalConditions]
+) -> Callable[[Array], tuple[Array, Array]]:
     """Return a function that tells how far nodal displacements (k, d) of held components move the obstacles of these
     conditions towards their nodes, (m,), and along their tangents, (m, d-1). Both are collective."""
-    frames, free = NodalFrames(*given(conditions)), ~joined_nodes([one.nodes for one in conditions]).held
-    free = np.take_along_axis(free, tangential_columns(frames.column, space.dimension), axis=1) & frames.rubs
+    frames, free = (
+        NodalFrames(*given(conditions)),
+        ~joined_nodes([one.nodes for one in conditions]).held,
+    )
+    free = (
+        np.take_along_axis(free, tangential_columns(frames.column, space.dimension), axis=1)
+        & frames.rubs
+    )
     tangents, directions = tangent_vectors(frames.directions, frames.place), frames.directions
-    faced = [[part for part in (one.facing, *one.bubbles) if part is not None] for one in conditions]
+    faced = [
+        [part for part in (one.facing, *one.bubbles) if part is not None] for one in conditions
+    ]
     own = [np.zeros(0, dtype=np.int64), *(part.nodes.numbers for parts in faced for part in parts)]
     numbers = np.unique(np.concatenate(from_each(space.comm, np.concatenate(own))))
-    shares = [[(part.P, np.searchsorted(numbers, part.nodes.numbers)) for part in parts] for parts in faced]
+    shares = [
+        [(part.P, np.searchsorted(numbers, part.nodes.numbers)) for part in parts]
+        for parts in faced
+    ]
 
     def moved(nodal: Array) -> tuple[Array, Array]:
         nodal = nodal.reshape(-1, space.dimension)
-        found = space.at_nodes(numbers, nodal if space.hierarchy is None else space.hierarchy.bent(nodal))
-        there = np.concatenate([sum((P @ found[place] for P, place in parts), start=np.zeros_like(one.directions))
-                                for one, parts in zip(conditions, shares, strict=True)])
+        found = space.at_nodes(
+            numbers, nodal if space.hierarchy is None else space.hierarchy.bent(nodal)
+        )
+        there = np.concatenate(
+            [
+                sum((P @ found[place] for P, place in parts), start=np.zeros_like(one.directions))
+                for one, parts in zip(conditions, shares, strict=True)
+            ]
+        )
         return -np.sum(there * directions, axis=1), np.einsum("ijk,ij->ik", tangents, there) * free
 
     return moved
 
 
-def _obstacle(obstacle: Obstacle | None, size: float, name: str, angle: float,
-              count: int) -> Callable[[Array, Array], tuple[Array, Array]]:
+def _obstacle(
+    obstacle: Obstacle | None, size: float, name: str, angle: float, count: int
+) -> Callable[[Array, Array], tuple[Array, Array]]:
     """What an obstacle answers: directions and initial gaps at points with these normals, of all ``count`` of a
     boundary or of those of a rank."""
+
     def ask(points: Array, normals: Array) -> tuple[Array, Array]:
         if not len(points):  # users' functions need not cope with none
             return np.zeros_like(points), np.zeros(0)
         way = Touching() if obstacle is None else obstacle
-        directions, gap = facing(way, points, normals, name=name, angle=angle, alone=len(points) == count)
+        directions, gap = facing(
+            way, points, normals, name=name, angle=angle, alone=len(points) == count
+        )
         return snapped(directions), admissible_gap(gap, points, size)
 
     return ask
 
 
-def _watched(space: FemSpace, name: str, nodes: Nodes, obstacle: Obstacle | None) -> tuple[Watched, ...]:
+def _watched(
+    space: FemSpace, name: str, nodes: Nodes, obstacle: Obstacle | None
+) -> tuple[Watched, ...]:
     """What watches nodes of this rank that are prescribed in every component, at each of their faces that looks towards
     the obstacle. InputError where such a face is in the obstacle at the start. Collective."""
     slots = slots_of(space.comm, nodes.numbers)
-    directions, gap = asked(space.comm, slots, _looking(obstacle, space.size), nodes.points, nodes.normals)
+    directions, gap = asked(
+        space.comm, slots, _looking(obstacle, space.size), nodes.points, nodes.normals
+    )
     rows = np.flatnonzero(directions.any(axis=1))
     return watched_nodes(space, name, nodes.pick(rows), directions[rows], gap[rows])
 
 
-def _looking(obstacle: Obstacle | None, size: float) -> Callable[[Array, Array], tuple[Array, Array]]:
+def _looking(
+    obstacle: Obstacle | None, size: float
+) -> Callable[[Array, Array], tuple[Array, Array]]:
     """What an obstacle answers at points with these normals, directions of zero where they do not lead out of the body
     or the obstacle has no answer."""
+
     def ask(points: Array, normals: Array) -> tuple[Array, Array]:
         directions, gap = np.zeros_like(points), np.zeros(len(points))
         try:
-            found = facing(Touching() if obstacle is None else obstacle, points, normals) if len(points) else None
+            found = (
+                facing(Touching() if obstacle is None else obstacle, points, normals)
+                if len(points)
+                else None
+            )
         except InputError:
             found = None
         if found is not None:
-            rows = np.flatnonzero(np.sum(found[0] * normals, axis=1) > EDGE_ON * np.linalg.norm(found[0], axis=1))
-            directions[rows], gap[rows] = snapped(found[0][rows]), admissible_gap(found[1][rows], points[rows], size)
+            rows = np.flatnonzero(
+                np.sum(found[0] * normals, axis=1) > EDGE_ON * np.linalg.norm(found[0], axis=1)
+            )
+            directions[rows], gap[rows] = (
+                snapped(found[0][rows]),
+                admissible_gap(found[1][rows], points[rows], size),
+            )
         return directions, gap
 
     return ask
@@ -187,7 +256,9 @@ def _places(nodes: Nodes, chosen: Indices | None) -> Indices:
     return np.asarray(order[np.searchsorted(chosen, nodes.numbers, sorter=order)])
 
 
-def one_per_direction(whole: Nodes, nodes: Nodes, directions: Array, gap: Array) -> tuple[Nodes, Array, Array]:
+def one_per_direction(
+    whole: Nodes, nodes: Nodes, directions: Array, gap: Array
+) -> tuple[Nodes, Array, Array]:
     """Return (nodes, directions, gaps), faces of one direction at a node as one condition: weights added, smaller gap.
 
     ``whole``: the nodes with the weights of all their faces."""
@@ -196,10 +267,14 @@ def one_per_direction(whole: Nodes, nodes: Nodes, directions: Array, gap: Array)
     weights, gap, kept = nodes.weights.copy(), gap.copy(), np.ones(len(nodes.numbers), dtype=bool)
     numbers, starts, counts = np.unique(nodes.numbers, return_index=True, return_counts=True)
     entire = dict(zip(whole.numbers.tolist(), whole.weights, strict=True))
-    for node, start, count in zip(*(column[counts > 1].tolist() for column in (numbers, starts, counts)), strict=True):
+    for node, start, count in zip(
+        *(column[counts > 1].tolist() for column in (numbers, starts, counts)), strict=True
+    ):
         before: list[int] = []  # the rows of a node follow one another
         for row in range(start, start + count):
-            alike = [other for other in before if directions[row] @ directions[other] > 1.0 - PARALLEL]
+            alike = [
+                other for other in before if directions[row] @ directions[other] > 1.0 - PARALLEL
+            ]
             if alike:
                 weights[alike[0]] += weights[row]
                 gap[alike[0]] = min(gap[alike[0]], gap[row])
@@ -211,15 +286,18 @@ def one_per_direction(whole: Nodes, nodes: Nodes, directions: Array, gap: Array)
     return replace(nodes, weights=weights).pick(kept), directions[kept], gap[kept]
 
 
-def contact_space(owner: str, system: SemiDiscreteSystem, groups: Mapping[str, Facets], points: Any,
-                  **others: Any) -> FemSpace:
+def contact_space(
+    owner: str, system: SemiDiscreteSystem, groups: Mapping[str, Facets], points: Any, **others: Any
+) -> FemSpace:
     """Return the space of a system; InputError for another kind, groups of another mesh, and a list of no points, and
     where ranks give other ``groups``, ``points`` or ``others``. Collective."""
     space = space_of(owner, system)
     agree(space.comm, owner, {**groups, "points": points, **others})
     for meaning, group in groups.items():
         facets_of(owner, meaning, group, space.mesh)
-    for point in () if points is None else several(owner, "points", points, "give a list of points, or None"):
+    for point in (
+        () if points is None else several(owner, "points", points, "give a list of points, or None")
+    ):
         several(owner, "a point", point, f"give {space.dimension} coordinates")
         array(owner, "a point", point, (None,))
     return space
@@ -234,13 +312,19 @@ def nodes_on(space: FemSpace, facets: Facets) -> Nodes:
     blocks = blocks[np.argsort(space.nodes[blocks])]
     weights, sums, held = values[blocks, 0], values[blocks, 1:], space.held[blocks]
     if not largest(space.comm, len(blocks)):
-        raise InputError(f"no contact nodes: boundary group '{facets.name}' is empty: choose a group with facets")
+        raise InputError(
+            f"no contact nodes: boundary group '{facets.name}' is empty: choose a group with facets"
+        )
     if largest(space.comm, not weights.all()):
-        raise InputError(f"boundary group '{facets.name}' lies inside the body, where cells on both sides share its "
-                         "nodes: cut the mesh open there (meshes.cut.CutOpen), or choose an outer boundary")
+        raise InputError(
+            f"boundary group '{facets.name}' lies inside the body, where cells on both sides share its "
+            "nodes: cut the mesh open there (meshes.cut.CutOpen), or choose an outer boundary"
+        )
     length = np.linalg.norm(sums, axis=1)[:, None]
     normals = in_symmetry_planes(sums / np.maximum(length, np.finfo(float).tiny), held)
-    return Nodes(space.nodes[blocks], space.points[blocks], normals, weights, held, space.numbers[blocks])
+    return Nodes(
+        space.nodes[blocks], space.points[blocks], normals, weights, held, space.numbers[blocks]
+    )
 
 
 def free_nodes(space: FemSpace, nodes: Nodes, name: str) -> Nodes:
@@ -248,8 +332,10 @@ def free_nodes(space: FemSpace, nodes: Nodes, name: str) -> Nodes:
     clamped = nodes.held.all(axis=1)
     count = round(total(space.comm, clamped.sum()))
     if not largest(space.comm, (~clamped).any()):
-        raise InputError(f"no contact nodes: every node of boundary group '{name}' is also clamped, and a point cannot "
-                         "be clamped and in contact: choose another boundary or clamp less")
+        raise InputError(
+            f"no contact nodes: every node of boundary group '{name}' is also clamped, and a point cannot "
+            "be clamped and in contact: choose another boundary or clamp less"
+        )
     if count:
         log.info("%d clamped nodes of '%s' are left out of the contact surface", count, name)
     return nodes.pick(~clamped)
@@ -265,22 +351,34 @@ def listed(space: FemSpace, nodes: Nodes, points: Sequence[Sequence[float]], nam
         distance = np.linalg.norm(nodes.points - x, axis=1)
         row = int(np.argmin(distance))
         if distance[row] > 0.05 * space.size:
-            raise InputError(f"contact point {at(x)} is {distance[row]:.3g} m away from boundary group '{name}': "
-                             "give a point on it")
+            raise InputError(
+                f"contact point {at(x)} is {distance[row]:.3g} m away from boundary group '{name}': "
+                "give a point on it"
+            )
         if distance[row] > 1e-6 * space.size and space.comm.rank == 0:
-            log.warning("contact point %s is replaced by the nearest node, %.3g m away", at(x), distance[row])
+            log.warning(
+                "contact point %s is replaced by the nearest node, %.3g m away",
+                at(x),
+                distance[row],
+            )
         if nodes.held[row].all():
             raise InputError(f"contact point {at(x)} is also clamped: leave it out, or clamp less")
         if row in rows:
-            raise InputError(f"contact point {at(x)} is listed twice (nearest node {nodes.numbers[row]}): list each "
-                             "once")
+            raise InputError(
+                f"contact point {at(x)} is listed twice (nearest node {nodes.numbers[row]}): list each "
+                "once"
+            )
         rows.append(row)
     if not rows:
-        raise InputError(f"no contact nodes: the list of contact points on '{name}' is empty: give points")
+        raise InputError(
+            f"no contact nodes: the list of contact points on '{name}' is empty: give points"
+        )
     return np.asarray(nodes.numbers[rows])
 
 
-def merged(space: FemSpace, name: str, nodes: Nodes, directions: Array, angle: float) -> tuple[Nodes, Array, Any]:
+def merged(
+    space: FemSpace, name: str, nodes: Nodes, directions: Array, angle: float
+) -> tuple[Nodes, Array, Any]:
     """Return (nodes, directions, shares (k, m)) of the k conditions that are left of the m of all ranks when nodes that
     move as one (tied boundaries) have one for each face: sums of weights, means with shares by weight.
 
@@ -291,27 +389,45 @@ def merged(space: FemSpace, name: str, nodes: Nodes, directions: Array, angle: f
         turn = directions[alike] @ directions[row]
         if turn.max(initial=-2.0) < np.cos(angle):
             partly = leaders[row] < 0
-            how = "is tied in some components only" if partly else "is tied to a node outside this contact"
-            remedy = "tie all components" if partly else "add the boundary of that node to the group"
-            raise InputError(f"contact node {at(nodes.points[row])} of '{name}' {how}: leave it out, by listing the "
-                             f"others as points=, or {remedy}")
+            how = (
+                "is tied in some components only"
+                if partly
+                else "is tied to a node outside this contact"
+            )
+            remedy = (
+                "tie all components" if partly else "add the boundary of that node to the group"
+            )
+            raise InputError(
+                f"contact node {at(nodes.points[row])} of '{name}' {how}: leave it out, by listing the "
+                f"others as points=, or {remedy}"
+            )
         target[row] = alike[turn.argmax()]
     kept, place = np.unique(target, return_inverse=True)
     sums = sp.csr_matrix((nodes.weights, (place.ravel(), np.arange(len(target)))))
     weights = np.asarray(sums.sum(axis=1)).ravel()
     shares = sp.csr_matrix(sp.diags([1.0 / weights], [0]) @ sums)
-    directions = np.where((np.diff(shares.indptr) > 1)[:, None], snapped(shares @ directions), directions[kept])
+    directions = np.where(
+        (np.diff(shares.indptr) > 1)[:, None], snapped(shares @ directions), directions[kept]
+    )
     return replace(nodes.pick(kept), weights=weights), directions, shares
 
 
-def with_ties(space: FemSpace, name: str, nodes: Nodes, directions: Array, gap: Array, angle: float) -> Any:
+def with_ties(
+    space: FemSpace, name: str, nodes: Nodes, directions: Array, gap: Array, angle: float
+) -> Any:
     """Return (nodes, directions, gaps) of this rank, those of nodes that move as one ``merged``. Collective."""
     tied = np.isin(nodes.numbers, space.tied_nodes)
     parts = from_each(space.comm, (nodes.pick(tied), directions[tied], gap[tied]))
-    every, (n, g) = joined_nodes([part[0] for part in parts]), (np.concatenate([p[i] for p in parts]) for i in (1, 2))
+    every, (n, g) = (
+        joined_nodes([part[0] for part in parts]),
+        (np.concatenate([p[i] for p in parts]) for i in (1, 2)),
+    )
     if not len(g):
         return nodes, directions, gap
     every, n, shares = merged(space, name, every, n, angle)
     own = np.flatnonzero(space.blocks_of(every.numbers) >= 0)
-    nodes, directions = joined_nodes([nodes.pick(~tied), every.pick(own)]), np.concatenate([directions[~tied], n[own]])
+    nodes, directions = (
+        joined_nodes([nodes.pick(~tied), every.pick(own)]),
+        np.concatenate([directions[~tied], n[own]]),
+    )
     return nodes, directions, np.concatenate([gap[~tied], (shares @ g)[own]])

@@ -52,7 +52,11 @@ class Watched:
 
     def carried(self, ground: Callable[[float], Array]) -> "Watched":
         """Return the same nodes before an obstacle that the ground carries, t [s] -> (d,) [m]."""
-        return self if self.facing is not None else replace(self, advance=lambda t: -self.directions @ ground(t))
+        return (
+            self
+            if self.facing is not None
+            else replace(self, advance=lambda t: -self.directions @ ground(t))
+        )
 
     def gaps(self, t: float) -> Array:
         """Return the gaps (k,) at time t [m]. Collective."""
@@ -70,14 +74,18 @@ class Watched:
         least = largest(self.space.comm, size) * ROUND_OFF
         if largest(self.space.comm, np.max(behind, initial=-np.inf)) <= least:
             return
-        own = [(float(behind[row]), int(self.nodes.numbers[row]), self.nodes.points[row])
-               for row in np.flatnonzero(behind > least)]
+        own = [
+            (float(behind[row]), int(self.nodes.numbers[row]), self.nodes.points[row])
+            for row in np.flatnonzero(behind > least)
+        ]
         found = [one for part in from_each(self.space.comm, own) for one in part]
         depth, _, point = max(found, key=lambda one: (one[0], -one[1]))
         what = "its obstacle" if self.side is None else f"'{self.side}'"
-        raise InputError(f"contact node {at(point)} of '{self.name}' is prescribed in every component and is driven "
-                         f"{depth:.3g} m into {what} at t = {t:.6g} s: prescribe a motion that keeps off, or only the "
-                         "components at right angles to its contact direction")
+        raise InputError(
+            f"contact node {at(point)} of '{self.name}' is prescribed in every component and is driven "
+            f"{depth:.3g} m into {what} at t = {t:.6g} s: prescribe a motion that keeps off, or only the "
+            "components at right angles to its contact direction"
+        )
 
     def _towards(self, t: float) -> tuple[Array, float]:
         """How far the nodes have moved towards what they face (k,), and the largest displacement [m]. Collective."""
@@ -91,10 +99,19 @@ class Watched:
         return (towards if self.advance is None else towards + self.advance(t)), float(size)
 
 
-def watched_nodes(space: Any, name: str, nodes: Nodes, directions: Array, gap0: Array, facing: Facing | None = None,
-                  side: str | None = None) -> tuple[Watched, ...]:
+def watched_nodes(
+    space: Any,
+    name: str,
+    nodes: Nodes,
+    directions: Array,
+    gap0: Array,
+    facing: Facing | None = None,
+    side: str | None = None,
+) -> tuple[Watched, ...]:
     """Return what watches these nodes of this rank; none where nothing moves that is prescribed. Collective."""
-    if not largest(space.comm, len(nodes.numbers)) or not any(one.moves for one in space.prescribed):
+    if not largest(space.comm, len(nodes.numbers)) or not any(
+        one.moves for one in space.prescribed
+    ):
         return ()
     return (Watched(space, name, nodes, directions, gap0, facing, side),)
 

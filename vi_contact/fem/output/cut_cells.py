@@ -17,15 +17,23 @@ from ..mesh import node_numbers
 from ..space import FemSpace
 
 
-def work_beyond(space: FemSpace, crossed: Mask, level: Callable[[Array], Array], motion: Callable[[Array], Array],
-                density: Array | float, load: Traction | BodyForce | None) -> Array:
+def work_beyond(
+    space: FemSpace,
+    crossed: Mask,
+    level: Callable[[Array], Array],
+    motion: Callable[[Array], Array],
+    density: Array | float,
+    load: Traction | BodyForce | None,
+) -> Array:
     """Return (motions, owned components) ∫ density motion·phi_i over parts of cells, or of the facets of a traction.
 
     The parts of ``crossed`` cells (local mask) where the ``level`` of points (…, d) is not positive. ``motion``: points
     (k, d) -> virtual displacements (motions, k, d), linear in them; ``density``: one for all or one of each local cell.
     Collective."""
     d = space.dimension
-    cells, nodes = _entities(space.mesh, crossed, load.facets.indices if isinstance(load, Traction) else None)
+    cells, nodes = _entities(
+        space.mesh, crossed, load.facets.indices if isinstance(load, Traction) else None
+    )
     whole = space.mesh.geometry.x[nodes][:, :, :d]
     corners, owner = parts(simplices(nodes.shape[1], d - isinstance(load, Traction)), level(whole))
     at = np.matmul(corners, whole[owner])
@@ -34,16 +42,25 @@ def work_beyond(space: FemSpace, crossed: Mask, level: Callable[[Array], Array],
     if isinstance(load, TangentialTraction):
         r = r @ (np.linalg.pinv(edges) @ edges)
     if isinstance(load, Pressure):  # which is the first component of its field
-        centres = space.mesh.geometry.x[compat.geometry_dofmap(space.mesh)[cells]].mean(axis=1)[owner, None, :d]
+        centres = space.mesh.geometry.x[compat.geometry_dofmap(space.mesh)[cells]].mean(axis=1)[
+            owner, None, :d
+        ]
         sides, away = np.diff(whole, axis=1)[owner], whole[owner, :1] - centres
         outward = away - away @ np.linalg.pinv(sides) @ sides
-        r = -(r @ (outward / np.linalg.norm(outward, axis=2, keepdims=True)).swapaxes(1, 2)) * np.eye(d)[0]
-    n = corners.shape[1]  # ∫ f g over a simplex of n corners: (Σf Σg + Σ f g) of its size / (n (n + 1))
+        r = (
+            -(r @ (outward / np.linalg.norm(outward, axis=2, keepdims=True)).swapaxes(1, 2))
+            * np.eye(d)[0]
+        )
+    n = corners.shape[
+        1
+    ]  # ∫ f g over a simplex of n corners: (Σf Σg + Σ f g) of its size / (n (n + 1))
     size = np.sqrt(np.abs(np.linalg.det(edges @ edges.swapaxes(1, 2)))) / factorial(n + 1)
     size = size * np.broadcast_to(density, len(crossed))[cells[owner]]
     shares = np.einsum("p,pnv,jpmd,nm->pvjd", size, corners, r, 1.0 + np.eye(n), optimize=True)
     found = np.zeros((len(space.nodes), len(r), d))
-    for numbers, values in from_each(space.comm, (node_numbers(space.mesh)[nodes[owner]].ravel(), shares)):
+    for numbers, values in from_each(
+        space.comm, (node_numbers(space.mesh)[nodes[owner]].ravel(), shares)
+    ):
         own = space.blocks_of(numbers)
         np.add.at(found, own[own >= 0], values.reshape(-1, len(r), d)[own >= 0])
     return found.swapaxes(0, 1).reshape(len(r), -1)
@@ -66,7 +83,9 @@ def simplices(vertices: int, dimension: int) -> Array:
     """Return (k, n, vertices) shares of the vertices in the corners of the simplices that make up a cell."""
     paths = [range(vertices)]
     if vertices > dimension + 1:  # from the first vertex to the last along the axes, in every order
-        paths = [np.cumsum([0, *(2**axis for axis in order)]) for order in permutations(range(dimension))]
+        paths = [
+            np.cumsum([0, *(2**axis for axis in order)]) for order in permutations(range(dimension))
+        ]
     return np.array([np.eye(vertices)[list(path)] for path in paths])
 
 
@@ -75,8 +94,12 @@ def parts(whole: Array, level: Array) -> tuple[Array, Indices]:
     (k, n, v) of each entity lies where the level of its vertices (entities, v), linear in them, is not positive."""
     owner = np.repeat(np.arange(len(level)), len(whole))
     corners = np.tile(whole, (len(level), 1, 1))
-    corners = np.concatenate([corners, corners @ level[owner][:, :, None]], axis=2)  # their level as last share
-    for _ in range(whole.shape[1] - 1):  # a cut edge leaves one corner less on the wrong side in both halves
+    corners = np.concatenate(
+        [corners, corners @ level[owner][:, :, None]], axis=2
+    )  # their level as last share
+    for _ in range(
+        whole.shape[1] - 1
+    ):  # a cut edge leaves one corner less on the wrong side in both halves
         low, high = corners[:, :, -1].argmin(axis=1), corners[:, :, -1].argmax(axis=1)
         every = np.arange(len(owner))
         below, above = corners[every, low], corners[every, high]

@@ -56,7 +56,9 @@ class VonMises:
         deviator = sigma - mean * ufl.Identity(space.dimension)
         squares = ufl.inner(deviator, deviator) + (3 - space.dimension) * (across - mean) ** 2
         cell = ufl.TestFunction(compat.cell_space(space.mesh))
-        self._form = compat.compile_form(ufl.sqrt(1.5 * squares) * cell * ufl.dx(metadata={"quadrature_degree": 2}))
+        self._form = compat.compile_form(
+            ufl.sqrt(1.5 * squares) * cell * ufl.dx(metadata={"quadrature_degree": 2})
+        )
         self._volume = cell_volumes(space.mesh)
 
     def __call__(self, nodal: Array, t: float = 0.0) -> Array:
@@ -67,9 +69,18 @@ class VonMises:
         return np.asarray(self._assembled(self._form).array_r / self._volume)
 
 
-_CELLS = {(1, 2): "Polyline", (2, 3): "Triangle", (2, 4): "Quadrilateral", (3, 4): "Tetrahedron", (3, 8): "Hexahedron",
-          (1, 3): "Edge_3", (2, 6): "Triangle_6", (2, 9): "Quadrilateral_9", (3, 10): "Tetrahedron_10",
-          (3, 27): "Hexahedron_27"}
+_CELLS = {
+    (1, 2): "Polyline",
+    (2, 3): "Triangle",
+    (2, 4): "Quadrilateral",
+    (3, 4): "Tetrahedron",
+    (3, 8): "Hexahedron",
+    (1, 3): "Edge_3",
+    (2, 6): "Triangle_6",
+    (2, 9): "Quadrilateral_9",
+    (3, 10): "Tetrahedron_10",
+    (3, 27): "Hexahedron_27",
+}
 """XDMF's name of a cell by its dimension and number of nodes."""
 
 _VECTORS = ("u", "v", "a")
@@ -89,7 +100,9 @@ class XDMF:
     def __post_init__(self) -> None:
         attributes(self, counts=("every", "frames_per_file"))
 
-    def open(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]) -> "FrameWriter":
+    def open(
+        self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]
+    ) -> "FrameWriter":
         """Write the mesh; go on after the frames of ``kept`` (step -> time) that are in the folder. Collective."""
         space = problem.system.space
         if isinstance(space, MatrixSpace):
@@ -112,8 +125,14 @@ class Cells:
 class FrameWriter:
     """Write the frames of a run, so many in an HDF5 file."""
 
-    def __init__(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float], per_file: int,
-                 shown: Cells) -> None:
+    def __init__(
+        self,
+        problem: ContactProblem,
+        folder: Path,
+        kept: Mapping[int, float],
+        per_file: int,
+        shown: Cells,
+    ) -> None:
         space: Any = problem.system.space
         self._problem, self._space, self._folder, self._per_file = problem, space, folder, per_file
         self._names = _VECTORS + (_RUBBING if problem.frictional else ())
@@ -154,7 +173,10 @@ class FrameWriter:
 
     def _remove_others(self) -> None:
         """Remove files of frames that hold none of the index; files of others stay."""
-        known, folder = {path for path, _ in self._places.values()}, inner_folder(self._folder, FIELDS)
+        known, folder = (
+            {path for path, _ in self._places.values()},
+            inner_folder(self._folder, FIELDS),
+        )
         for name in os.listdir(folder):
             if folder / name not in known and (FRAME.fullmatch(name) or FRAMES.fullmatch(name)):
                 remove(folder / name)
@@ -162,18 +184,28 @@ class FrameWriter:
     def write(self, state: State, acceleration: Array, report: Report | None = None) -> None:
         """Write a frame of state, acceleration of its step (both in the rotated basis) and report. Collective."""
         problem, space = self._problem, self._space
-        moving = [space.expand(problem.cartesian(x), state.t, derivative)
-                  for derivative, x in enumerate((state.u, state.v, acceleration))]
+        moving = [
+            space.expand(problem.cartesian(x), state.t, derivative)
+            for derivative, x in enumerate((state.u, state.v, acceleration))
+        ]
         von_mises = self._von_mises
-        stress = None if von_mises is None else on_first(space.comm, self._cell_numbers, von_mises(moving[0], state.t))
+        stress = (
+            None
+            if von_mises is None
+            else on_first(space.comm, self._cell_numbers, von_mises(moving[0], state.t))
+        )
         slipping = np.zeros(problem.surface.count, dtype=bool)
         if problem.frictional and report is not None:
             slipping = slipped(report)
-        pressure, status = nodal_contact(problem, state, np.where(state.active, np.where(slipping, 3, 2), 1))
+        pressure, status = nodal_contact(
+            problem, state, np.where(state.active, np.where(slipping, 3, 2), 1)
+        )
         if problem.frictional:
             moving += [between(problem, nodal) for nodal in self._rubbing(state)]
         rows = np.hstack([*(_three(nodal) for nodal in moving), pressure, status])
-        on_root(space.comm, partial(self._write, state, on_first(space.comm, space.nodes, rows), stress))
+        on_root(
+            space.comm, partial(self._write, state, on_first(space.comm, space.nodes, rows), stress)
+        )
 
     def _rubbing(self, state: State) -> list[Array]:
         """Tangential traction and slip at the owned nodes, (k, d) each."""
@@ -193,7 +225,10 @@ class FrameWriter:
         def fill(file: Any) -> None:
             for i, name in enumerate(self._names):
                 file[name] = nodal[:, 3 * i : 3 * i + 3]
-            file["contact_pressure"], file["contact_status"] = nodal[:, -2], nodal[:, -1].astype(np.int32)
+            file["contact_pressure"], file["contact_status"] = (
+                nodal[:, -2],
+                nodal[:, -1].astype(np.int32),
+            )
             if stress is not None:
                 file["von_mises"] = stress
 
@@ -211,8 +246,10 @@ class FrameWriter:
     def _write_index(self) -> None:
         """fields.xdmf with all complete frames."""
         frames = "".join(self._grid(k, t) for k, t in self._times.items())
-        text = ('<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>\n<Grid Name="frames" GridType="Collection" '
-                f'CollectionType="Temporal">\n{frames}</Grid>\n</Domain></Xdmf>\n')
+        text = (
+            '<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>\n<Grid Name="frames" GridType="Collection" '
+            f'CollectionType="Temporal">\n{frames}</Grid>\n</Domain></Xdmf>\n'
+        )
         write_atomically(self._folder / FIELDS_INDEX, text.encode())
 
     def _grid(self, k: int, t: float) -> str:
@@ -220,8 +257,13 @@ class FrameWriter:
         path, group = self._places[k]
         mesh, frame = f"{FIELDS}/mesh.h5", f"{FIELDS}/{path.name}:{group.rstrip('/')}"
 
-        def attribute(name: str, center: str, *shape: int, number: str = "Float", size: int = 8) -> str:
-            kind, item = "Vector" if len(shape) == 2 else "Scalar", _item(shape, f"{frame}/{name}", number, size)
+        def attribute(
+            name: str, center: str, *shape: int, number: str = "Float", size: int = 8
+        ) -> str:
+            kind, item = (
+                "Vector" if len(shape) == 2 else "Scalar",
+                _item(shape, f"{frame}/{name}", number, size),
+            )
             return f'<Attribute Name="{name}" AttributeType="{kind}" Center="{center}">{item}</Attribute>\n'
 
         attributes = [attribute(name, "Node", nodes, 3) for name in self._names]
@@ -232,9 +274,10 @@ class FrameWriter:
         return (
             f'<Grid Name="step {k}" GridType="Uniform"><Time Value="{t!r}"/>\n'
             f'<Topology TopologyType="{self._type}" NumberOfElements="{cells}" NodesPerElement="{corners}">'
-            f'{_item((cells, corners), f"{mesh}:/cells", "Int")}</Topology>\n'
+            f"{_item((cells, corners), f'{mesh}:/cells', 'Int')}</Topology>\n"
             f'<Geometry GeometryType="XYZ">{_item((nodes, 3), f"{mesh}:/points")}</Geometry>\n'
-            f'{"".join(attributes)}</Grid>\n')
+            f"{''.join(attributes)}</Grid>\n"
+        )
 
 
 def nodal_contact(problem: ContactProblem, state: State, status: Array) -> tuple[Array, Array]:
@@ -262,8 +305,12 @@ def between(problem: ContactProblem, nodal: Array, mean: Any = np.mean) -> Array
     space = cast(NodalSpace, problem.system.space)
     if space.hierarchy is None:
         return nodal
-    own = [part.nodes.numbers for one in getattr(problem.surface, "parts", ()) for part in one.bubbles]
-    middles = np.concatenate(from_each(space.comm, np.concatenate([np.zeros(0, dtype=np.int64), *own])))
+    own = [
+        part.nodes.numbers for one in getattr(problem.surface, "parts", ()) for part in one.bubbles
+    ]
+    middles = np.concatenate(
+        from_each(space.comm, np.concatenate([np.zeros(0, dtype=np.int64), *own]))
+    )
     return space.hierarchy.between(nodal, np.isin(space.nodes, middles), mean)
 
 
@@ -293,9 +340,13 @@ def _cells_of_body(problem: ContactProblem) -> Cells:
     if space.forms.tells_stress:
         known_matrices("XDMF, von_mises", problem.system, "K")
     elif space.comm.rank == 0:
-        log.info("XDMF: forms=… have no stress, so frames have no von_mises: give fem.Forms(…, stress=)")
+        log.info(
+            "XDMF: forms=… have no stress, so frames have no von_mises: give fem.Forms(…, stress=)"
+        )
     mesh, stress = space.mesh, VonMises(space.forms) if space.forms.tells_stress else None
     dim = mesh.topology.dim
-    rows = space.node_of_block[compat.cell_blocks(space.V)[: mesh.topology.index_map(dim).size_local]]
+    rows = space.node_of_block[
+        compat.cell_blocks(space.V)[: mesh.topology.index_map(dim).size_local]
+    ]
     order = compat.vtk_order(mesh, rows.shape[1])
     return Cells(_CELLS[dim, rows.shape[1]], rows[:, order], compat.cell_numbers(mesh), stress)

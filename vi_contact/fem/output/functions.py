@@ -32,7 +32,9 @@ ACCURACY = 1e-13  # of a projection, in its residual
 SAME = 1e-9  # of the size of the mesh, and of the longest time
 
 
-def as_function(problem: ContactProblem, state: State, name: str, *, continuous: bool = False) -> Any:
+def as_function(
+    problem: ContactProblem, state: State, name: str, *, continuous: bool = False
+) -> Any:
     """Return a state as a DOLFINx Function: "u" [m], "v" [m/s], "stress" [Pa] (d, d) or "contact_pressure" [Pa].
 
     Where a node of the contact boundary has no pressure of its own, as one that is held, the function has the mean of
@@ -45,7 +47,13 @@ def as_function(problem: ContactProblem, state: State, name: str, *, continuous:
     check_sizes("as_function", problem, state)
     if name != "contact_pressure":
         x, derivative = (state.v, 1) if name == "v" else (state.u, 0)
-        return _function(problem, name, space.expand(problem.cartesian(x), state.t, derivative), state.t, continuous)
+        return _function(
+            problem,
+            name,
+            space.expand(problem.cartesian(x), state.t, derivative),
+            state.t,
+            continuous,
+        )
     pressure = nodal_contact(problem, state, np.ones(len(state.r_n)))[0]
     return _function(problem, name, with_borrowed(problem, pressure)[:, 0], state.t)
 
@@ -68,20 +76,44 @@ def with_borrowed(problem: ContactProblem, pressure: Array) -> Array:
     return kept + between(problem, found)
 
 
-def read_function(problem: ContactProblem, folder: str | Path, name: str, *, t: float | None = None,
-                  frame: int | None = None, continuous: bool = False) -> Any:
+def read_function(
+    problem: ContactProblem,
+    folder: str | Path,
+    name: str,
+    *,
+    t: float | None = None,
+    frame: int | None = None,
+    continuous: bool = False,
+) -> Any:
     """Return a frame in the folder of a run (``fields=fem.XDMF(…)``) as ``as_function`` returns a state.
 
     ``t``: its time [s]; ``frame``: its number in the order of time, 0 for the first and -1 for the last. The run may
     have had any number of ranks. Collective. InputError for a time without a frame, and fields of another mesh."""
     space = _checked("read_function", problem, name, continuous)
     optional(number, "read_function", "t", t, unit="s")
-    optional(instance, "read_function", "frame", frame, int, "give its number, 0 for the first and -1 for the last")
+    optional(
+        instance,
+        "read_function",
+        "frame",
+        frame,
+        int,
+        "give its number, 0 for the first and -1 for the last",
+    )
     kind, comm, d = "u" if name == "stress" else name, space.comm, space.dimension
     points, values, t = comm.bcast(on_root(comm, lambda: _stored(Path(folder), kind, t, frame)))
     fits = len(points) > np.max(space.nodes, initial=-1)
-    fits = fits and np.max(np.abs(points[space.nodes, :d] - space.points), initial=0.0) <= SAME * space.size
-    refuse(["" if fits else f"the fields in '{folder}' are of another mesh: give the problem of that run"], comm)
+    fits = (
+        fits
+        and np.max(np.abs(points[space.nodes, :d] - space.points), initial=0.0) <= SAME * space.size
+    )
+    refuse(
+        [
+            ""
+            if fits
+            else f"the fields in '{folder}' are of another mesh: give the problem of that run"
+        ],
+        comm,
+    )
     if name == "contact_pressure":
         return _function(problem, name, with_borrowed(problem, values[space.nodes, None])[:, 0], t)
     return _function(problem, name, values[space.nodes, :d], t, continuous)
@@ -92,14 +124,22 @@ def _checked(owner: str, problem: Any, name: Any, continuous: Any) -> FemSpace:
     check_problem_given(owner, problem)
     flag(owner, "continuous", continuous)
     if name not in NAMES:
-        raise InputError(f"{owner}: {shown(name)} is not a quantity; give one of {', '.join(map(repr, NAMES))}")
+        raise InputError(
+            f"{owner}: {shown(name)} is not a quantity; give one of {', '.join(map(repr, NAMES))}"
+        )
     return space_of(owner, problem.system)
 
 
-def _function(problem: ContactProblem, name: str, nodal: Array, t: float, continuous: bool = False) -> Any:
+def _function(
+    problem: ContactProblem, name: str, nodal: Array, t: float, continuous: bool = False
+) -> Any:
     """The Function of values at the owned nodes, (k,) or (k, d), at a time; the stress is that of displacements."""
     system, space = problem.system, space_of(name, problem.system)
-    V = system.cached("scalars", lambda: compat.lagrange(space.mesh, space.degree)) if nodal.ndim == 1 else space.V
+    V = (
+        system.cached("scalars", lambda: compat.lagrange(space.mesh, space.degree))
+        if nodal.ndim == 1
+        else space.V
+    )
     found = compat.function(V)
     values = nodal[_blocks(V, space.V)].ravel()
     found.x.array[: values.size] = values
@@ -123,11 +163,23 @@ class Stress:
     """Project sigma(u): M sigma_c = ∫ sigma(u) : tau_c for every component c, by conjugate gradients."""
 
     def __init__(self, space: FemSpace, continuous: bool) -> None:
-        d, degree = space.dimension, space.degree - (compat.is_simplex(space.mesh) and not continuous)
+        d, degree = (
+            space.dimension,
+            space.degree - (compat.is_simplex(space.mesh) and not continuous),
+        )
         self._tensors = compat.lagrange(space.mesh, degree, (d, d), continuous=continuous)
-        self._u, scalars = compat.function(space.V), compat.lagrange(space.mesh, degree, continuous=continuous)
-        self._blocks, dx = _blocks(scalars, self._tensors), ufl.dx(metadata={"quadrature_degree": 2 * degree + 2})
-        self._forms, sigma = space.forms, space.forms.stress(self._u) / space.forms.section.thickness
+        self._u, scalars = (
+            compat.function(space.V),
+            compat.lagrange(space.mesh, degree, continuous=continuous),
+        )
+        self._blocks, dx = (
+            _blocks(scalars, self._tensors),
+            ufl.dx(metadata={"quadrature_degree": 2 * degree + 2}),
+        )
+        self._forms, sigma = (
+            space.forms,
+            space.forms.stress(self._u) / space.forms.section.thickness,
+        )
         self._load = compat.compile_form(ufl.inner(sigma, ufl.TestFunction(self._tensors)) * dx)
         mass = ufl.inner(ufl.TrialFunction(scalars), ufl.TestFunction(scalars)) * dx
         matrix = compat.assemble_matrix(compat.compile_form(mass))
@@ -153,35 +205,65 @@ class Stress:
         return found
 
 
-def _stored(folder: Path, name: str, t: float | None, frame: int | None) -> tuple[Array, Array, float]:
+def _stored(
+    folder: Path, name: str, t: float | None, frame: int | None
+) -> tuple[Array, Array, float]:
     """Points of the mesh, a quantity of a frame at them, and its time."""
     if not is_own(folder / FIELDS_INDEX):
-        raise InputError(f"'{folder}' has no {FIELDS_INDEX}: run again with out and fields=fem.XDMF(every=10)")
+        raise InputError(
+            f"'{folder}' has no {FIELDS_INDEX}: run again with out and fields=fem.XDMF(every=10)"
+        )
     try:
         index: Any = ET.fromstring(read_bytes(folder / FIELDS_INDEX))
-        places = sorted((float(grid.find("Time").get("Value")), grid.find(f"Attribute[@Name='{name}']/DataItem").text)
-                        for grid in index.findall(".//Grid[@GridType='Uniform']"))
+        places = sorted(
+            (
+                float(grid.find("Time").get("Value")),
+                grid.find(f"Attribute[@Name='{name}']/DataItem").text,
+            )
+            for grid in index.findall(".//Grid[@GridType='Uniform']")
+        )
         time, place = places[_chosen([time for time, _ in places], t, frame)]
         file, path = place.split(":")
         known = {str(one.relative_to(folder)): one for one, _ in frames_of(folder).values()}
-        with open_hdf5(inner_folder(folder, FIELDS) / "mesh.h5") as mesh, open_hdf5(known[file]) as fields:
+        with (
+            open_hdf5(inner_folder(folder, FIELDS) / "mesh.h5") as mesh,
+            open_hdf5(known[file]) as fields,
+        ):
             return mesh["points"][()], fields[path][()], time
     except InputError:
         raise
-    except (ET.ParseError, OSError, KeyError, AttributeError, TypeError, ValueError, RuntimeError) as error:
+    except (
+        ET.ParseError,
+        OSError,
+        KeyError,
+        AttributeError,
+        TypeError,
+        ValueError,
+        RuntimeError,
+    ) as error:
         if of_machine(error):
             raise
-        raise InputError(f"the fields in '{folder}' are incomplete or damaged ({error}): run again") from error
+        raise InputError(
+            f"the fields in '{folder}' are incomplete or damaged ({error}): run again"
+        ) from error
 
 
 def _chosen(times: list[float], t: float | None, frame: int | None) -> int:
     """The number of the frame of a time, or of this number."""
-    told = ", ".join(f"{one:.9g}" for one in times[:12]) + (f", … {times[-1]:.9g}" if len(times) > 12 else "")
+    told = ", ".join(f"{one:.9g}" for one in times[:12]) + (
+        f", … {times[-1]:.9g}" if len(times) > 12 else ""
+    )
     stored = f"the {len(times)} frames are at t = {told} s"
     if (t is None) == (frame is None):
         raise InputError(f"a stored frame: give either t or frame, and not both; {stored}")
     slack = SAME * max(map(abs, times), default=0.0)
-    wanted = range(len(times))[frame:][:1] if t is None else [i for i, one in enumerate(times) if abs(one - t) <= slack]
+    wanted = (
+        range(len(times))[frame:][:1]
+        if t is None
+        else [i for i, one in enumerate(times) if abs(one - t) <= slack]
+    )
     if not wanted or (frame or 0) < -len(times):
-        raise InputError(f"no frame {shown(frame) if t is None else f'at t = {shown(t)} s'}: {stored}")
+        raise InputError(
+            f"no frame {shown(frame) if t is None else f'at t = {shown(t)} s'}: {stored}"
+        )
     return wanted[0]

@@ -27,17 +27,23 @@ class LargestStrain:
         """Name largest_shear_strain."""
         return {"largest_shear_strain": ("-", "largest shear strain of any cell since the start")}
 
-    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
+    def start(
+        self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
+    ) -> Row:
         """Measure from this state on. Collective."""
         if resumed is not None:
-            raise InputError("LargestStrain does not know the strains before the checkpoint: run from the start")
+            raise InputError(
+                "LargestStrain does not know the strains before the checkpoint: run from the start"
+            )
         self._problem, self._space = problem, space_of("LargestStrain", problem.system)
         V, d = self._space.V, self._space.dimension
         if d == 1:
             raise InputError("LargestStrain: a body on a line has no shear strain; leave it out")
         tensors = compat.lagrange(V.mesh, 0, (d, d), continuous=False)
         q, eps = ufl.TestFunction(tensors), ufl.sym(ufl.grad(ufl.TrialFunction(V)))
-        self._integral = PetscMatrix(compat.assemble_matrix(compat.compile_form(ufl.inner(q, eps) * ufl.dx)))
+        self._integral = PetscMatrix(
+            compat.assemble_matrix(compat.compile_form(ufl.inner(q, eps) * ufl.dx))
+        )
         volumes = np.array(compat.assemble_vector(compat.compile_form(q[0, 0] * ufl.dx)).array_r)
         self._volumes = volumes.reshape(-1, d * d)[:, :1]
         self._order = compat.cell_blocks(tensors)[: len(self._volumes), 0]
@@ -52,7 +58,9 @@ class LargestStrain:
 
     def _row(self, state: State) -> Row:
         d = self._space.dimension
-        eps = (self._integral @ (self._nodal(state) - self._begin)).reshape(-1, d * d) / self._volumes
+        eps = (self._integral @ (self._nodal(state) - self._begin)).reshape(
+            -1, d * d
+        ) / self._volumes
         square = 2.0 * (np.sum(eps**2, axis=1) - np.sum(eps[:, :: d + 1], axis=1) ** 2 / d)
         self.values = np.maximum(self.values, np.sqrt(np.maximum(square, 0.0))[self._order])
         return {"largest_shear_strain": largest(self._space.comm, self.values.max(initial=0.0))}

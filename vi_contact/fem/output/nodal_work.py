@@ -28,7 +28,9 @@ from ..space import known_matrices, space_of
 
 log = logging.getLogger(__name__)
 
-Beyond = Callable[[Array | float, Any], Array]  # (density, its load or None) -> (motions, owned components)
+Beyond = Callable[
+    [Array | float, Any], Array
+]  # (density, its load or None) -> (motions, owned components)
 # (components of nodes that move, (owned, d) or (owned, 1); centre of their rotations (d,); mask of local cells of the
 # group, ghosts too, None for all; what is taken away of inertia, its damping and loads, or None)
 Rigid = tuple[Mask, Array, Mask | None, Beyond | None]
@@ -50,29 +52,51 @@ class NodalWork:
         loads: those given to ``fem.assemble``: what acts on cells of the group belongs to their balance.
         gravity: acceleration (d,) [m/s²] of ``with_weight``, which acts on the mass of the cells."""
 
-    def __init__(self, owner: str, problem: ContactProblem, loads: Loads, gravity: Sequence[float] | None) -> None:
+    def __init__(
+        self, owner: str, problem: ContactProblem, loads: Loads, gravity: Sequence[float] | None
+    ) -> None:
         space = space_of("NodalWork", problem.system)
         known_matrices("reactions and section forces", problem.system, "MCK")
         self._problem, self.space = problem, space
-        self._loads: Any = [one for one in as_tuple(loads) if not isinstance(one, InitialStrain)]  # known to the body
+        self._loads: Any = [
+            one for one in as_tuple(loads) if not isinstance(one, InitialStrain)
+        ]  # known to the body
         for facets in (getattr(load, "facets", None) for load in self._loads):
             if facets is not None:
                 facets_of("NodalWork", "the facets of loads", facets, space.mesh)
-        self._gravity = np.zeros(space.dimension) if gravity is None else np.asarray(gravity, dtype=float)
+        self._gravity = (
+            np.zeros(space.dimension) if gravity is None else np.asarray(gravity, dtype=float)
+        )
         if self._gravity.shape != (space.dimension,):
-            raise InputError(f"gravity has {self._gravity.size} components: give {space.dimension} numbers")
-        self._r, self._inside = compat.function(space.V), compat.function(compat.cell_space(space.mesh))
-        self._forms = [space.compiled(space.forms.against(name, self._r, self._inside))
-                       if name != "C" or space.forms.damped else None for name in ("K", "C", "M")]
+            raise InputError(
+                f"gravity has {self._gravity.size} components: give {space.dimension} numbers"
+            )
+        self._r, self._inside = (
+            compat.function(space.V),
+            compat.function(compat.cell_space(space.mesh)),
+        )
+        self._forms = [
+            space.compiled(space.forms.against(name, self._r, self._inside))
+            if name != "C" or space.forms.damped
+            else None
+            for name in ("K", "C", "M")
+        ]
         self._initial = [] if space.forms.initial is None else [space.forms.initial]
         self._forms += [space.compiled(one.against(self._r, self._inside)) for one in self._initial]
         g, mesh, h = ufl.TestFunction(space.V), space.mesh, space.forms.section.thickness
         self._load_forms = [  # their products with nodal values of the loads are rᵀf
-            None if isinstance(load, LinearForm)
-            else space.compiled(h * self._inside * ufl.inner(self._r, load.acting(g, mesh)) * load.measure(mesh))
+            None
+            if isinstance(load, LinearForm)
+            else space.compiled(
+                h * self._inside * ufl.inner(self._r, load.acting(g, mesh)) * load.measure(mesh)
+            )
             for load in self._loads
         ]
-        self._nodal = {k: one.full(space, h) for k, one in enumerate(self._loads) if isinstance(one, LinearForm)}
+        self._nodal = {
+            k: one.full(space, h)
+            for k, one in enumerate(self._loads)
+            if isinstance(one, LinearForm)
+        }
         self._tell_constant_loads(owner)
 
     def _tell_constant_loads(self, owner: str) -> None:
@@ -80,25 +104,47 @@ class NodalWork:
         do not carry it. Collective."""
         system, space = self._problem.system, self.space
         theirs = space.comm.sum(system.influence.T @ system.load.constant)
-        if theirs.any() and not (self._loads or self._gravity.any() or self._initial) and space.comm.rank == 0:
+        if (
+            theirs.any()
+            and not (self._loads or self._gravity.any() or self._initial)
+            and space.comm.rank == 0
+        ):
             text = ", ".join(f"{x:.4g}" for x in theirs)
-            log.warning("%s: the system has constant loads of (%s) N in all, and none were given here: if they act on "
-                        "these elements, give the loads of fem.assemble or the gravity of with_weight", owner, text)
+            log.warning(
+                "%s: the system has constant loads of (%s) N in all, and none were given here: if they act on "
+                "these elements, give the loads of fem.assemble or the gravity of with_weight",
+                owner,
+                text,
+            )
 
     def take(self, parts: Sequence[Rigid]) -> None:
         """Take the rigid motions of each part as r, one after the other. Collective."""
-        if self._nodal and any(cells is not None or beyond is not None for _, _, cells, beyond in parts):
-            raise InputError("section forces: the part of a LinearForm on the cells of a cut is unknown; give these "
-                             "loads as Traction and BodyForce, or record Reactions")
+        if self._nodal and any(
+            cells is not None or beyond is not None for _, _, cells, beyond in parts
+        ):
+            raise InputError(
+                "section forces: the part of a LinearForm on the cells of a cut is unknown; give these "
+                "loads as Traction and BodyForce, or record Reactions"
+            )
         forms, ours = [*self._forms, *self._load_forms], self.space.forms
         if not ours.densities and any(beyond for *_, beyond in parts):
-            raise InputError("a section goes through elements, and with forms=… the mass of their parts is unknown: "
-                             "let it run along element sides, or give a material for the density in place of mass=")
-        densities = [(ours.cellwise(name), None) if ours.densities else None for name in ("alpha_rho", "rho")]
+            raise InputError(
+                "a section goes through elements, and with forms=… the mass of their parts is unknown: "
+                "let it run along element sides, or give a material for the density in place of mass="
+            )
+        densities = [
+            (ours.cellwise(name), None) if ours.densities else None for name in ("alpha_rho", "rho")
+        ]
         densities += [(ours.section.thickness, load) for load in self._loads]
         rows: list[list[Any]] = [[] for _ in forms]
-        moved = [moved_by_held(self.space, made)] if (made := getattr(self._problem.surface, "parts", ())) else []
-        self._direct: list[tuple[Array, Array]] = []  # how far each motion of held nodes moves obstacles
+        moved = (
+            [moved_by_held(self.space, made)]
+            if (made := getattr(self._problem.surface, "parts", ()))
+            else []
+        )
+        self._direct: list[
+            tuple[Array, Array]
+        ] = []  # how far each motion of held nodes moves obstacles
         for where, centre, cells, beyond in parts:
             self._inside.x.array[:] = 1.0 if cells is None else cells
             less = [beyond and beyond(*density) for density in densities]  # type: ignore[misc]
@@ -122,8 +168,12 @@ class NodalWork:
     def at_rest(self, state: State) -> Array:
         """Return the work of a state without acceleration, (count,): a static one, or the start of a run."""
         problem, space, t = self._problem, self.space, state.t
-        motion = [space.expand(problem.cartesian(x), t, k) for k, x in enumerate((state.u, state.v))]
-        return self._sum([*motion, np.zeros_like(motion[0]) - self._gravity], lambda one: one(t), state)
+        motion = [
+            space.expand(problem.cartesian(x), t, k) for k, x in enumerate((state.u, state.v))
+        ]
+        return self._sum(
+            [*motion, np.zeros_like(motion[0]) - self._gravity], lambda one: one(t), state
+        )
 
     def of_step(self, report: Report) -> Array:
         """Return the work in a step's equation of motion (``Report.balance``), with absolute accelerations, (count,).
@@ -139,7 +189,11 @@ class NodalWork:
         motion = []
         for k, x in enumerate((balance.u, balance.v, balance.a)):
             free = problem.cartesian(x)
-            motion.append(between(partial(space.expand, free, derivative=k)) if moves else space.expand(free, t1, k))
+            motion.append(
+                between(partial(space.expand, free, derivative=k))
+                if moves
+                else space.expand(free, t1, k)
+            )
         motion[2] = motion[2] + between(problem.ground_acceleration) - self._gravity
         return self._sum(motion, between, balance)
 
@@ -149,12 +203,16 @@ class NodalWork:
         both, square = self.space.comm.sum(np.array([here @ way, way @ way]))
         return float(min(max(both / square, 0.0), 1.0)) if square > 0.0 else 1.0
 
-    def _sum(self, motion: Sequence[Array], at: Callable[..., Any], contact: State | Balance) -> Array:
+    def _sum(
+        self, motion: Sequence[Array], at: Callable[..., Any], contact: State | Balance
+    ) -> Array:
         """The numbers for nodal u, v, a (owned, d), less contact forces on held ones; ``at`` evaluates functions."""
         total, r_t = np.zeros(self._count), 0.0 if contact.r_t is None else contact.r_t
         for k, (towards, along) in enumerate(self._direct):
             total[k] = towards @ contact.r_n - np.sum(along * r_t)
-        for matrix, x in zip(self._matrices, [*motion, *(at(one.follow) for one in self._initial)], strict=False):
+        for matrix, x in zip(
+            self._matrices, [*motion, *(at(one.follow) for one in self._initial)], strict=False
+        ):
             if matrix is not None:
                 total += matrix @ x.ravel()
         for k, load in enumerate(self._loads):
@@ -168,14 +226,20 @@ class NodalWork:
             if isinstance(load, LinearForm):
                 values = self._nodal[k](t)
             else:
-                values = evaluate(type(load).__name__, load.value, self.space.points, t, self.space.comm)
+                values = evaluate(
+                    type(load).__name__, load.value, self.space.points, t, self.space.comm
+                )
             return np.asarray(self._matrices[len(self._forms) + k] @ values.ravel())
 
         if load.history is None and not load.is_constant:
             return np.asarray(at(work))
         if k not in self._still:
             self._still[k] = work(0.0)
-        return self._still[k] if load.history is None else np.asarray(at(load.history) * self._still[k])
+        return (
+            self._still[k]
+            if load.history is None
+            else np.asarray(at(load.history) * self._still[k])
+        )
 
 
 def rigid_motions(points: Array, centre: Array) -> Array:

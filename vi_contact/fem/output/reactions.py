@@ -65,16 +65,23 @@ class Reactions:
         found = {}
         for part in self._parts:
             unit, text = moment if part.startswith("M") else force
-            found[f"reaction_{part}_{self.name}"] = (unit, text if part == "M" else f"{text} along {part[-1]}")
+            found[f"reaction_{part}_{self.name}"] = (
+                unit,
+                text if part == "M" else f"{text} along {part[-1]}",
+            )
         return found
 
-    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
+    def start(
+        self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
+    ) -> Row:
         """Prepare the work of rigid motions of the held nodes; return the row of the state at rest. Collective."""
         owner = f"reactions '{self.name}'"
         self._work = NodalWork(owner, problem, self.loads, self.gravity)
         space: FemSpace = self._work.space
         if len(self.centre) != space.dimension:
-            raise InputError(f"{owner}: the centre has {len(self.centre)} coordinates: give {space.dimension}")
+            raise InputError(
+                f"{owner}: the centre has {len(self.centre)} coordinates: give {space.dimension}"
+            )
         held = np.zeros_like(space.held)
         facets_of(owner, "facets", self.facets, space.mesh)
         blocks = space.facet_blocks(self.facets.indices)
@@ -82,9 +89,13 @@ class Reactions:
         for one in space.forms.boundaries:
             held[space.facet_blocks(np.intersect1d(self.facets.indices, one.facets.indices))] = True
         if not largest(space.comm, held.any()):
-            raise InputError(f"nothing is prescribed on boundary group '{self.facets.name}', and it has no dashpots, "
-                             "so it has no reactions: give a boundary that is held")
-        self._parts = {1: ["x"], 2: ["x", "y", "M"], 3: ["x", "y", "z", "M_x", "M_y", "M_z"]}[space.dimension]
+            raise InputError(
+                f"nothing is prescribed on boundary group '{self.facets.name}', and it has no dashpots, "
+                "so it has no reactions: give a boundary that is held"
+            )
+        self._parts = {1: ["x"], 2: ["x", "y", "M"], 3: ["x", "y", "z", "M_x", "M_y", "M_z"]}[
+            space.dimension
+        ]
         self._work.take([(held, np.asarray(self.centre, dtype=float), None, None)])
         return self._named(self._work.at_rest(state))
 

@@ -24,7 +24,9 @@ from .nodal_work import Loads, NodalWork, Rigid, check_actions, rigid_motions
 
 ON_LINE = 1e-6  # of the length of the cut: what counts as lying on it, and how far a rectangle's angles may be from 90°
 UNCOVERED = 1e-3  # of the length of a cut in the plane: what the elements on it may miss
-_QUANTITIES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))  # unit, meaning
+_QUANTITIES = tomllib.loads(
+    Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+)  # unit, meaning
 
 
 @dataclass
@@ -62,24 +64,45 @@ class SectionForces:
     gravity: Sequence[float] | None = None
 
     def __post_init__(self) -> None:
-        instance("SectionForces", "cuts", self.cuts, Mapping, "give labels and two ends each, {'base': (a, b)}")
+        instance(
+            "SectionForces",
+            "cuts",
+            self.cuts,
+            Mapping,
+            "give labels and two ends each, {'base': (a, b)}",
+        )
         for label, ends in self.cuts.items():
             column_name("section label", label)
             shape = shape_of(ends)
             if len(shape) == 2 and shape not in ((2, 2), (3, 3)):
-                raise InputError(f"SectionForces: section '{label}' has {shape[0]} points of {shape[1]} coordinates; "
-                                 "give 2 ends (x, y) in the plane, 3 corners (x, y, z) of a rectangle in space")
+                raise InputError(
+                    f"SectionForces: section '{label}' has {shape[0]} points of {shape[1]} coordinates; "
+                    "give 2 ends (x, y) in the plane, 3 corners (x, y, z) of a rectangle in space"
+                )
             d = 3 if shape[:1] == (3,) else 2
-            array("SectionForces", f"section '{label}' of two ends, or three corners", ends, (d, d), unit="metres")
+            array(
+                "SectionForces",
+                f"section '{label}' of two ends, or three corners",
+                ends,
+                (d, d),
+                unit="metres",
+            )
         optional(cells_of, "SectionForces", "cells", self.cells)
         check_actions("SectionForces", self.loads, self.gravity)
 
     def columns(self) -> Columns:
         """Return the columns N_<label>, V_<label>, M_<label>, or in space N, V_2, V_3, M_t, M_2, M_3."""
-        return {f"{quantity}_{label}": (unit, f"{text}, section {label}") for label, ends in self.cuts.items()
-                for quantity, (unit, text) in _QUANTITIES["plane" if len(ends) == 2 else "space"].items()}
+        return {
+            f"{quantity}_{label}": (unit, f"{text}, section {label}")
+            for label, ends in self.cuts.items()
+            for quantity, (unit, text) in _QUANTITIES[
+                "plane" if len(ends) == 2 else "space"
+            ].items()
+        }
 
-    def start(self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None) -> Row:
+    def start(
+        self, problem: ContactProblem, state: State, resumed: Mapping[str, float] | None = None
+    ) -> Row:
         """Find the cuts; return the row of the state at rest, of a static stage for example. Collective."""
         work = self._work = NodalWork("section forces", problem, self.loads, self.gravity)
         found = [find_cut(work.space, *item, self.cells) for item in self.cuts.items()]
@@ -98,12 +121,16 @@ def axes_of(name: str, corners: Array) -> tuple[Array, Array]:
     """Return ((d, d) unit vectors along the normal and the sides, lengths (d - 1,) of the sides) of a cut (d, d)."""
     size = np.linalg.norm(corners[1:] - corners[0], axis=1)
     if not size.all():
-        raise InputError(f"section '{name}' has the same point twice: give different ends or corners")
+        raise InputError(
+            f"section '{name}' has the same point twice: give different ends or corners"
+        )
     along = (corners[1:] - corners[0]) / size[:, None]
     if len(along) == 1:
         return np.vstack([[-along[0, 1], along[0, 0]], along]), size
     if abs(along[0] @ along[1]) > ON_LINE:
-        raise InputError(f"section '{name}' is not a rectangle: give corners a, b, c with a right angle at a")
+        raise InputError(
+            f"section '{name}' is not a rectangle: give corners a, b, c with a right angle at a"
+        )
     return np.vstack([np.cross(*along), along]), size
 
 
@@ -115,10 +142,14 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
     cells lie on the cut behind it only, as at a foot."""
     corners, mesh = np.asarray(given, dtype=float), space.mesh
     if len(corners) != space.dimension:
-        raise InputError(f"section '{name}' has {len(corners)} corners: give 2 ends in the plane, 3 corners of a "
-                         f"rectangle in space; this mesh has {space.dimension} dimensions")
+        raise InputError(
+            f"section '{name}' has {len(corners)} corners: give 2 ends in the plane, 3 corners of a "
+            f"rectangle in space; this mesh has {space.dimension} dimensions"
+        )
     axes, size = axes_of(name, corners)
-    tol = ON_LINE * min(float(size.max()), space.size)  # a rectangle may be much larger than the body
+    tol = ON_LINE * min(
+        float(size.max()), space.size
+    )  # a rectangle may be much larger than the body
 
     def level(x: Array) -> Array:
         away = (x - corners[0]) @ axes[0]
@@ -126,29 +157,48 @@ def find_cut(space: FemSpace, name: str, given: Any, group: Cells | None) -> tup
 
     x = mesh.geometry.x[compat.geometry_dofmap(mesh)][:, :, : space.dimension]
     inside = np.zeros(len(x), dtype=bool)
-    inside[slice(None) if group is None else cells_of(f"section '{name}'", "cells", group, mesh).indices] = True
+    inside[
+        slice(None)
+        if group is None
+        else cells_of(f"section '{name}'", "cells", group, mesh).indices
+    ] = True
     vertices = x[:, : len(compat.sub_entities(mesh, 0))]
     trace = _Trace((vertices - corners[0]) @ axes[1:].T, level(vertices), size, tol)
     inside &= trace.touches
-    sides = [[(inside & ends & side).any() for side in (trace.left, trace.right)] for ends in trace.beyond]
+    sides = [
+        [(inside & ends & side).any() for side in (trace.left, trace.right)]
+        for ends in trace.beyond
+    ]
     if space.comm.max(np.array(sides, dtype=float)).all(axis=1).any():
-        raise InputError(f"section '{name}' ends inside the group of cells: let it reach from surface to surface")
+        raise InputError(
+            f"section '{name}' ends inside the group of cells: let it reach from surface to surface"
+        )
     owned = mesh.topology.index_map(mesh.topology.dim).size_local
     left, right, through = space.comm.sum(trace.cover[:, :owned] @ inside[:owned])
     cover = through + max(left, right)
     if not cover > 0.0 or (space.dimension == 2 and abs(cover - size[0]) > UNCOVERED * size[0]):
-        raise InputError(f"section '{name}': elements cover {cover:.4g} of its {size.prod():.4g} m"
-                         f"{'²' * (space.dimension - 2)}: let it reach from one surface of the group of cells to the "
-                         "other")
+        raise InputError(
+            f"section '{name}': elements cover {cover:.4g} of its {size.prod():.4g} m"
+            f"{'²' * (space.dimension - 2)}: let it reach from one surface of the group of cells to the "
+            "other"
+        )
     sign = 1.0 if left >= right else -1.0
     away, at = level(space.points), (space.points - corners[0]) @ axes[1:].T
-    nodes = (sign * away < 0.0) & (space.degree < 2) | ((away == 0.0) & ((at >= -tol) & (at <= size + tol)).all(axis=1))
+    nodes = (sign * away < 0.0) & (space.degree < 2) | (
+        (away == 0.0) & ((at >= -tol) & (at <= size + tol)).all(axis=1)
+    )
     crossed = inside & (level(x).max(axis=1) > 0.0) & (level(x).min(axis=1) < 0.0)
     if space.degree > 1 and space.comm.max(np.array([float(crossed.any())]))[0]:
-        raise InputError(f"section '{name}' cuts cells of degree 2: let it follow their plane sides")
+        raise InputError(
+            f"section '{name}' cuts cells of degree 2: let it follow their plane sides"
+        )
     middle = corners[0] + 0.5 * (corners[1:] - corners[0]).sum(axis=0)
     motions = partial(rigid_motions, centre=middle)
-    beyond = partial(work_beyond, space, crossed, lambda points: sign * level(points), motions) if through else None
+    beyond = (
+        partial(work_beyond, space, crossed, lambda points: sign * level(points), motions)
+        if through
+        else None
+    )
     moved = nodes[:, None], middle, inside & (trace.left if sign > 0.0 else trace.right), beyond
     return moved, -sign * block_diag(axes, axes if len(axes) == 3 else 1.0)
 

@@ -48,7 +48,7 @@ def recognises(text: TextFile) -> bool:
     if not any(_NPTS.search(line) or _VALUES_FIRST.search(line) for line in header):
         return False
     last = max(k for k, line in enumerate(text.heads[:HEADER_LINES]) if _states(line))
-    after = next((line.strip() for line in text.heads[last + 1:] if line.strip()), "")
+    after = next((line.strip() for line in text.heads[last + 1 :] if line.strip()), "")
     return not after[:1].isalpha()  # a heading of columns follows
 
 
@@ -56,8 +56,12 @@ def read(text: TextFile) -> Record:
     """Return the record of an AT2 file; units and dt are needed only where the file does not state them."""
     npts, stated_dt, start = _header(text)
     told = [index for index in range(start) if text.heads[index].strip()]
-    told = [index for index in told if not (text.heads[0].startswith(OURS) and index == 1)]  # the title of another file
-    header = [" ".join(text.heads[index].split()) for index in range(start) if text.heads[index].strip()]
+    told = [
+        index for index in told if not (text.heads[0].startswith(OURS) and index == 1)
+    ]  # the title of another file
+    header = [
+        " ".join(text.heads[index].split()) for index in range(start) if text.heads[index].strip()
+    ]
     line, units = _stated_units(text, told)
     if line is not None and units is not None:
         canonical_units(text.at(line), units)
@@ -66,10 +70,18 @@ def read(text: TextFile) -> Record:
     if npts is not None:
         text.refuse_other_count(int(npts[0]), npts[1], len(values))
     title = next((line for line in header if not line.upper().startswith("PEER")), "")
-    return text.record(values, units=units, line=line, dt=stated_dt and stated_dt[1], lines=lines, title=title,
-                       format="PEER AT2", notes=tuple(header),
-                       dt_from=f"header, line {stated_dt[0] + 1}" if stated_dt else "",
-                       counted="counted" if npts is None else "counted, as the header says")
+    return text.record(
+        values,
+        units=units,
+        line=line,
+        dt=stated_dt and stated_dt[1],
+        lines=lines,
+        title=title,
+        format="PEER AT2",
+        notes=tuple(header),
+        dt_from=f"header, line {stated_dt[0] + 1}" if stated_dt else "",
+        counted="counted" if npts is None else "counted, as the header says",
+    )
 
 
 def _stated_units(text: TextFile, told: list[int]) -> tuple[int | None, str | None]:
@@ -77,8 +89,10 @@ def _stated_units(text: TextFile, told: list[int]) -> tuple[int | None, str | No
     found = [(index, match[1]) for index in told for match in _UNITS.finditer(text.heads[index])]
     for index, units in found[1:]:
         if known_units(units) is not None and known_units(units) != known_units(found[0][1]):
-            raise InputError(f"{text.at(index)}: the header states units as {units}, but line {found[0][0] + 1} states "
-                             f"them as {found[0][1]}; correct the file, or get it again")
+            raise InputError(
+                f"{text.at(index)}: the header states units as {units}, but line {found[0][0] + 1} states "
+                f"them as {found[0][1]}; correct the file, or get it again"
+            )
     return found[0] if found else (None, None)
 
 
@@ -88,7 +102,7 @@ def _header(text: TextFile) -> tuple[tuple[int, float] | None, tuple[int, float]
     counts: list[tuple[int, float]] = []
     steps: list[tuple[int, float]] = []
     begin, last = begin_data(text), 0
-    for index, line in enumerate(text.heads[:HEADER_LINES if begin is None else begin]):
+    for index, line in enumerate(text.heads[: HEADER_LINES if begin is None else begin]):
         both, count, step = _VALUES_FIRST.search(line), _NPTS.search(line), _DT.search(line)
         if begin is None and counts and (both or count):
             raise InputError(f"{text.at(index)}: NPTS is stated a second time; give one record")
@@ -101,11 +115,17 @@ def _header(text: TextFile) -> tuple[tuple[int, float] | None, tuple[int, float]
             steps.append((index, text.number(index, step[1])))
         last = index if both or count or step else last
     start = last + 1 if begin is None else begin
-    prose = [index for index in range(start) if not _states(text.heads[index])
-             and not (text.heads[0].startswith(OURS) and index == 1)]
+    prose = [
+        index
+        for index in range(start)
+        if not _states(text.heads[index]) and not (text.heads[0].startswith(OURS) and index == 1)
+    ]
     # a sentence "1559 points at equal spacing of 0.02 sec", if there is exactly one, says the same as NPTS and DT
     sentences = stated_steps(text, prose)
     if len({value for _, value in sentences}) == 1:
         steps += sentences
-    return (agreed(text, "the number of samples", [*counts, *stated_counts(text, prose)]),
-            agreed(text, "the time step", steps), start)
+    return (
+        agreed(text, "the number of samples", [*counts, *stated_counts(text, prose)]),
+        agreed(text, "the time step", steps),
+        start,
+    )

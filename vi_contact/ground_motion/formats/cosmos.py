@@ -17,19 +17,30 @@ from .text import NUMBER, TextFile
 
 STEP = 33  # place of the time step among the real header values of COSMOS, from 0
 
-_FIRST = re.compile(r"^\s*+(?:un)?corrected\s++accelerogram\b|\(\s*+format\s++v[\d.]++ with \d++ text lines",
-                    re.IGNORECASE)
+_FIRST = re.compile(
+    r"^\s*+(?:un)?corrected\s++accelerogram\b|\(\s*+format\s++v[\d.]++ with \d++ text lines",
+    re.IGNORECASE,
+)
 _COUNT = re.compile(r"^\s*+(\d++)\s")
 _QUANTITY = re.compile(r"\b(acc|vel|dis)\w*+", re.IGNORECASE)
 _SAMPLES = re.compile(r"\b(?:pts|spaced|data)\b", re.IGNORECASE)
 _FORMAT = re.compile(r"\(\s*+(\d*+)\s*+(?:1P)?[FEIDG](\d++)[^()]*+\)", re.IGNORECASE)
-_UNITS = (re.compile(r"units?\s*+(?:[=:]|\bof\b)\s*+(g/10|[^,()\s]++)", re.IGNORECASE),
-          re.compile(r"\bin\s++(?:units\s++)?(g/10|cms?/s(?:ec)?[*^]*+2|cms?/s(?:ec)?/s(?:ec)?|g)\b", re.IGNORECASE))
-_SPACED = re.compile(rf"equally[- ]spaced\s++(?:at|intervals\s++of)\s++({NUMBER})\s*+sec", re.IGNORECASE)
+_UNITS = (
+    re.compile(r"units?\s*+(?:[=:]|\bof\b)\s*+(g/10|[^,()\s]++)", re.IGNORECASE),
+    re.compile(
+        r"\bin\s++(?:units\s++)?(g/10|cms?/s(?:ec)?[*^]*+2|cms?/s(?:ec)?/s(?:ec)?|g)\b",
+        re.IGNORECASE,
+    ),
+)
+_SPACED = re.compile(
+    rf"equally[- ]spaced\s++(?:at|intervals\s++of)\s++({NUMBER})\s*+sec", re.IGNORECASE
+)
 _UNEVEN = re.compile(r"unequally", re.IGNORECASE)
 _RATE = re.compile(rf"\bat\s++({NUMBER})\s*+pts/sec", re.IGNORECASE)
 _PEAK = re.compile(rf"\bpeak\s++accel\w*+\s*+=\s*+({NUMBER})\s*+(\S++)\s++at\b", re.IGNORECASE)
-_REALS = re.compile(r"^\s*+(\d++)\s++real-header values follow on\s++(\d++)\s++lines", re.IGNORECASE)
+_REALS = re.compile(
+    r"^\s*+(\d++)\s++real-header values follow on\s++(\d++)\s++lines", re.IGNORECASE
+)
 _CHANNEL = re.compile(r"\bchan?:?\s++([\w?]++):([^(]*+)", re.IGNORECASE)
 _COMPONENT = re.compile(r"^\s*+COMP\s++(\S++)")
 _FROM = re.compile(r"\bfrom\b", re.IGNORECASE)
@@ -65,21 +76,30 @@ def recognises(text: TextFile) -> bool:
 
 def begins_blocks(text: TextFile) -> bool:
     """Tell whether one of the first lines announces a block of samples with its format or its step."""
-    lines = [(index, line) for index, line in enumerate(text.heads[:400]) if "header" not in line.lower()]
-    return any(_announced(text, index) and (_FORMAT.search(line) or _SPACED.search(line)) for index, line in lines)
+    lines = [
+        (index, line) for index, line in enumerate(text.heads[:400]) if "header" not in line.lower()
+    ]
+    return any(
+        _announced(text, index) and (_FORMAT.search(line) or _SPACED.search(line))
+        for index, line in lines
+    )
 
 
 def read(text: TextFile) -> Record:
     """Return the record of one channel; channel: 1 for the first of the file, required where it holds several."""
     blocks = _blocks(text)
     if not blocks:
-        raise InputError(f"{text.at(0)}: no block of accelerations follows, which a line such as '7500 points of accel "
-                         "data equally spaced at .010 sec, in cm/sec2. (8f10.6)' begins; other layouts are not read, "
-                         "write columns of time and acceleration")
+        raise InputError(
+            f"{text.at(0)}: no block of accelerations follows, which a line such as '7500 points of accel "
+            "data equally spaced at .010 sec, in cm/sec2. (8f10.6)' begins; other layouts are not read, "
+            "write columns of time and acceleration"
+        )
     block = blocks[text.chosen([_component(text, block) for block in blocks])]
     line = text.heads[block.line]
     if _UNEVEN.search(line):
-        raise InputError(f"{text.at(block.line)}: the samples are unequally spaced; get the corrected file (V2)")
+        raise InputError(
+            f"{text.at(block.line)}: the samples are unequally spaced; get the corrected file (V2)"
+        )
     stated = next((match[1] for pattern in _UNITS if (match := pattern.search(line))), None)
     words, comments = _words(text, block)
     cosmos = "format v" in text.heads[0].lower()
@@ -88,9 +108,18 @@ def read(text: TextFile) -> Record:
     place = block.line
     if stated is None and (peak := _peak_units(text, block, samples)) is not None:
         place, stated = peak
-    return text.record(samples, lines=lines, units=stated, dt=_step(text, block), line=place, title=event,
-                       format="COSMOS" if cosmos else "CSMIP", notes=(*words, *comments),
-                       station=_station(text, block), component=_component(text, block))
+    return text.record(
+        samples,
+        lines=lines,
+        units=stated,
+        dt=_step(text, block),
+        line=place,
+        title=event,
+        format="COSMOS" if cosmos else "CSMIP",
+        notes=(*words, *comments),
+        station=_station(text, block),
+        component=_component(text, block),
+    )
 
 
 def _blocks(text: TextFile) -> list[Block]:
@@ -101,7 +130,11 @@ def _blocks(text: TextFile) -> list[Block]:
         form = _FORMAT.search(text.heads[index]) if announced else None
         if announced and (form or _SPACED.search(text.heads[index])):
             count, quantity = announced
-            per_line, width = (int(text.number(index, part or "1")) for part in form.groups()) if form else (8, 10)
+            per_line, width = (
+                (int(text.number(index, part or "1")) for part in form.groups())
+                if form
+                else (8, 10)
+            )
             block = Block(index, range(start, index), count, max(per_line, 1), max(width, 1))
             if quantity == "acc":
                 found.append(block)
@@ -126,31 +159,50 @@ def _announced(text: TextFile, index: int) -> tuple[int, str] | None:
 def _words(text: TextFile, block: Block) -> tuple[list[str], list[str]]:
     """Return the text of a channel's header, which ends where numbers begin, and its comments, blanks squeezed."""
     header = [" ".join(text.heads[index].split()) for index in block.header]
-    numbers = (k for k, entry in enumerate(header) if _NUMBERS.fullmatch(entry) or "header values" in entry)
+    numbers = (
+        k for k, entry in enumerate(header) if _NUMBERS.fullmatch(entry) or "header values" in entry
+    )
     comments = [entry.lstrip("| ") for entry in header if entry.startswith("|")]
-    return [entry for entry in header[:next(numbers, len(header))] if entry], [entry for entry in comments if entry]
+    return [entry for entry in header[: next(numbers, len(header))] if entry], [
+        entry for entry in comments if entry
+    ]
 
 
 def _samples(text: TextFile, block: Block) -> tuple[list[float], list[int]]:
     """Return the samples in the file's units, and the index of the line of each."""
-    unknown = next((text.number(index, mark[1]) for index, mark in _found(text, block.header, _UNKNOWN)), None)
+    unknown = next(
+        (text.number(index, mark[1]) for index, mark in _found(text, block.header, _UNKNOWN)), None
+    )
     values: list[float] = []
     lines: list[int] = []
     for index in range(block.line + 1, block.end):
         line = text.lines[index].rstrip() if index < len(text.lines) else ""
-        fields, wanted = -(-len(line) // block.width), min(block.per_line, block.count - len(values))
+        fields, wanted = (
+            -(-len(line) // block.width),
+            min(block.per_line, block.count - len(values)),
+        )
         if fields != wanted:
-            raise InputError(f"{text.at(block.line)}: {block.count:.12g} samples are announced but line {index + 1} "
-                             f"holds {fields} of them instead of {wanted:g}; get the complete file")
+            raise InputError(
+                f"{text.at(block.line)}: {block.count:.12g} samples are announced but line {index + 1} "
+                f"holds {fields} of them instead of {wanted:g}; get the complete file"
+            )
         row = text.fixed(index, block.width)
         if unknown in row:
-            raise InputError(f"{text.at(index)}: a sample is marked as unknown ({unknown:g}); use another record")
+            raise InputError(
+                f"{text.at(index)}: a sample is marked as unknown ({unknown:g}); use another record"
+            )
         values += row
         lines += [index] * len(row)
     after = text.lines[block.end] if block.end < len(text.lines) else ""
-    if after.strip() and not _VALUE.sub("", after).strip() and len(after.rstrip()) % block.width == 0:
-        raise InputError(f"{text.at(block.line)}: {block.count:.12g} samples are announced but line {block.end + 1} "
-                         "holds more of them; get the complete file")
+    if (
+        after.strip()
+        and not _VALUE.sub("", after).strip()
+        and len(after.rstrip()) % block.width == 0
+    ):
+        raise InputError(
+            f"{text.at(block.line)}: {block.count:.12g} samples are announced but line {block.end + 1} "
+            "holds more of them; get the complete file"
+        )
     return values, lines
 
 
@@ -159,8 +211,10 @@ def _step(text: TextFile, block: Block) -> float | None:
     rate = _RATE.search(text.heads[block.line])
     if rate and text.number(block.line, rate[1]) > 0.0:
         return 1.0 / text.number(block.line, rate[1])
-    found = [(index, text.number(index, spaced[1]))
-             for index, spaced in _found(text, (block.line, *block.header), _SPACED)]
+    found = [
+        (index, text.number(index, spaced[1]))
+        for index, spaced in _found(text, (block.line, *block.header), _SPACED)
+    ]
     for index, reals in _found(text, block.header, _REALS) if not found else ():
         if form := _FORMAT.search(text.heads[index]):
             rows = range(index + 1, min(index + 1 + int(text.number(index, reals[2])), block.line))
@@ -182,7 +236,10 @@ def _peak_units(text: TextFile, block: Block, samples: list[float]) -> tuple[int
 
 def _component(text: TextFile, block: Block) -> str:
     """Return the direction of the channel, such as "90 Deg" or "UP", from the text of its header."""
-    named = (_FROM.split(match[2], maxsplit=1)[0].split() for _, match in _found(text, block.header, _CHANNEL))
+    named = (
+        _FROM.split(match[2], maxsplit=1)[0].split()
+        for _, match in _found(text, block.header, _CHANNEL)
+    )
     older = (match[1] for _, match in _found(text, block.header, _COMPONENT))
     return " ".join(next(filter(None, named), [])) or next(older, "")
 
@@ -193,6 +250,8 @@ def _station(text: TextFile, block: Block) -> str:
     return next(iter((_CODE.search(named[1]) or named)[1].split()), "") if named else ""
 
 
-def _found(text: TextFile, indices: Iterable[int], pattern: re.Pattern[str]) -> Iterator[tuple[int, re.Match[str]]]:
+def _found(
+    text: TextFile, indices: Iterable[int], pattern: re.Pattern[str]
+) -> Iterator[tuple[int, re.Match[str]]]:
     """Yield those of the lines in which there is the pattern."""
     return ((index, match) for index in indices if (match := pattern.search(text.heads[index])))

@@ -16,7 +16,9 @@ def recognises(text: TextFile) -> bool:
     """Tell whether line 1 is an entry "KEY: value" and one of the first 100 is NDATA or SAMPLING_INTERVAL_S."""
     keys = ("EVENT_NAME", "SAMPLING_INTERVAL_S", "NDATA")
     entries = [_entry(line) for line in text.heads[:100]]
-    return entries[0] is not None and any(entry is not None and entry[0] in keys for entry in entries)
+    return entries[0] is not None and any(
+        entry is not None and entry[0] in keys for entry in entries
+    )
 
 
 def read(text: TextFile) -> Record:
@@ -25,17 +27,45 @@ def read(text: TextFile) -> Record:
     header = {entry[0]: (index, entry[1]) for index, entry in enumerate(entries) if entry}
     index, kind = header.get("DATA_TYPE", (0, "ACCELERATION"))
     if kind and "ACCELERATION" not in kind.upper():
-        raise InputError(f"{text.at(index)}: the file holds {kind.lower()}; get the file of accelerations (.ACC.ASC)")
+        raise InputError(
+            f"{text.at(index)}: the file holds {kind.lower()}; get the file of accelerations (.ACC.ASC)"
+        )
     values, lines = text.series(len(entries))
-    text.refuse_other_count(text.entry(header, "NDATA")[0], text.entry_number(header, "NDATA"), len(values))
+    text.refuse_other_count(
+        text.entry(header, "NDATA")[0], text.entry_number(header, "NDATA"), len(values)
+    )
     line, units = text.entry(header, "UNITS")
     value = {key: content for key, (_, content) in header.items()}
     station = ".".join(filter(None, (value.get("NETWORK"), value.get("STATION_CODE"))))
-    title = " ".join(filter(None, (value.get("EVENT_NAME"), value.get("EVENT_DATE_YYYYMMDD"),
-                                   value.get("EVENT_TIME_HHMMSS"), station, value.get("STREAM"))))
-    notes = tuple(f"{key}: {content}" for key, content in value.items() if content and not key.startswith("USER"))
-    return text.record(values, units=units, line=line, lines=lines, dt=text.entry_number(header, "SAMPLING_INTERVAL_S"),
-                       format="ESM", title=title, notes=notes, station=station, component=value.get("STREAM", ""))
+    title = " ".join(
+        filter(
+            None,
+            (
+                value.get("EVENT_NAME"),
+                value.get("EVENT_DATE_YYYYMMDD"),
+                value.get("EVENT_TIME_HHMMSS"),
+                station,
+                value.get("STREAM"),
+            ),
+        )
+    )
+    notes = tuple(
+        f"{key}: {content}"
+        for key, content in value.items()
+        if content and not key.startswith("USER")
+    )
+    return text.record(
+        values,
+        units=units,
+        line=line,
+        lines=lines,
+        dt=text.entry_number(header, "SAMPLING_INTERVAL_S"),
+        format="ESM",
+        title=title,
+        notes=notes,
+        station=station,
+        component=value.get("STREAM", ""),
+    )
 
 
 def _entry(line: str) -> tuple[str, str] | None:

@@ -102,7 +102,9 @@ def _column(cell: str, line: int) -> Column:
         name, unit = cell[: match.start()].rstrip(" _"), match[1].strip()
     else:
         word = _UNIT_WORD.match(cell)
-        name, unit = (word[1], word[2]) if word and word[1] and _kind_of_unit(word[2]) else (cell, None)
+        name, unit = (
+            (word[1], word[2]) if word and word[1] and _kind_of_unit(word[2]) else (cell, None)
+        )
     by_unit = _kind_of_unit(unit) if unit else ""
     by_name = next((kind for kind, pattern in _KINDS if pattern.search(name.strip(" .:"))), "")
     if by_name == "time" and by_unit not in ("time", ""):

@@ -16,15 +16,34 @@ from . import afad, at2, columns, cosmos, cwa, esm, geonet, knet, smc, unam, vol
 from .text import load_text
 from .unread import refuse_unread
 
-SEVERAL = (geonet, volume1, cosmos, afad, unam, cwa)  # formats whose files may hold several components
-DOUBTED = 1e-3 * STANDARD_GRAVITY, 3.0 * STANDARD_GRAVITY  # a peak outside of these is rare in a record that is used
-STEPS = 1e-6, 100.0  # shortest and longest time step [s] of a file; that of seismographs is 0.001 to 0.05
+SEVERAL = (
+    geonet,
+    volume1,
+    cosmos,
+    afad,
+    unam,
+    cwa,
+)  # formats whose files may hold several components
+DOUBTED = (
+    1e-3 * STANDARD_GRAVITY,
+    3.0 * STANDARD_GRAVITY,
+)  # a peak outside of these is rare in a record that is used
+STEPS = (
+    1e-6,
+    100.0,
+)  # shortest and longest time step [s] of a file; that of seismographs is 0.001 to 0.05
 
 
 @checked
-def read_record(path: str | os.PathLike[str], units: str | None = None, *, dt: float | None = None,
-                resample_dt: float | None = None, channel: int | str | None = None,
-                largest: float = LARGEST_PEAK) -> Record:
+def read_record(
+    path: str | os.PathLike[str],
+    units: str | None = None,
+    *,
+    dt: float | None = None,
+    resample_dt: float | None = None,
+    channel: int | str | None = None,
+    largest: float = LARGEST_PEAK,
+) -> Record:
     """Read one component of ground motion from a file of any format listed in docs/guide/records.md.
 
     units: a key of UNITS ("m/s2", "cm/s2", "gal", "g", ...); required where the file does not state them, elsewhere
@@ -39,22 +58,30 @@ def read_record(path: str | os.PathLike[str], units: str | None = None, *, dt: f
     refuse_unread(text)
     reader = next((one for one in (*SEVERAL, smc, knet, esm, at2) if one.recognises(text)), columns)
     if channel is not None and reader not in (*SEVERAL, columns):
-        raise InputError(f"{text.path}: channel={shown(channel)} was passed but the file holds one record; leave "
-                         "channel out")
+        raise InputError(
+            f"{text.path}: channel={shown(channel)} was passed but the file holds one record; leave "
+            "channel out"
+        )
     number("read_record", "largest", largest, positive=True, unit="m/s²")
     record = reader.read(text)
     peak = float(np.max(np.abs(record.acceleration)))
     if peak > largest:
-        raise InputError(f"{record.source}: the peak acceleration is {peak / STANDARD_GRAVITY:.4g} g = {peak:.4g} m/s2 "
-                         f"if the unit is {record.units}; give the right units=, or largest= in m/s2 where the motion "
-                         "is that strong")
+        raise InputError(
+            f"{record.source}: the peak acceleration is {peak / STANDARD_GRAVITY:.4g} g = {peak:.4g} m/s2 "
+            f"if the unit is {record.units}; give the right units=, or largest= in m/s2 where the motion "
+            "is that strong"
+        )
     if 0.0 < peak < DOUBTED[0] or peak > DOUBTED[1]:
-        doubt = (f"the peak is {peak / STANDARD_GRAVITY:.4g} g if the unit is {record.units}; check the unit, which "
-                 f"comes from: {record.units_from}")
+        doubt = (
+            f"the peak is {peak / STANDARD_GRAVITY:.4g} g if the unit is {record.units}; check the unit, which "
+            f"comes from: {record.units_from}"
+        )
         record = replace(record, doubts=(*record.doubts, doubt))
     if not STEPS[0] <= record.dt <= STEPS[1]:
-        raise InputError(f"{record.source}: a time step of {record.dt:g} s is not usual for ground motions; give "
-                         f"seconds from {STEPS[0]:g} to {STEPS[1]:g}, or make a Record of the samples")
+        raise InputError(
+            f"{record.source}: a time step of {record.dt:g} s is not usual for ground motions; give "
+            f"seconds from {STEPS[0]:g} to {STEPS[1]:g}, or make a Record of the samples"
+        )
     if resample_dt is not None and not math.isclose(record.dt, resample_dt, rel_tol=1e-9):
         record = resampled(record, resample_dt)
     return record

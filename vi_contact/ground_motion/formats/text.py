@@ -64,9 +64,20 @@ class TextFile:
         """Return 'path, line N' of lines[index], counted from 1 as editors do."""
         return f"{self.path}, line {index + 1}"
 
-    def record(self, samples: Sequence[float] | Array, *, units: str | None, dt: float | None, line: int | None = None,
-               scale: float = 1.0, lines: Sequence[int] | None = None, counted: str = "counted, as the header says",
-               dt_from: str = "header", dt_rounding: float = SAME_STEP, **told: Any) -> Record:
+    def record(
+        self,
+        samples: Sequence[float] | Array,
+        *,
+        units: str | None,
+        dt: float | None,
+        line: int | None = None,
+        scale: float = 1.0,
+        lines: Sequence[int] | None = None,
+        counted: str = "counted, as the header says",
+        dt_from: str = "header",
+        dt_rounding: float = SAME_STEP,
+        **told: Any,
+    ) -> Record:
         """Return the record of ``scale`` times samples, with the units and time step [s] that the file states.
 
         None: it does not state them. line: index of the one with the units. lines: index of the line of every sample,
@@ -78,22 +89,41 @@ class TextFile:
         names = [canonical_units(place, one) for one in (units, self.units) if one is not None]
         step = self.dt if dt is None else dt
         if not names:
-            raise InputError(f"{place}: the file does not state its units; pass units= as one of {', '.join(UNITS)}")
+            raise InputError(
+                f"{place}: the file does not state its units; pass units= as one of {', '.join(UNITS)}"
+            )
         if UNITS[names[0]] != UNITS[names[-1]]:
-            raise InputError(f"{place}: the file states its units as {names[0]} but units={self.units!r} was passed; "
-                             "leave units out or correct the file")
+            raise InputError(
+                f"{place}: the file states its units as {names[0]} but units={self.units!r} was passed; "
+                "leave units out or correct the file"
+            )
         if step is None:
-            raise InputError(f"{self.path}: the file does not state its time step; pass dt= in seconds")
-        if dt is not None and self.dt is not None and not math.isclose(dt, self.dt, rel_tol=dt_rounding):
-            raise InputError(f"{self.path}: the file states a time step of {step:g} s but dt={self.dt!r} was passed; "
-                             "leave dt out or correct the file")
+            raise InputError(
+                f"{self.path}: the file does not state its time step; pass dt= in seconds"
+            )
+        if (
+            dt is not None
+            and self.dt is not None
+            and not math.isclose(dt, self.dt, rel_tol=dt_rounding)
+        ):
+            raise InputError(
+                f"{self.path}: the file states a time step of {step:g} s but dt={self.dt!r} was passed; "
+                "leave dt out or correct the file"
+            )
         if lines is not None:
             refuse_fill_values(samples, lambda k: self.at(lines[k]))
         stated = "header" if line is None else f"header, line {line + 1}"
-        return Record(acceleration=UNITS[names[0]] * scale * np.array(samples, dtype=float), units=names[0], dt=step,
-                      source=self.path, sha256=self.sha256, samples_from=counted,
-                      units_from="option" if units is None else stated,
-                      dt_from="option" if dt is None else dt_from, **told)
+        return Record(
+            acceleration=UNITS[names[0]] * scale * np.array(samples, dtype=float),
+            units=names[0],
+            dt=step,
+            source=self.path,
+            sha256=self.sha256,
+            samples_from=counted,
+            units_from="option" if units is None else stated,
+            dt_from="option" if dt is None else dt_from,
+            **told,
+        )
 
     def chosen(self, components: Sequence[str]) -> int:
         """Return which component the caller chose, from 0; InputError that lists them where none or another one is.
@@ -103,11 +133,19 @@ class TextFile:
             return 0
         wanted = self.channel
         if isinstance(wanted, str):
-            same = [k for k, name in enumerate(components) if name.casefold() == wanted.strip().casefold()]
+            same = [
+                k
+                for k, name in enumerate(components)
+                if name.casefold() == wanted.strip().casefold()
+            ]
             if len(same) == 1:
                 return same[0]
             wanted = int(wanted) if wanted.strip().isdecimal() and len(wanted) < 9 else wanted
-        if isinstance(wanted, int) and not isinstance(wanted, bool) and 0 < wanted <= len(components):
+        if (
+            isinstance(wanted, int)
+            and not isinstance(wanted, bool)
+            and 0 < wanted <= len(components)
+        ):
             return wanted - 1
         names = ", ".join(f"{k}: {name or 'unnamed'}" for k, name in enumerate(components, 1))
         wrong = "" if self.channel is None else f"there is no channel {shown(self.channel)}: "
@@ -117,13 +155,21 @@ class TextFile:
     def refuse_other_count(self, index: int, announced: float, found: int) -> None:
         """Raise InputError unless as many samples were found as lines[index] announces."""
         if found != announced:
-            raise InputError(f"{self.at(index)}: {announced:.12g} samples are announced but {found} follow; get the "
-                             "complete file")
+            raise InputError(
+                f"{self.at(index)}: {announced:.12g} samples are announced but {found} follow; get the "
+                "complete file"
+            )
 
     def filled(self, start: int) -> Sequence[int]:
         """Return the indices of the lines from `start` on that are not blank, up to a line '*** End data ***'."""
-        end = next((index for index in range(start, len(self.lines)) if _END_DATA.match(self.heads[index])),
-                   len(self.lines))
+        end = next(
+            (
+                index
+                for index in range(start, len(self.lines))
+                if _END_DATA.match(self.heads[index])
+            ),
+            len(self.lines),
+        )
         return [index for index in range(start, end) if self.lines[index].strip()]
 
     def series(self, start: int) -> tuple[list[float], list[int]]:
@@ -136,8 +182,9 @@ class TextFile:
         self.refuse_uneven_rows(lines, rows)
         self.refuse_misaligned(lines)
         self.refuse_empty_lines(lines, rows)
-        return [value for row in rows for value in row], [index for index, row in zip(lines, rows, strict=True)
-                                                          for _ in row]
+        return [value for row in rows for value in row], [
+            index for index, row in zip(lines, rows, strict=True) for _ in row
+        ]
 
     def refuse_uneven_rows(self, lines: Sequence[int], rows: Sequence[Sequence[float]]) -> None:
         """Raise InputError unless all rows have the length that most have; the last one may be shorter."""
@@ -145,32 +192,43 @@ class TextFile:
         usual = max(set(lengths), key=lambda length: (lengths.count(length), length), default=0)
         for k, length in enumerate(lengths):
             if length != usual and not (k == len(lengths) - 1 and length < usual):
-                raise InputError(f"{self.at(lines[k])}: the row has {length} values and other rows have {usual}; a "
-                                 "value is missing or too many, get the complete file")
+                raise InputError(
+                    f"{self.at(lines[k])}: the row has {length} values and other rows have {usual}; a "
+                    "value is missing or too many, get the complete file"
+                )
 
     def refuse_empty_lines(self, lines: Sequence[int], rows: Sequence[Sequence[float]]) -> None:
         """Raise InputError for an empty line among values that stand one a line: a value is missing there.
 
         Empty lines between all of them are line ends that were doubled."""
-        gaps = [before for before, after in pairwise(lines)
-                if after > before + 1 and not self.lines[before + 1].strip()]
+        gaps = [
+            before
+            for before, after in pairwise(lines)
+            if after > before + 1 and not self.lines[before + 1].strip()
+        ]
         if gaps and len(gaps) < len(lines) - 1 and all(len(row) == 1 for row in rows):
-            raise InputError(f"{self.at(gaps[0] + 1)}: the line is empty among values that stand one a line, so that a "
-                             "value is missing; get the complete file, or take the line out where none is")
+            raise InputError(
+                f"{self.at(gaps[0] + 1)}: the line is empty among values that stand one a line, so that a "
+                "value is missing; get the complete file, or take the line out where none is"
+            )
 
     def refuse_misaligned(self, lines: Sequence[int]) -> None:
         """Raise InputError for a row that is shorter than the others where nine of ten rows have numbers that end at
         the same places: a character was lost. A longer row holds a number that is too wide for its columns."""
         if len(lines) < 5:
             return
-        ends = [tuple(match.end() for match in _NUMBER.finditer(self.lines[index])) for index in lines]
+        ends = [
+            tuple(match.end() for match in _NUMBER.finditer(self.lines[index])) for index in lines
+        ]
         usual, often = Counter(ends[:-1]).most_common(1)[0]
         if len(usual) < 2 or often < 0.9 * (len(lines) - 1):
             return
         for index, found in zip(lines, ends, strict=True):
-            if found != usual[:len(found)] and found[-1] < usual[len(found) - 1]:
-                raise InputError(f"{self.at(index)}: the row is shorter than the others, whose numbers end at the same "
-                                 "places, so that a character is missing; get the complete file")
+            if found != usual[: len(found)] and found[-1] < usual[len(found) - 1]:
+                raise InputError(
+                    f"{self.at(index)}: the row is shorter than the others, whose numbers end at the same "
+                    "places, so that a character is missing; get the complete file"
+                )
 
     def rows(self, indices: Sequence[int]) -> Iterator[list[float]]:
         """Return the values on each of these lines, all the data of the file: see ``numbers``."""
@@ -185,13 +243,23 @@ class TextFile:
         numbers touch nobody can tell where the first one ends. An empty cell between two commas is refused too."""
         values = []
         if _EMPTY_CELL.search(self.lines[index]):
-            raise InputError(f"{self.at(index)}: a cell is empty between two separators, so that a value is missing; "
-                             "get the complete file")
-        for word in (_BETWEEN_DECIMALS if decimal_commas else _BETWEEN).split(self.lines[index].strip()):
+            raise InputError(
+                f"{self.at(index)}: a cell is empty between two separators, so that a value is missing; "
+                "get the complete file"
+            )
+        for word in (_BETWEEN_DECIMALS if decimal_commas else _BETWEEN).split(
+            self.lines[index].strip()
+        ):
             written = word.replace(",", ".") if decimal_commas else word
             parts = _NUMBER.findall(written)
-            whole_after_decimal = len({"." in part for part in parts}) > 1  # "1.234-105": the exponent lost its letter
-            if "".join(parts) != written or whole_after_decimal or any(part[0] not in "+-" for part in parts[1:]):
+            whole_after_decimal = (
+                len({"." in part for part in parts}) > 1
+            )  # "1.234-105": the exponent lost its letter
+            if (
+                "".join(parts) != written
+                or whole_after_decimal
+                or any(part[0] not in "+-" for part in parts[1:])
+            ):
                 parts = [word]  # which is no number, and is refused as one
             values += [self.number(index, part) for part in parts]
         return values
@@ -202,7 +270,11 @@ class TextFile:
         split = _BETWEEN_DECIMALS if decimal else _BETWEEN
         words = (split.split(self.lines[index].strip()) for index in indices)
         styles = {_style(row[column]) for row in words if len(row) > column}
-        return None if any(exponent for _, exponent in styles) else max((found for found, _ in styles), default=None)
+        return (
+            None
+            if any(exponent for _, exponent in styles)
+            else max((found for found, _ in styles), default=None)
+        )
 
     def fixed(self, index: int, width: int, offset: int = 0) -> list[float]:
         """Return the values on lines[index] in columns of `width` characters from `offset` on, which may touch.
@@ -212,19 +284,23 @@ class TextFile:
         line = self.lines[index].rstrip()
         values = []
         for left in range(offset, len(line), width):
-            field = line[left:left + width]
+            field = line[left : left + width]
             where = f" in columns {left + 1} to {left + width}"
             values.append(self.number(index, field.strip(), where))
             if len(field) < width or field[-1].isspace():
-                raise InputError(f"{self.at(index)}: {shown(field.strip())}{where} does not end where its columns do, "
-                                 "so that a character is missing or too many on the line; get the complete file")
+                raise InputError(
+                    f"{self.at(index)}: {shown(field.strip())}{where} does not end where its columns do, "
+                    "so that a character is missing or too many on the line; get the complete file"
+                )
         return values
 
     def number(self, index: int, word: str, where: str = "") -> float:
         """Return a finite number, also with Fortran's exponent letter D; InputError naming file, line and word."""
         found = float(word.upper().replace("D", "E")) if _NUMBER.fullmatch(word) else math.nan
         if not math.isfinite(found):
-            raise InputError(f"{self.at(index)}: {shown(word)}{where} is not a number; correct it or get another file")
+            raise InputError(
+                f"{self.at(index)}: {shown(word)}{where} is not a number; correct it or get another file"
+            )
         return found
 
     def entry(self, header: Entries, key: str) -> tuple[int, str]:
@@ -248,10 +324,14 @@ class TextFile:
         for index in indices:
             line = self.lines[index].strip()
             words.append([word for word in split.split(line) if word])
-            short = [word for word in words[-1] for digits in _EXPONENT.findall(word) if len(digits) == 1]
+            short = [
+                word for word in words[-1] for digits in _EXPONENT.findall(word) if len(digits) == 1
+            ]
             if zeros and short:
-                raise InputError(f"{self.at(index)}: the exponent of {shown(short[0])} is shorter than those of other "
-                                 "numbers; a digit was lost, get the complete file")
+                raise InputError(
+                    f"{self.at(index)}: the exponent of {shown(short[0])} is shorter than those of other "
+                    "numbers; a digit was lost, get the complete file"
+                )
         if len(words) < 2 or not words[-1]:
             return
         last = words[-1][-1]
@@ -264,13 +344,22 @@ class TextFile:
         decimals, exponent = styles.pop()
         found, has_exponent = _style(last)
         if found < decimals or exponent and not has_exponent:
-            raise InputError(f"{self.at(indices[-1])}: the last number {shown(last)} is cut off, others in its column "
-                             f"have {decimals} decimals{' and an exponent' if exponent else ''}; get the complete file")
+            raise InputError(
+                f"{self.at(indices[-1])}: the last number {shown(last)} is cut off, others in its column "
+                f"have {decimals} decimals{' and an exponent' if exponent else ''}; get the complete file"
+            )
 
     def _decimal_commas(self, indices: Sequence[int]) -> bool:
         """Tell whether commas in these lines are decimal, and do not separate; InputError where it cannot be told."""
         data = [self.lines[index] for index in indices]
-        inside = next((index for index, line in zip(indices, data, strict=True) if _COMMA_INSIDE.search(line)), None)
+        inside = next(
+            (
+                index
+                for index, line in zip(indices, data, strict=True)
+                if _COMMA_INSIDE.search(line)
+            ),
+            None,
+        )
         points, semicolons = (any(sign in line for line in data) for sign in ".;")
         if inside is None or points and not semicolons:
             return False
@@ -279,8 +368,10 @@ class TextFile:
             return False
         if semicolons and not points:
             return True
-        raise InputError(f"{self.at(inside)}: the comma between digits may be a decimal comma or a separator; write "
-                         "decimal points, and blanks between the numbers")
+        raise InputError(
+            f"{self.at(inside)}: the comma between digits may be a decimal comma or a separator; write "
+            "decimal points, and blanks between the numbers"
+        )
 
 
 def _style(word: str) -> tuple[int, bool]:
@@ -302,13 +393,17 @@ def load_text(path: str | os.PathLike[str], **said: Any) -> TextFile:
     except FileNotFoundError:
         raise InputError(f"{name}: there is no such file; check the path") from None
     except OSError as error:
-        raise InputError(f"{name}: cannot be read ({error.strerror}); check that it is a file you may read") from None
+        raise InputError(
+            f"{name}: cannot be read ({error.strerror}); check that it is a file you may read"
+        ) from None
     if len(data) > BYTES:
         raise InputError(f"{name}: the file is larger than {BYTES:.0e} bytes; give one record")
     if not data.strip():
         raise InputError(f"{name}: the file is empty; download or copy it again")
     if b"\0" in data:
-        raise InputError(f"{name}: this is not a text file; convert MiniSEED and SAC, unpack archives")
+        raise InputError(
+            f"{name}: this is not a text file; convert MiniSEED and SAC, unpack archives"
+        )
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:

@@ -14,7 +14,11 @@ DIGITS = 9  # significant digits of a written sample; what is read back differs 
 def write_columns(record: Record, path: str | os.PathLike[str], units: str) -> None:
     """Write time [s] and acceleration in `units`, after comment lines "#" with title, units, time step and notes."""
     samples, name = _samples(record, units)
-    comments = [record.title, f"time [s], acceleration [{name}], dt = {record.dt:.10g} s", *record.notes]
+    comments = [
+        record.title,
+        f"time [s], acceleration [{name}], dt = {record.dt:.10g} s",
+        *record.notes,
+    ]
     rows = [f"{time:.10g} {sample}" for time, sample in zip(record.times, samples, strict=True)]
     _write(path, [" ".join(["#", *comment.split()]) for comment in comments if comment] + rows)
 
@@ -23,10 +27,15 @@ def write_columns(record: Record, path: str | os.PathLike[str], units: str) -> N
 def write_at2(record: Record, path: str | os.PathLike[str], units: str = "g") -> None:
     """Write PEER AT2: four header lines with units, NPTS and DT, then five values a row."""
     samples, name = _samples(record, units)
-    header = ["PEER AT2 format, written by vi_contact", " ".join(record.title.split()) or "record",
-              f"ACCELERATION TIME SERIES IN UNITS OF {name.upper()}",
-              f"NPTS= {record.acceleration.size}, DT= {record.dt:.10g} SEC"]
-    rows = ["".join(f"{sample:>18}" for sample in samples[k:k + 5]) for k in range(0, len(samples), 5)]
+    header = [
+        "PEER AT2 format, written by vi_contact",
+        " ".join(record.title.split()) or "record",
+        f"ACCELERATION TIME SERIES IN UNITS OF {name.upper()}",
+        f"NPTS= {record.acceleration.size}, DT= {record.dt:.10g} SEC",
+    ]
+    rows = [
+        "".join(f"{sample:>18}" for sample in samples[k : k + 5]) for k in range(0, len(samples), 5)
+    ]
     _write(path, header + rows)
 
 
@@ -46,5 +55,7 @@ def _write(path: str | os.PathLike[str], lines: list[str]) -> None:
     try:
         write_output(path, ("\n".join(lines) + "\n").encode("utf-8"))
     except OSError as error:
-        raise InputError(f"{os.fspath(path)}: cannot be written ({error.strerror or error}); give another file, or "
-                         "mend what the system says") from error
+        raise InputError(
+            f"{os.fspath(path)}: cannot be written ({error.strerror or error}); give another file, or "
+            "mend what the system says"
+        ) from error

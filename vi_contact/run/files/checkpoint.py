@@ -39,8 +39,21 @@ Arrays = dict[str, Any]
 MEMORY = "memory_"
 CONTACT = ("r_n", "active", "r_t")  # arrays of the conditions
 SAID = 200  # characters of a foreign reason
-DAMAGE = (OSError, ValueError, LookupError, TypeError, AttributeError, RuntimeError, EOFError, ArithmeticError,
-          SyntaxError, tokenize.TokenError, struct.error, zlib.error, zipfile.BadZipFile)
+DAMAGE = (
+    OSError,
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    RuntimeError,
+    EOFError,
+    ArithmeticError,
+    SyntaxError,
+    tokenize.TokenError,
+    struct.error,
+    zlib.error,
+    zipfile.BadZipFile,
+)
 """What a damaged archive makes the readers of zip, numpy and json raise."""
 
 
@@ -63,22 +76,42 @@ class RestartPoint:
         return self.k_start + self.base
 
 
-def write_checkpoint(folder: Path, problem: ContactProblem, place: RestartPoint, *, of: Mapping[str, Any],
-                     rows: str = "", safe: bool = True) -> None:
+def write_checkpoint(
+    folder: Path,
+    problem: ContactProblem,
+    place: RestartPoint,
+    *,
+    of: Mapping[str, Any],
+    rows: str = "",
+    safe: bool = True,
+) -> None:
     """Replace the checkpoint in the folder. ``of``: the "run", as ``identity`` sees it over a "span" of times [s];
     ``rows``: checksum of the histories up to here; ``safe``: whether these are on the medium, and the checkpoint shall
     be. Collective; ViContactError on all ranks when the disk refuses it."""
     state = place.state
     vectors, same = _split(problem, state)
     gathered = problem.system.algebra.comm.gather((problem.system.space.ids, vectors))
-    about = json.dumps({"format": FORMAT, **of, "rows": rows, "vectors": sorted(vectors), "t": state.t, "k": state.k,
-                        "t_start": place.t_start, "k_start": place.k_start, "base": place.base,
-                        "halved": place.halved})  # json keeps floats to the last bit
+    about = json.dumps(
+        {
+            "format": FORMAT,
+            **of,
+            "rows": rows,
+            "vectors": sorted(vectors),
+            "t": state.t,
+            "k": state.k,
+            "t_start": place.t_start,
+            "k_start": place.k_start,
+            "base": place.base,
+            "halved": place.halved,
+        }
+    )  # json keeps floats to the last bit
 
     def write() -> None:
         parts = gathered or []
         order = np.argsort(np.concatenate([ids for ids, _ in parts]))
-        arrays = {name: np.concatenate([found[name] for _, found in parts])[order] for name in vectors} | same
+        arrays = {
+            name: np.concatenate([found[name] for _, found in parts])[order] for name in vectors
+        } | same
         arrays["about"] = np.array(about)
         buffer = io.BytesIO()
         np.savez(buffer, checksum=np.array(checksum(arrays)), **arrays)
@@ -106,7 +139,9 @@ def _split(problem: ContactProblem, state: State) -> tuple[Arrays, Arrays]:
     """(arrays of owned unknowns, arrays that are the same on every rank, or on rank 0 only)."""
     comm = problem.system.algebra.comm
     vectors: Arrays = {"u": state.u, "v": state.v}
-    contact: Arrays = {"r_n": state.r_n, "active": state.active} | ({} if state.r_t is None else {"r_t": state.r_t})
+    contact: Arrays = {"r_n": state.r_n, "active": state.active} | (
+        {} if state.r_t is None else {"r_t": state.r_t}
+    )
     same = {name: problem.surface.on_first(array) for name, array in contact.items()}
     for name in sorted(state.memory):
         array = np.asarray(state.memory[name])
@@ -115,8 +150,9 @@ def _split(problem: ContactProblem, state: State) -> tuple[Arrays, Arrays]:
     return vectors, same
 
 
-def read_checkpoint(folder: Path, problem: ContactProblem, *, scheme: Scheme, dt: TimeSteps,
-                    changed: bool = False) -> tuple[RestartPoint, str]:
+def read_checkpoint(
+    folder: Path, problem: ContactProblem, *, scheme: Scheme, dt: TimeSteps, changed: bool = False
+) -> tuple[RestartPoint, str]:
     """Return (where a run was left, with the state on the ranks of this one; checksum of its histories). Collective.
 
     InputError when the checkpoint is missing, damaged, of an unknown format, or of another problem, dt (or plan of
@@ -127,9 +163,18 @@ def read_checkpoint(folder: Path, problem: ContactProblem, *, scheme: Scheme, dt
     about = comm.bcast(whole and whole[0])
     other = _compare(file, problem, scheme, dt, about, changed)
     arrays: Arrays = {"r_t": None} | _own(problem, about["vectors"], whole and whole[1])
-    known = {} if other else arrays  # what a scheme keeps in mind was made of the old problem's matrices and loads
-    memory = {name.removeprefix(MEMORY): array for name, array in known.items() if name.startswith(MEMORY)}
-    state = State(about["t"], about["k"], memory=memory, **{name: arrays[name] for name in ("u", "v", *CONTACT)})
+    known = (
+        {} if other else arrays
+    )  # what a scheme keeps in mind was made of the old problem's matrices and loads
+    memory = {
+        name.removeprefix(MEMORY): array for name, array in known.items() if name.startswith(MEMORY)
+    }
+    state = State(
+        about["t"],
+        about["k"],
+        memory=memory,
+        **{name: arrays[name] for name in ("u", "v", *CONTACT)},
+    )
     place = RestartPoint(state, about["t_start"], about["k_start"], about["base"], about["halved"])
     if "dt" in other:
         place = replace(place, t_start=state.t, k_start=place.number, base=0)
@@ -143,22 +188,36 @@ def _own(problem: ContactProblem, vectors: list[str], whole: Arrays | None) -> A
     every = np.sort(np.concatenate([ids for ids, _ in parts]))
     for rank, (ids, slots) in enumerate(parts):
         rows = dict.fromkeys(vectors, np.searchsorted(every, ids)) | dict.fromkeys(CONTACT, slots)
-        found = comm.bcast({name: values[rows.get(name, ...)] for name, values in (whole or {}).items()})
+        found = comm.bcast(
+            {name: values[rows.get(name, ...)] for name, values in (whole or {}).items()}
+        )
         own = found if rank == comm.rank else own
     return own
 
 
-def _compare(file: Path, problem: ContactProblem, scheme: Scheme, dt: TimeSteps, about: Mapping[str, Any],
-             changed: bool) -> list[str]:
+def _compare(
+    file: Path,
+    problem: ContactProblem,
+    scheme: Scheme,
+    dt: TimeSteps,
+    about: Mapping[str, Any],
+    changed: bool,
+) -> list[str]:
     """The names of what is another problem's; InputError unless that was allowed, or can be. Collective."""
     start, end = about["span"]
     found = differences(identity(problem, scheme, dt, start=start, end=end), about["run"])
     for name, how in found.items():
         if name in FIXED or not changed:
-            remedy = "or start a new one" + ("" if name in FIXED else ", or allow it by name (changed=True)")
-            raise InputError(f"the checkpoint '{file}' is of a run with {how}: restart the same run, {remedy}")
+            remedy = "or start a new one" + (
+                "" if name in FIXED else ", or allow it by name (changed=True)"
+            )
+            raise InputError(
+                f"the checkpoint '{file}' is of a run with {how}: restart the same run, {remedy}"
+            )
     if found and problem.system.algebra.comm.rank == 0:
-        log.warning("the checkpoint '%s' is continued as another problem: %s", file, ", ".join(found))
+        log.warning(
+            "the checkpoint '%s' is continued as another problem: %s", file, ", ".join(found)
+        )
     return list(found)
 
 
@@ -170,7 +229,9 @@ def _damaged(file: Path, why: Any) -> InputError:
 def _read(file: Path, problem: ContactProblem) -> tuple[dict[str, Any], Arrays]:
     """Description and whole arrays of a checkpoint that fits the problem in its sizes."""
     if not is_own(file):
-        raise InputError(f"there is no checkpoint '{file}' to restart from: give the folder of a run")
+        raise InputError(
+            f"there is no checkpoint '{file}' to restart from: give the folder of a run"
+        )
     try:
         about, arrays = _unpacked(file)
     except DAMAGE as error:
@@ -181,7 +242,9 @@ def _read(file: Path, problem: ContactProblem) -> tuple[dict[str, Any], Arrays]:
     try:
         _check_sizes(problem, about, arrays)
     except (InputError, KeyError, TypeError) as error:
-        raise _damaged(file, f"{error} is missing" if isinstance(error, KeyError) else error) from error
+        raise _damaged(
+            file, f"{error} is missing" if isinstance(error, KeyError) else error
+        ) from error
     return about, arrays
 
 
@@ -221,9 +284,16 @@ def _check_header(archive: zipfile.ZipFile, one: zipfile.ZipInfo) -> None:
 
 def _check_sizes(problem: ContactProblem, about: dict[str, Any], arrays: Arrays) -> None:
     """InputError or KeyError for missing, misshapen or senseless values; of another problem nothing need fit."""
-    n, m, d = problem.system.space.unknowns, problem.surface.total, problem.surface.tangents.shape[1]
+    n, m, d = (
+        problem.system.space.unknowns,
+        problem.surface.total,
+        problem.surface.tangents.shape[1],
+    )
     about |= {name: number("it", name, about[name]) for name in ("t", "t_start")}
-    about |= {name: whole("it", name, about[name], most=2**53) for name in ("k", "k_start", "base", "halved")}
+    about |= {
+        name: whole("it", name, about[name], most=2**53)
+        for name in ("k", "k_start", "base", "halved")
+    }
     array("it", "span", about["span"], (2,))
     if not isinstance(about["rows"], str) or not {"u", "v"} <= set(about["vectors"]):
         raise InputError("the description of the run is empty")

@@ -22,7 +22,16 @@ from typing import Any
 from ...core.algebra import Comm
 from ...core.checks import shown
 from ...core.errors import InputError
-from ...core.files import FIELDS, FIELDS_INDEX, FRAME, FRAMES, on_root, sentence, to_json, write_atomically
+from ...core.files import (
+    FIELDS,
+    FIELDS_INDEX,
+    FRAME,
+    FRAMES,
+    on_root,
+    sentence,
+    to_json,
+    write_atomically,
+)
 from ...core.own_files import (
     inner_folder,
     is_own,
@@ -54,11 +63,35 @@ MESH = "mesh.h5"
 STAGES = "stages"  # the folder of the runs of stages before the last one
 MODEL = "model.json"
 SUMMARY = "summary.json"
-FILES = (ABOUT, CHECKPOINT, COLUMNS, FIELDS_INDEX, HISTORY_CSV, HISTORY_H5, JOURNAL, LOG, MODEL,
-         SUMMARY)  # of a run
-_OF_CASES = (COPY, FOLLOWS, "strain_compatible.json", "row.json", "failure.txt")  # beside them, by cases and studies
-_OF_REPORTS = ("report.pdf", "report.html", "peaks.csv", "model.png", "deformed.png", "faces.png", "film.gif",
-               "film.mp4")
+FILES = (
+    ABOUT,
+    CHECKPOINT,
+    COLUMNS,
+    FIELDS_INDEX,
+    HISTORY_CSV,
+    HISTORY_H5,
+    JOURNAL,
+    LOG,
+    MODEL,
+    SUMMARY,
+)  # of a run
+_OF_CASES = (
+    COPY,
+    FOLLOWS,
+    "strain_compatible.json",
+    "row.json",
+    "failure.txt",
+)  # beside them, by cases and studies
+_OF_REPORTS = (
+    "report.pdf",
+    "report.html",
+    "peaks.csv",
+    "model.png",
+    "deformed.png",
+    "faces.png",
+    "film.gif",
+    "film.mp4",
+)
 _TRIAL = re.compile(r"\.writable-\d+")
 _held: dict[Path, int] = {}  # locks that this process has -> the thread that took them
 
@@ -69,7 +102,9 @@ def run_folder(comm: Comm, path: str | Path) -> Path:
     InputError also when files of others have names that a run replaces."""
     folder = Path(path)
     if find_spec("h5py") is None:
-        raise InputError(f"output folder '{folder}' needs h5py, which is missing here: install it, or run without")
+        raise InputError(
+            f"output folder '{folder}' needs h5py, which is missing here: install it, or run without"
+        )
 
     def make() -> None:
         try:
@@ -79,7 +114,9 @@ def run_folder(comm: Comm, path: str | Path) -> Path:
             remove(trial)
         except OSError as error:
             reason = error.strerror or str(error)
-            raise InputError(f"output folder '{folder}' cannot be written ({reason}): choose another one") from error
+            raise InputError(
+                f"output folder '{folder}' cannot be written ({reason}): choose another one"
+            ) from error
         refuse_files_of_others(folder)
 
     on_root(comm, make)
@@ -101,8 +138,10 @@ def refuse_files_of_others(folder: Path) -> None:
     if is_marked(folder):
         return
     for path in _written_by_runs(folder):
-        raise InputError(f"'{path}' is not of a run of vi_contact (there is no {ABOUT} in '{folder}'), and a run would "
-                         "replace it: choose another output folder, or move the file")
+        raise InputError(
+            f"'{path}' is not of a run of vi_contact (there is no {ABOUT} in '{folder}'), and a run would "
+            "replace it: choose another output folder, or move the file"
+        )
 
 
 def take(folder: Path) -> None:
@@ -115,7 +154,11 @@ def take(folder: Path) -> None:
 def _written_by_runs(folder: Path) -> list[Path]:
     """What is in a folder under names that runs write, but for the copy of a case, which has a mark of its own."""
     fields = inner_folder(folder, FIELDS)
-    files = [folder / name for name in (*FILES, FOLLOWS) if name != MODEL or not _is_model(folder / MODEL)]
+    files = [
+        folder / name
+        for name in (*FILES, FOLLOWS)
+        if name != MODEL or not _is_model(folder / MODEL)
+    ]
     return [path for path in [*files, *_frames(fields)] if os.path.lexists(path)]
 
 
@@ -133,14 +176,20 @@ def _is_model(path: Path) -> bool:
 def _frames(fields: Path) -> list[Path]:
     """The files in the folder of fields that have names of ours."""
     known = sorted(os.listdir(fields)) if fields.is_dir() else []
-    return [fields / name for name in known if name == MESH or FRAME.fullmatch(name) or FRAMES.fullmatch(name)]
+    return [
+        fields / name
+        for name in known
+        if name == MESH or FRAME.fullmatch(name) or FRAMES.fullmatch(name)
+    ]
 
 
 def check_format(file: Path, found: Any) -> None:
     """Raise InputError for a file of a format that this version does not know."""
     if found != FORMAT or isinstance(found, bool):
-        raise InputError(f"'{file}' has format {shown(found)} and this version of vi_contact reads {FORMAT}: read it "
-                         "with the version that wrote it")
+        raise InputError(
+            f"'{file}' has format {shown(found)} and this version of vi_contact reads {FORMAT}: read it "
+            "with the version that wrote it"
+        )
 
 
 def check_folder_format(folder: Path) -> None:
@@ -151,8 +200,15 @@ def check_folder_format(folder: Path) -> None:
         found = json.loads(read_text(folder / ABOUT))["format"]
     except OSError as error:
         raise InputError(sentence(error)) from error
-    except (ValueError, TypeError, KeyError, RecursionError) as error:  # of json, and of what it has read
-        raise InputError(f"'{folder / ABOUT}' is damaged ({error}): restore it or remove it") from error
+    except (
+        ValueError,
+        TypeError,
+        KeyError,
+        RecursionError,
+    ) as error:  # of json, and of what it has read
+        raise InputError(
+            f"'{folder / ABOUT}' is damaged ({error}): restore it or remove it"
+        ) from error
     check_format(folder, found)
 
 
@@ -230,7 +286,9 @@ def _is_temporary(name: str) -> bool:
 
 def _is_name_of_runs(name: str) -> bool:
     known = (*FILES, *_OF_CASES, *_OF_REPORTS, MESH)
-    return bool(name in known or FRAME.fullmatch(name) or FRAMES.fullmatch(name) or _TRIAL.fullmatch(name))
+    return bool(
+        name in known or FRAME.fullmatch(name) or FRAMES.fullmatch(name) or _TRIAL.fullmatch(name)
+    )
 
 
 @contextmanager
@@ -243,7 +301,9 @@ def locked(comm: Comm, folder: Path | None, name: str = LOCK) -> Iterator[None]:
     try:
         yield
     finally:
-        if mine is not None and folder is not None:  # removed while locked: who opens it meanwhile makes a new one
+        if (
+            mine is not None and folder is not None
+        ):  # removed while locked: who opens it meanwhile makes a new one
             _held.pop(folder.resolve() / name, None)
             remove(folder / name)
             mine.close()
@@ -258,11 +318,16 @@ def _take(folder: Path, name: str) -> Any:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise InputError(f"another run writes into '{folder}' ({_owner(file)}): wait until it has ended, or choose "
-                             "another output folder") from None
+            raise InputError(
+                f"another run writes into '{folder}' ({_owner(file)}): wait until it has ended, or choose "
+                "another output folder"
+            ) from None
         except OSError as error:
-            log.warning("'%s' is on a file system without locks (%s): make sure that no other run writes there",
-                        folder, error.strerror)
+            log.warning(
+                "'%s' is on a file system without locks (%s): make sure that no other run writes there",
+                folder,
+                error.strerror,
+            )
         if names(file) > 1 and same_file(folder / name, file):
             remove(folder / name)  # its other name, a hard link, keeps what it holds
         if same_file(folder / name, file):

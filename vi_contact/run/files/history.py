@@ -17,15 +17,33 @@ from typing import Any
 import numpy as np
 
 from ...core.algebra import Array
-from ...core.files import STRIDE, copy_start, hdf5_atomically, open_hdf5, push, to_json, write_all, write_atomically
+from ...core.files import (
+    STRIDE,
+    copy_start,
+    hdf5_atomically,
+    open_hdf5,
+    push,
+    to_json,
+    write_all,
+    write_atomically,
+)
 from ...core.own_files import open_new, open_to_append, open_to_read, remove
 from ...core.step import Row
 from .folder import COLUMNS, FORMAT, HISTORY_CSV, HISTORY_H5, JOURNAL
 from .stored_rows import StoredArrays, StoredRows, lines_of, read_blocks, records_of
 from .table import Block, Table
 
-GEOMETRY = {"points": "m", "normals": "-", "weights": "m²", "gap0": "m", "bilateral": "-"}  # of contact points, units
-PUSH, SAVE = 1.0, 10.0  # seconds after which rows are pushed onto the medium, and history.h5 is rewritten, again
+GEOMETRY = {
+    "points": "m",
+    "normals": "-",
+    "weights": "m²",
+    "gap0": "m",
+    "bilateral": "-",
+}  # of contact points, units
+PUSH, SAVE = (
+    1.0,
+    10.0,
+)  # seconds after which rows are pushed onto the medium, and history.h5 is rewritten, again
 GROWTH = 1.25  # history.h5 is rewritten when it has grown by this factor: what is written stays in proportion
 
 
@@ -35,14 +53,22 @@ class HistoryFiles:
     ``stored``: the rows of an earlier run that this one continues, in this folder (later ones are dropped) or another.
     """
 
-    def __init__(self, folder: Path, table: Table, geometry: Mapping[str, Array],
-                 stored: StoredRows | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        table: Table,
+        geometry: Mapping[str, Array],
+        stored: StoredRows | None = None,
+    ) -> None:
         self._folder, self._table, self._geometry = folder, table, geometry
         self._rows = self._saved = self._tail = self._last = 0
         self._hash = hashlib.sha256()
         self._journal: Any = None
         self._pushed = self._made = time.monotonic()
-        columns = {name: {"unit": unit, "meaning": meaning} for name, (unit, meaning) in table.columns.items()}
+        columns = {
+            name: {"unit": unit, "meaning": meaning}
+            for name, (unit, meaning) in table.columns.items()
+        }
         write_atomically(folder / COLUMNS, (to_json(columns) + "\n").encode())
         if stored is None:
             self._csv = open_new(folder / HISTORY_CSV)
@@ -74,7 +100,9 @@ class HistoryFiles:
     def append(self, *rows: Row) -> None:
         """Write rows onto the disk; those that it has no room for are taken back, all of them."""
         lines, names = lines_of(self._table, rows), ("k", *self._table.arrays)
-        records = records_of(self._table, {name: np.array([row[name] for row in rows]) for name in names})
+        records = records_of(
+            self._table, {name: np.array([row[name] for row in rows]) for name in names}
+        )
         _append((self._journal, b"".join(records)), (self._csv, b"".join(lines)))
         for line, record in zip(lines, records, strict=True):
             self._hash.update(line + record)
@@ -106,7 +134,9 @@ class HistoryFiles:
     def save(self) -> None:
         """Write history.h5 with all rows, from the memory if they are there; the journal starts anew."""
         if self._rows == self._table.count and (known := self._table.remembered()) is not None:
-            self._replace(iter([{name: values[self._saved :] for name, values in known.items()}]), self._saved)
+            self._replace(
+                iter([{name: values[self._saved :] for name, values in known.items()}]), self._saved
+            )
         else:
             path, stored = self._folder / HISTORY_CSV, StoredArrays(self._folder, self._table)
             with open_to_read(path) as csv, closing(stored) as arrays:

@@ -39,24 +39,38 @@ Numbers = list[tuple[float, float]]  # values and their sizes
 Identity = dict[str, Any]
 
 
-def identity(problem: ContactProblem, scheme: Scheme, dt: TimeSteps, *, start: float, end: float) -> Identity:
+def identity(
+    problem: ContactProblem, scheme: Scheme, dt: TimeSteps, *, start: float, end: float
+) -> Identity:
     """Name -> number, text or numbers with sizes, of all ranks; histories from ``start`` to ``end`` [s]. Collective."""
     system, surface = problem.system, problem.surface
     probes = [probe(np.asarray(system.space.ids), j) for j in range(PROBES)]
-    pairs = [(w, w) for w in probes] + ([] if system.algebra.symmetric else [(probes[0], probes[1])])
+    pairs = [(w, w) for w in probes] + (
+        [] if system.algebra.symmetric else [(probes[0], probes[1])]
+    )
     first = min(end - start, STEPS * min(pieces_of(dt))[0])
     early = [start + first * i / EARLY for i in range(EARLY + 1)]
-    times = start + (end - start) * (np.arange(SAMPLES) + probe(np.arange(SAMPLES), 0) + 0.5) / SAMPLES
+    times = (
+        start + (end - start) * (np.arange(SAMPLES) + probe(np.arange(SAMPLES), 0) + 0.5) / SAMPLES
+    )
     return {
-        "unknowns": system.space.unknowns, "contact points": surface.total, "dt": described(dt),
-        "scheme": text_of(scheme), "mass": text_of(problem.mass), "impact law": text_of(problem.impact),
-        "friction law": text_of(with_values(problem.friction, surface, partial(_of_all_points, surface))),
+        "unknowns": system.space.unknowns,
+        "contact points": surface.total,
+        "dt": described(dt),
+        "scheme": text_of(scheme),
+        "mass": text_of(problem.mass),
+        "impact law": text_of(problem.impact),
+        "friction law": text_of(
+            with_values(problem.friction, surface, partial(_of_all_points, surface))
+        ),
         "stiffness": [_dot(system, w, system.K @ x) for w, x in pairs],
         "mass matrix": [_dot(system, w, system.M @ x) for w, x in pairs],
         "damping": [] if system.C is None else [_dot(system, w, system.C @ x) for w, x in pairs],
         "geometry": [_dot(system, probes[0], x) for x in system.space.coordinates.T],
-        "load": _loads(system, probes, early, times), "excitation": _excitation(problem, times),
-        "contact surface or obstacle": _contact(surface, early), "friction": _friction(problem),
+        "load": _loads(system, probes, early, times),
+        "excitation": _excitation(problem, times),
+        "contact surface or obstacle": _contact(surface, early),
+        "friction": _friction(problem),
     }
 
 
@@ -79,12 +93,17 @@ def differences(ours: Identity, theirs: Mapping[str, Any]) -> dict[str, str]:
 
 def _same_numbers(own: Numbers, other: Any) -> bool:
     try:
-        one, two = np.array(own, dtype=float).reshape(-1, 2), np.array(other, dtype=float).reshape(-1, 2)
+        one, two = (
+            np.array(own, dtype=float).reshape(-1, 2),
+            np.array(other, dtype=float).reshape(-1, 2),
+        )
     except (TypeError, ValueError):
         return False
     if one.shape != two.shape:
         return False
-    return bool(np.all(np.abs(one - two) <= SAME * np.maximum(np.abs(one[:, 1:]), np.abs(two[:, 1:]))))
+    return bool(
+        np.all(np.abs(one - two) <= SAME * np.maximum(np.abs(one[:, 1:]), np.abs(two[:, 1:])))
+    )
 
 
 def _same_text(own: str, other: str) -> bool:
@@ -105,7 +124,9 @@ def _dot(system: SemiDiscreteSystem, w: Array, x: Array) -> tuple[float, float]:
     return dot(w, x), float(np.sqrt(dot(w, w) * dot(x, x)))
 
 
-def _loads(system: SemiDiscreteSystem, probes: Sequence[Array], early: Sequence[float], times: Array) -> Numbers:
+def _loads(
+    system: SemiDiscreteSystem, probes: Sequence[Array], early: Sequence[float], times: Array
+) -> Numbers:
     """The load in the first steps, and the histories of its separable parts through the run."""
     forces = [system.load(t) for t in early]
     size = max(float(np.sqrt(system.algebra.dot(f, f))) for f in forces)
@@ -152,14 +173,27 @@ def _numbers_in(value: Any) -> Iterator[float]:
 
 def _contact(surface: ContactSurface, early: Sequence[float]) -> Numbers:
     """Where the contact points are, and what they may touch, at rest and as it moves."""
-    arrays = [*surface.points.T, *surface.normals.T, surface.weights, surface.gap0, surface.compliance,
-              surface.bilateral.astype(float)]
+    arrays = [
+        *surface.points.T,
+        *surface.normals.T,
+        surface.weights,
+        surface.gap0,
+        surface.compliance,
+        surface.bilateral.astype(float),
+    ]
     arrays += [] if surface.motion is None else [surface.gap(t) for t in early]
-    arrays += [] if surface.slide is None else [column for t in early for column in surface.slide(t).T]
+    arrays += (
+        [] if surface.slide is None else [column for t in early for column in surface.slide(t).T]
+    )
     found, d = _columns(surface, arrays), surface.points.shape[1]
-    round_off = ROUND_OFF * max(size for _, size in found[: 3 * d])  # of points, which gaps are differences of
+    round_off = ROUND_OFF * max(
+        size for _, size in found[: 3 * d]
+    )  # of points, which gaps are differences of
     gaps = {2 * d + 1, *range(2 * d + 4, len(arrays))}
-    return [(value, max(size, round_off) if i // 3 in gaps else size) for i, (value, size) in enumerate(found)]
+    return [
+        (value, max(size, round_off) if i // 3 in gaps else size)
+        for i, (value, size) in enumerate(found)
+    ]
 
 
 def _columns(surface: ContactSurface, arrays: Sequence[Array]) -> Numbers:

@@ -102,7 +102,11 @@ def versions(*needed: str) -> dict[str, str]:
     for name in needed:
         with suppress(ModuleNotFoundError):  # nothing is written, else the folder was refused
             import_module(name)
-    names = [name for name in ("numpy", "scipy", "h5py", "petsc4py", "mpi4py", "dolfinx") if sys.modules.get(name)]
+    names = [
+        name
+        for name in ("numpy", "scipy", "h5py", "petsc4py", "mpi4py", "dolfinx")
+        if sys.modules.get(name)
+    ]
     own = {"vi_contact": __version__, "python": platform.python_version()}
     return own | {name: str(sys.modules[name].__version__) for name in names}
 
@@ -129,11 +133,21 @@ class Progress:
         """Count one more step as done."""
         self._done += 1
         if self._bar is not None:
-            self._bar.set_postfix_str(f"t={t:.4g} s, iterations={iterations}, worst={worst:.1e}", refresh=False)
+            self._bar.set_postfix_str(
+                f"t={t:.4g} s, iterations={iterations}, worst={worst:.1e}", refresh=False
+            )
             self._bar.update()
         now = time.monotonic()
         if self._done >= self._next or now - self._told >= SECONDS:
             self._told, self._next = now, self._done + SHARE * self._total
             left = (now - self._begin) / self._done * (self._total - self._done)
-            log.info("step %d, t = %.6g s: %d of %d steps, %d iterations, worst certificate %.1e, %s left",
-                     k, t, self._done, self._total, iterations, worst, timedelta(seconds=int(left)))
+            log.info(
+                "step %d, t = %.6g s: %d of %d steps, %d iterations, worst certificate %.1e, %s left",
+                k,
+                t,
+                self._done,
+                self._total,
+                iterations,
+                worst,
+                timedelta(seconds=int(left)),
+            )

@@ -24,9 +24,22 @@ BYTES = 100_000_000  # of a JSON file
 _NEEDED = ("t", "k", "iterations", "certificate", "escalated")  # columns of every run
 _NUMBER = (int, float)
 _KINDS: dict[str, type | tuple[type, ...]] = {  # of the entries of summary.json that are used
-    "scheme": str, "mass": str, "solver": str, "status": str, "reason": str, "dt": (int, float, str), "versions": dict,
-    "iterations_per_step": dict, "tolerance": _NUMBER, "ranks": int, "unknowns": int, "contact_points": int,
-    "energy_defect": _NUMBER, "worst_certificate": _NUMBER, "energy_created": _NUMBER, "steps": int,
+    "scheme": str,
+    "mass": str,
+    "solver": str,
+    "status": str,
+    "reason": str,
+    "dt": (int, float, str),
+    "versions": dict,
+    "iterations_per_step": dict,
+    "tolerance": _NUMBER,
+    "ranks": int,
+    "unknowns": int,
+    "contact_points": int,
+    "energy_defect": _NUMBER,
+    "worst_certificate": _NUMBER,
+    "energy_created": _NUMBER,
+    "steps": int,
 }
 
 
@@ -81,10 +94,19 @@ def _of(path: Path, read: Callable[[Path], T]) -> T:
         return read(path)
     except InputError:
         raise
-    except (OSError, ValueError, KeyError, TypeError, RuntimeError, AttributeError) as error:  # of json and h5py
+    except (
+        OSError,
+        ValueError,
+        KeyError,
+        TypeError,
+        RuntimeError,
+        AttributeError,
+    ) as error:  # of json and h5py
         if of_machine(error):
             raise
-        raise InputError(f"a file of the run, '{path}', is missing or damaged ({_short(error)}): restore it") from error
+        raise InputError(
+            f"a file of the run, '{path}', is missing or damaged ({_short(error)}): restore it"
+        ) from error
 
 
 def _short(error: Exception) -> str:
@@ -141,7 +163,9 @@ def _fits(value: Any, kinds: type | tuple[type, ...]) -> bool:
 def _numbers(path: Path) -> dict[str, Array]:
     """Columns of history.csv; a last line that a crash cut short is left out."""
     try:
-        header, *lines = [line for line in read_bytes(path).splitlines(keepends=True) if line.endswith(b"\n")]
+        header, *lines = [
+            line for line in read_bytes(path).splitlines(keepends=True) if line.endswith(b"\n")
+        ]
         names = header.decode().strip().split(",")
         history = dict(zip(names, numbers_of(str(path), lines, len(names), 0).T, strict=True))
         if not lines or len(history) != len(names):
@@ -155,7 +179,9 @@ def _numbers(path: Path) -> dict[str, Array]:
     except OSError as error:
         raise InputError(sentence(error)) from error
     except ValueError as error:
-        raise InputError(f"'{path}' is damaged ({_short(error)}): restore it or run again") from error
+        raise InputError(
+            f"'{path}' is damaged ({_short(error)}): restore it or run again"
+        ) from error
     return history
 
 
@@ -164,11 +190,15 @@ def _check_rows(folder: Path, history: Mapping[str, Array], facts: Mapping[str, 
     rows, steps = len(history["t"]), facts.get("steps")
     gaps = np.flatnonzero(np.diff(history["k"]) != 1.0)
     if len(gaps):
-        raise InputError(f"'{folder / HISTORY_CSV}' is damaged (the steps k after line {gaps[0] + 2} do not follow "
-                         "each other): restore it or run again")
+        raise InputError(
+            f"'{folder / HISTORY_CSV}' is damaged (the steps k after line {gaps[0] + 2} do not follow "
+            "each other): restore it or run again"
+        )
     if isinstance(steps, int) and rows < steps + 1:
-        raise InputError(f"'{folder / HISTORY_CSV}' is damaged ({rows} rows are there, {SUMMARY} tells of {steps} "
-                         "steps and the initial state): restore it or run again")
+        raise InputError(
+            f"'{folder / HISTORY_CSV}' is damaged ({rows} rows are there, {SUMMARY} tells of {steps} "
+            "steps and the initial state): restore it or run again"
+        )
 
 
 def _compare(path: Path, file: StoredFile, history: Mapping[str, Array]) -> None:
@@ -177,14 +207,20 @@ def _compare(path: Path, file: StoredFile, history: Mapping[str, Array]) -> None
         if name not in file or file[name].ndim != 1:
             raise ValueError(f"{HISTORY_H5}: the column {shown(name)} is missing")
         other = file[name][: len(own)]
-        differ = np.flatnonzero(~((other == own[: len(other)]) | (np.isnan(other) & np.isnan(own[: len(other)]))))
+        differ = np.flatnonzero(
+            ~((other == own[: len(other)]) | (np.isnan(other) & np.isnan(own[: len(other)])))
+        )
         if len(differ):
             csv = path.with_name(HISTORY_CSV)
-            raise InputError(f"'{csv}' and '{path}' differ in {name}, line {differ[0] + 2}: one of them is damaged or "
-                             f"was changed; restore it, or move {HISTORY_H5} away to read the other alone")
+            raise InputError(
+                f"'{csv}' and '{path}' differ in {name}, line {differ[0] + 2}: one of them is damaged or "
+                f"was changed; restore it, or move {HISTORY_H5} away to read the other alone"
+            )
 
 
-def _arrays(path: Path, history: Mapping[str, Array]) -> tuple[dict[str, Array], ContactGeometry | None]:
+def _arrays(
+    path: Path, history: Mapping[str, Array]
+) -> tuple[dict[str, Array], ContactGeometry | None]:
     """(array columns when they have all rows, geometry of the contact points)."""
     rows = len(history["t"])
     if not is_own(path):
@@ -192,13 +228,24 @@ def _arrays(path: Path, history: Mapping[str, Array]) -> tuple[dict[str, Array],
     with open_hdf5(path) as file:
         _compare(path, file, history)
         group = file["contact"]
-        geometry = ContactGeometry(*(group[name][()] for name in ContactGeometry.__dataclass_fields__))
+        geometry = ContactGeometry(
+            *(group[name][()] for name in ContactGeometry.__dataclass_fields__)
+        )
         count = len(geometry.weights)
         shapes = {np.shape(getattr(geometry, name)) for name in ("weights", "gap0", "bilateral")}
         points = np.shape(geometry.points)
-        if shapes != {(count,)} or len(points) != 2 or points[0] != count or np.shape(geometry.normals) != points:
+        if (
+            shapes != {(count,)}
+            or len(points) != 2
+            or points[0] != count
+            or np.shape(geometry.normals) != points
+        ):
             raise ValueError(f"{HISTORY_H5}: the contact points do not fit each other")
-        whole = [name for name in file if name != "contact" and file[name].ndim > 1 and file[name].shape[0] == rows]
+        whole = [
+            name
+            for name in file
+            if name != "contact" and file[name].ndim > 1 and file[name].shape[0] == rows
+        ]
         arrays = {name: file[name][()] for name in whole}
         if any(values.shape[1] != count for values in arrays.values()):
             raise ValueError(f"{HISTORY_H5}: arrays are not those of {count} contact points")

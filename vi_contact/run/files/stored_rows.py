@@ -24,7 +24,10 @@ from .table import Block, Table
 
 def lines_of(table: Table, rows: Sequence[Row]) -> list[bytes]:
     """Return lines of history.csv: whole numbers stay whole, all others are floats that read back to the last bit."""
-    values = [[v if type(v) is int else float(v) for v in map(row.__getitem__, table.numbers)] for row in rows]
+    values = [
+        [v if type(v) is int else float(v) for v in map(row.__getitem__, table.numbers)]
+        for row in rows
+    ]
     return [line + b"\n" for line in repr(values).replace(" ", "").encode()[2:-2].split(b"],[")]
 
 
@@ -52,12 +55,16 @@ class StoredRows:
         check_folder_format(self.folder)
         path, names = self.folder / HISTORY_CSV, self._table.numbers
         if not is_own(path):
-            raise InputError(f"'{path}' is missing, so the histories cannot be continued: start a new run")
+            raise InputError(
+                f"'{path}' is missing, so the histories cannot be continued: start a new run"
+            )
         self.hash = hashlib.sha256()
         with open_to_read(path) as csv, closing(StoredArrays(self.folder, self._table)) as arrays:
             header = csv.readline()
             if header.decode(errors="replace").strip() != ",".join(names):
-                raise InputError(f"'{path}' holds other columns than this run records: restart with the same recorders")
+                raise InputError(
+                    f"'{path}' holds other columns than this run records: restart with the same recorders"
+                )
             self.length = len(header)
             for lines, block in read_blocks(csv, self._table, arrays, k=self.k):
                 for line, record in zip(lines, records_of(self._table, block), strict=True):
@@ -65,12 +72,15 @@ class StoredRows:
                     self.hash.update(line + record)
                 yield block
             if self._checksum and self.hash.hexdigest() != self._checksum:
-                raise InputError(f"the histories in '{self.folder}' do not belong to the checkpoint, or a file is "
-                                 "damaged: restore the folder or start a new run")
+                raise InputError(
+                    f"the histories in '{self.folder}' do not belong to the checkpoint, or a file is "
+                    "damaged: restore the folder or start a new run"
+                )
 
 
-def read_blocks(csv: Any, table: Table, arrays: "StoredArrays", *, first: int = 0,
-                k: int | None = None) -> Iterator[tuple[list[bytes], Block]]:
+def read_blocks(
+    csv: Any, table: Table, arrays: "StoredArrays", *, first: int = 0, k: int | None = None
+) -> Iterator[tuple[list[bytes], Block]]:
     """Return (lines, rows) from where history.csv is, row ``first``, to step k or its end; no line cut short."""
     done = first
     while True:
@@ -78,8 +88,10 @@ def read_blocks(csv: Any, table: Table, arrays: "StoredArrays", *, first: int = 
         numbers = numbers_of(csv.name, lines, len(table.numbers), done)
         steps = numbers[:, table.numbers.index("k")]
         if len(steps) and not np.array_equal(steps, steps[0] + np.arange(len(steps))):
-            raise InputError(f"the steps in '{csv.name}' after line {done + 1} do not follow each other: restore it or "
-                             "start a new run")
+            raise InputError(
+                f"the steps in '{csv.name}' after line {done + 1} do not follow each other: restore it or "
+                "start a new run"
+            )
         n = len(steps) if k is None else int(np.searchsorted(steps, k, side="right"))
         if n:
             found = dict(zip(table.numbers, numbers[:n].T, strict=True))
@@ -90,7 +102,9 @@ def read_blocks(csv: Any, table: Table, arrays: "StoredArrays", *, first: int = 
         if n < table.block:
             if k is None:
                 return
-            raise InputError(f"'{csv.name}' does not reach step {k} of the checkpoint: restore it or start a new run")
+            raise InputError(
+                f"'{csv.name}' does not reach step {k} of the checkpoint: restore it or start a new run"
+            )
 
 
 def numbers_of(path: str, lines: list[bytes], width: int, before: int) -> Array:
@@ -101,7 +115,9 @@ def numbers_of(path: str, lines: list[bytes], width: int, before: int) -> Array:
         try:
             values.append([float(text) for _, text in zip(range(width), texts, strict=True)])
         except ValueError as error:
-            raise InputError(f"line {before + i + 2} of '{path}' is damaged: restore it or start a new run") from error
+            raise InputError(
+                f"line {before + i + 2} of '{path}' is damaged: restore it or start a new run"
+            ) from error
     return np.array(values).reshape(-1, width)
 
 
@@ -140,24 +156,43 @@ class StoredArrays:
         """How many of them history.h5 has, all of the right shape."""
         try:
             held = self._file["k"]
-            fit = all(self._file[name].shape == (*held.shape, *one.shape) for name, one in self._samples.items())
+            fit = all(
+                self._file[name].shape == (*held.shape, *one.shape)
+                for name, one in self._samples.items()
+            )
             n = min(max(held.shape[0] - first, 0), len(steps))
             return n if fit and np.array_equal(held[first : first + n], steps[:n]) else 0
         except InputError:
             raise
-        except (TypeError, KeyError, AttributeError, ValueError, OSError, RuntimeError) as error:  # h5py's, of damage
+        except (
+            TypeError,
+            KeyError,
+            AttributeError,
+            ValueError,
+            OSError,
+            RuntimeError,
+        ) as error:  # h5py's, of damage
             if of_machine(error):
                 raise
             return 0
 
     def _from_hdf5(self, first: int, n: int) -> Block:
         try:
-            return {name: np.asarray(self._file[name][first : first + n]).astype(one.dtype)
-                    for name, one in self._samples.items()}
-        except (TypeError, ValueError, OSError, RuntimeError) as error:  # h5py's, of a file that is damaged
+            return {
+                name: np.asarray(self._file[name][first : first + n]).astype(one.dtype)
+                for name, one in self._samples.items()
+            }
+        except (
+            TypeError,
+            ValueError,
+            OSError,
+            RuntimeError,
+        ) as error:  # h5py's, of a file that is damaged
             if of_machine(error):
                 raise
-            raise InputError(f"'{self._path}' is damaged ({error}): restore it or start a new run") from error
+            raise InputError(
+                f"'{self._path}' is damaged ({error}): restore it or start a new run"
+            ) from error
 
     def _from_journal(self, steps: Array) -> Block:
         held = self._journal
@@ -165,12 +200,16 @@ class StoredArrays:
         part = held[start : start + len(steps)] if start >= 0 else held[:0]
         if not np.array_equal(part[:, 0], steps):
             missing = int(steps[len(part)] if len(part) < len(steps) else steps[0])
-            raise InputError(f"'{self._path}' does not hold {', '.join(self._samples)} of step {missing}: restore it "
-                             "or start a new run")
+            raise InputError(
+                f"'{self._path}' does not hold {', '.join(self._samples)} of step {missing}: restore it "
+                "or start a new run"
+            )
         ends = np.cumsum([one.size for one in self._samples.values()])[:-1]
         columns = np.split(np.array(part[:, 1:]), ends, axis=1)
-        return {name: column.reshape(len(part), *one.shape).astype(one.dtype)
-                for (name, one), column in zip(self._samples.items(), columns, strict=True)}
+        return {
+            name: column.reshape(len(part), *one.shape).astype(one.dtype)
+            for (name, one), column in zip(self._samples.items(), columns, strict=True)
+        }
 
 
 def _journal_rows(path: Path, width: int) -> Array:
@@ -179,7 +218,11 @@ def _journal_rows(path: Path, width: int) -> Array:
         return np.zeros((0, width))
     with open_to_read(path) as file:
         rows = os.fstat(file.fileno()).st_size // (8 * width)
-        return np.memmap(file, dtype=float, mode="r", shape=(rows, width)) if rows else np.zeros((0, width))
+        return (
+            np.memmap(file, dtype=float, mode="r", shape=(rows, width))
+            if rows
+            else np.zeros((0, width))
+        )
 
 
 def times_of(folder: Path, steps: Container[int]) -> dict[int, float]:

@@ -20,10 +20,14 @@ BYTES = 16 * 2**20
 KEPT = 64 * 2**20  # bytes of histories that stay in memory of a run with a folder, on each rank
 SHARED = 10_000  # rows of an array (contact points) up to which every rank gets it at the end
 
-WORDS = tomllib.loads(Path(__file__).with_name("ledger.toml").read_text(encoding="utf-8"))  # of the energy ledger
+WORDS = tomllib.loads(
+    Path(__file__).with_name("ledger.toml").read_text(encoding="utf-8")
+)  # of the energy ledger
 LEDGER = tuple(WORDS["titles"].items())
 
-Block = dict[str, Array]  # column -> values of some rows: (rows,) float64, or (rows, *shape) of the arrays
+Block = dict[
+    str, Array
+]  # column -> values of some rows: (rows,) float64, or (rows, *shape) of the arrays
 
 
 class Table:
@@ -35,14 +39,24 @@ class Table:
         file: the history.h5 of a run with a folder, which has the rows too: beyond KEPT bytes the memory lets them go.
         block: how many rows are turned into columns, read or written together."""
 
-    def __init__(self, columns: Columns, first: Row, file: Path | None = None, comm: Comm | None = None) -> None:
-        self.columns, self.first, self.file, self.count, self._comm = columns, first, file, 0, comm or SerialComm()
+    def __init__(
+        self, columns: Columns, first: Row, file: Path | None = None, comm: Comm | None = None
+    ) -> None:
+        self.columns, self.first, self.file, self.count, self._comm = (
+            columns,
+            first,
+            file,
+            0,
+            comm or SerialComm(),
+        )
         self._types: set[type] = set()
         self.check(first)
         self.numbers = [name for name in columns if not isinstance(first[name], np.ndarray)]
         arrays = [] if self._comm.rank else [name for name in columns if name not in self.numbers]
         self.arrays = {name: np.array(first[name]) for name in arrays}
-        self.block = max(1, min(BLOCK, BYTES // max(sum(one.nbytes for one in self.arrays.values()), 1)))
+        self.block = max(
+            1, min(BLOCK, BYTES // max(sum(one.nbytes for one in self.arrays.values()), 1))
+        )
         self._open: list[Row] = []
         self._blocks: list[Block] = []
         self._size, self._kept = 0, True
@@ -54,11 +68,17 @@ class Table:
         if row.keys() == self.columns.keys() and self._types.issuperset(map(type, row.values())):
             return
         for name in sorted(row.keys() ^ self.columns.keys()):
-            raise InputError(f"a recorder names the column '{name}' in columns() only, or in start() and row() only: "
-                             "let all three name the same columns")
+            raise InputError(
+                f"a recorder names the column '{name}' in columns() only, or in start() and row() only: "
+                "let all three name the same columns"
+            )
         for name, value in row.items():
-            if not isinstance(value, int | float | np.generic | np.ndarray) or isinstance(value, np.str_):
-                raise InputError(f"column '{name}' is {shown(value)}: let its recorder return a number or an array")
+            if not isinstance(value, int | float | np.generic | np.ndarray) or isinstance(
+                value, np.str_
+            ):
+                raise InputError(
+                    f"column '{name}' is {shown(value)}: let its recorder return a number or an array"
+                )
         self._types.update(map(type, row.values()))
 
     def append(self, row: Row) -> None:
@@ -81,7 +101,9 @@ class Table:
         self._store(block)
 
     def _columns(self, rows: list[Row]) -> Block:
-        found: Block = {name: np.array([row[name] for row in rows], dtype=float) for name in self.numbers}
+        found: Block = {
+            name: np.array([row[name] for row in rows], dtype=float) for name in self.numbers
+        }
         return found | {name: np.array([row[name] for row in rows]) for name in self.arrays}
 
     def _store(self, block: Block) -> None:
@@ -96,7 +118,9 @@ class Table:
         """Return all rows, column -> values, arrays on rank 0 only; None when the memory has let some go."""
         self._gather()
         names = [*self.numbers, *self.arrays] if self._kept else []
-        return {name: np.concatenate([block[name] for block in self._blocks]) for name in names} or None
+        return {
+            name: np.concatenate([block[name] for block in self._blocks]) for name in names
+        } or None
 
     def facts(self) -> dict[str, Any]:
         """Return what the rows say about the run, for its summary."""
@@ -109,12 +133,24 @@ class Table:
         """Return column -> values of all rows: (rows,) float64, or (rows, *shape of the arrays); of too many rows for
         the memory, or points for every rank, as they are in the file. Collective."""
         kept = self.remembered() or {}
-        shared = [name for name in self.arrays if name in kept and self.arrays[name].shape[:1] <= (SHARED,)]
+        shared = [
+            name
+            for name in self.arrays
+            if name in kept and self.arrays[name].shape[:1] <= (SHARED,)
+        ]
         pieces = self._comm.bcast({name: 1 + kept[name].nbytes // BYTES for name in shared})
-        for name, count in pieces.items() if self._comm.size > 1 else ():  # messages of MPI hold 2 GB at most
-            parts: list[Any] = [None] * count if self._comm.rank else np.array_split(kept[name], count)
+        for name, count in (
+            pieces.items() if self._comm.size > 1 else ()
+        ):  # messages of MPI hold 2 GB at most
+            parts: list[Any] = (
+                [None] * count if self._comm.rank else np.array_split(kept[name], count)
+            )
             kept[name] = np.concatenate([self._comm.bcast(part) for part in parts])
-        return kept if len(kept) == len(self.columns) else StoredHistory(self.file, kept, list(self.columns))
+        return (
+            kept
+            if len(kept) == len(self.columns)
+            else StoredHistory(self.file, kept, list(self.columns))
+        )
 
 
 class StoredHistory(Mapping[str, Array]):
@@ -139,11 +175,15 @@ class StoredHistory(Mapping[str, Array]):
         if name in self._kept:
             return self._kept[name]
         if self._file is None:
-            raise ViContactError(f"'{name}' of more than {SHARED} points is on rank 0 only: give the run an output "
-                                 "folder (out=), from which every rank reads it")
+            raise ViContactError(
+                f"'{name}' of more than {SHARED} points is on rank 0 only: give the run an output "
+                "folder (out=), from which every rank reads it"
+            )
         if self._stamp is None or self._now() != self._stamp:
-            raise ViContactError(f"'{self._file}', which holds the histories of this run, was replaced or is not on "
-                                 "this machine: give every run a folder of its own on a shared disk")
+            raise ViContactError(
+                f"'{self._file}', which holds the histories of this run, was replaced or is not on "
+                "this machine: give every run a folder of its own on a shared disk"
+            )
         with open_hdf5(self._file) as file:
             return np.asarray(file[name][()])
 
@@ -183,7 +223,10 @@ class Tally:
             self._raise("energy", rows["energy_kinetic"] + rows["energy_strain"])
             self._raise("work", np.abs(rows["work_input"]))
             self._raise("defect", np.abs(rows["energy_defect"]))
-            self._raise("created", -np.asarray(sum(rows[name] for name, _ in LEDGER if name.startswith("loss_"))))
+            self._raise(
+                "created",
+                -np.asarray(sum(rows[name] for name, _ in LEDGER if name.startswith("loss_"))),
+            )
 
     def _add(self, name: str, values: Array) -> None:
         self._sums[name] = self._sums.get(name, 0.0) + float(np.sum(values))
@@ -199,12 +242,20 @@ class Tally:
         steps, most = self._rows - 1, self._most
         mean = self._sums["iterations"] / steps if steps else 0.0
         iterations = {"mean": mean, "max": int(most.get("iterations", 0))}
-        facts: dict[str, Any] = {"steps": steps, "t_start": self._first["t"], "t_end": self._last["t"],
-                                 "iterations_per_step": iterations, "escalated_steps": int(self._sums["escalated"]),
-                                 "worst_certificate": most["certificate"]}
+        facts: dict[str, Any] = {
+            "steps": steps,
+            "t_start": self._first["t"],
+            "t_end": self._last["t"],
+            "iterations_per_step": iterations,
+            "escalated_steps": int(self._sums["escalated"]),
+            "worst_certificate": most["certificate"],
+        }
         if "uplift" in most:  # a negative gap: gap drift of the scheme
-            facts |= {"largest_uplift": most["uplift"], "smallest_gap": -most["depth"],
-                      "steps_in_contact": int(self._sums["contact"])}
+            facts |= {
+                "largest_uplift": most["uplift"],
+                "smallest_gap": -most["depth"],
+                "steps_in_contact": int(self._sums["contact"]),
+            }
         return facts | (self._energy() if "defect" in most else {})
 
     def _energy(self) -> dict[str, Any]:
@@ -214,7 +265,12 @@ class Tally:
         size = max(most["energy"], most["work"])
         relative = most["defect"] / size if size > 0.0 else most["defect"]
         created = max(0.0, most["created"])
-        energy = {"energy_start": start, "energy_max": most["energy"], **{name: last[name] for name, _ in LEDGER[:-1]},
-                  "energy_defect_joule": last["energy_defect"], "energy_defect": relative}
+        energy = {
+            "energy_start": start,
+            "energy_max": most["energy"],
+            **{name: last[name] for name, _ in LEDGER[:-1]},
+            "energy_defect_joule": last["energy_defect"],
+            "energy_defect": relative,
+        }
         created = created / size if size > 0.0 else created
         return {"energy": energy, "energy_defect": relative, "energy_created": created}

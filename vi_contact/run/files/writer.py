@@ -22,7 +22,9 @@ from .stored_rows import StoredRows, times_of
 from .table import Table
 
 log = logging.getLogger(__name__)
-LATEST = 0.5  # seconds that a row may wait, the next step included, if that takes as long as this one
+LATEST = (
+    0.5  # seconds that a row may wait, the next step included, if that takes as long as this one
+)
 
 
 class OpenFields(Protocol):
@@ -37,7 +39,9 @@ class FieldWriter(Protocol):
     @property
     def every(self) -> int: ...
 
-    def open(self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]) -> OpenFields: ...
+    def open(
+        self, problem: ContactProblem, folder: Path, kept: Mapping[int, float]
+    ) -> OpenFields: ...
 
 
 class Writer:
@@ -46,10 +50,20 @@ class Writer:
     ``stored``: the rows of an earlier run that this one continues. Unless they are in this folder, ``open`` clears it.
     """
 
-    def __init__(self, problem: ContactProblem, folder: Path | None, fields: FieldWriter | None, table: Table,
-                 stored: StoredRows | None = None) -> None:
+    def __init__(
+        self,
+        problem: ContactProblem,
+        folder: Path | None,
+        fields: FieldWriter | None,
+        table: Table,
+        stored: StoredRows | None = None,
+    ) -> None:
         self._problem, self.folder, self._table, self._stored = problem, folder, table, stored
-        self._continued = stored is not None and folder is not None and stored.folder.resolve() == folder.resolve()
+        self._continued = (
+            stored is not None
+            and folder is not None
+            and stored.folder.resolve() == folder.resolve()
+        )
         self._settings = fields
         self._comm = problem.system.algebra.comm
         self._fields: OpenFields | None = None
@@ -75,7 +89,13 @@ class Writer:
         geometry = {name: surface.on_first(getattr(surface, name)) for name in GEOMETRY}
         on_root(self._comm, partial(self._make, folder, geometry))
         if self._settings is not None:
-            kept = on_root(self._comm, lambda: times_of(folder, frames_of(folder)) if self._continued else {}) or {}
+            kept = (
+                on_root(
+                    self._comm,
+                    lambda: times_of(folder, frames_of(folder)) if self._continued else {},
+                )
+                or {}
+            )
             self._fields = self._settings.open(self._problem, folder, kept)
             if not self._continued:
                 self._fields.write(state, np.zeros_like(state.u))
@@ -113,7 +133,11 @@ class Writer:
 
     def frame(self, report: Report, number: int) -> None:
         """Write a frame of the fields at the end of a base step, when one is due by its number."""
-        if self._fields is not None and self._settings is not None and number % self._settings.every == 0:
+        if (
+            self._fields is not None
+            and self._settings is not None
+            and number % self._settings.every == 0
+        ):
             self._fields.write(report.new, report.balance.a, report)
 
     def checkpoint(self, place: RestartPoint, of: Callable[[], Mapping[str, Any]]) -> None:
@@ -123,7 +147,9 @@ class Writer:
         if self.folder is None or self._saved == k:
             return
         files = self._files
-        told = on_root(self._comm, lambda: (files.checksum(k), files.sync()) if files else ("", True))
+        told = on_root(
+            self._comm, lambda: (files.checksum(k), files.sync()) if files else ("", True)
+        )
         checksum, safe = self._comm.bcast(told)
         write_checkpoint(self.folder, self._problem, place, of=of(), rows=checksum, safe=safe)
         self._saved = k
@@ -136,7 +162,9 @@ class Writer:
 
     def rescue(self, facts: Mapping[str, Any]) -> None:
         """Do the same after a failure: not collective, as others might not come; no error hides the first."""
-        with suppress(Exception):  # of any kind: the first error is told, and this one comes of it or after it
+        with suppress(
+            Exception
+        ):  # of any kind: the first error is told, and this one comes of it or after it
             self._close(facts)
 
     def _close(self, facts: Mapping[str, Any]) -> None:

@@ -8,4 +8,12 @@ from .newton import FrictionNewton as FrictionNewton
 from .nsgs import NSGS as NSGS
 from .slip_rate import RateIteration as RateIteration
 
-__all__: list[str] = ['Anderson', 'FixedPoint', 'FrictionNewton', 'GivenForces', 'NSGS', 'Plain', 'RateIteration']
+__all__: list[str] = [
+    "Anderson",
+    "FixedPoint",
+    "FrictionNewton",
+    "GivenForces",
+    "NSGS",
+    "Plain",
+    "RateIteration",
+]

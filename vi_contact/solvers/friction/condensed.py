@@ -28,8 +28,14 @@ from .slip_rate import RateIteration
 class CondensedFriction:
     """Solve the small problem with friction of one A, condensed onto normal and tangential unknowns."""
 
-    def __init__(self, method: FrictionMethod, condensed: Condensation, surface: ContactSurface, *,
-                 rates: RateIteration) -> None:
+    def __init__(
+        self,
+        method: FrictionMethod,
+        condensed: Condensation,
+        surface: ContactSurface,
+        *,
+        rates: RateIteration,
+    ) -> None:
         self._surface, self._rates, self.condensed = surface, rates, condensed
         self._name = f"condensed {type(method).__name__}"
         self.delassus, d = condensed.flexibility, 1 + surface.tangents.shape[1]
@@ -42,17 +48,26 @@ class CondensedFriction:
         found, held, places = self.reactions(step, self.condensed.free(step.b), rigid)
         x, mine = self.condensed.answer(found.r.ravel(), held, places), self._surface.slots
         r_n, r_t = found.r[mine][:, 0].copy(), found.r[mine][:, 1:].copy()
-        return StepResult(x, r_n, found.active[mine], found.iterations, self._name, r_t=r_t, history=found.history)
+        return StepResult(
+            x, r_n, found.active[mine], found.iterations, self._name, r_t=r_t, history=found.history
+        )
 
-    def reactions(self, step: StepProblem, free: Array, rigid: Mask) -> tuple[FrictionResult, Mask, Array]:
+    def reactions(
+        self, step: StepProblem, free: Array, rigid: Mask
+    ) -> tuple[FrictionResult, Mask, Array]:
         """Return the reactions for contact unknowns that would be ``free``, and where they are put: closed points on
         a rigid support on their bound, those that stick where they were, which removes round-off only."""
         surface = self._surface
         assert step.slip0 is not None
         none = np.zeros(surface.count)
         rest = step.friction_at(np.zeros_like(step.slip0))
-        cohesion, slope = limit_of(rest, none, surface.weights, step.scale), slope_of(rest, surface.weights)
-        given = surface.everywhere(np.column_stack([step.bound, step.slip0, cohesion, slope, step.active]))
+        cohesion, slope = (
+            limit_of(rest, none, surface.weights, step.scale),
+            slope_of(rest, surface.weights),
+        )
+        given = surface.everywhere(
+            np.column_stack([step.bound, step.slip0, cohesion, slope, step.active])
+        )
         places, (cohesion, slope, closed) = given[:, :-3], given[:, -3:].T
         q = places - free.reshape(places.shape)
         active = closed > 0.0
@@ -60,16 +75,27 @@ class CondensedFriction:
         def solved(mu: Array, before: FrictionResult | None) -> FrictionResult:
             return self._small.solve(q, cohesion, mu, active if before is None else before.r)
 
-        found = self._rates.solve(step, rest, slope, solved, lambda found: self._slip(q, found)[surface.slots])
+        found = self._rates.solve(
+            step, rest, slope, solved, lambda found: self._slip(q, found)[surface.slots]
+        )
         held = np.repeat(found.stick[:, None], places.shape[1], axis=1)
         held[:, 0] = (found.r[:, 0] != 0.0) & rigid
         held &= found.r.any()
         return found, held.ravel(), places.ravel()
 
-    def solve_many(self, many: StepProblem, own: Callable[[int], StepProblem], rigid: Mask) -> Answers:
+    def solve_many(
+        self, many: StepProblem, own: Callable[[int], StepProblem], rigid: Mask
+    ) -> Answers:
         """Return the answers to several steps: ``many`` holds their rows, ``own`` makes one of them."""
-        free, (m, d) = self.condensed.free(many.b), (len(many.bound), 1 + self._surface.tangents.shape[1])
-        r, places, held = np.zeros((len(free), m, d)), np.zeros(free.shape), np.zeros(free.shape, dtype=bool)
+        free, (m, d) = (
+            self.condensed.free(many.b),
+            (len(many.bound), 1 + self._surface.tangents.shape[1]),
+        )
+        r, places, held = (
+            np.zeros((len(free), m, d)),
+            np.zeros(free.shape),
+            np.zeros(free.shape, dtype=bool),
+        )
         active, counts, failed = held[:, :m].copy(), [0] * len(free), dict[int, ViContactError]()
         histories: list[tuple[float, ...]] = [()] * len(free)
         for row in range(len(free)):

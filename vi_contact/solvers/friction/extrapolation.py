@@ -30,7 +30,9 @@ class Extrapolation(Protocol):
 
 def accelerated(owner: str, value: Any) -> None:
     """Raise InputError unless it is an extrapolation."""
-    provides(owner, "extrapolation", value, ("start",), "give Plain() or Anderson()", lacks=("step",))
+    provides(
+        owner, "extrapolation", value, ("start",), "give Plain() or Anderson()", lacks=("step",)
+    )
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,11 @@ class Anderson:
             nonlocal count, points
             count += 1
             new, kept = image - x, points[-self.depth :]
-            if kept and np.array_equal(x, kept[-1][1]) and float(new @ kept[-1][0]) >= float(kept[-1][0] @ kept[-1][0]):
+            if (
+                kept
+                and np.array_equal(x, kept[-1][1])
+                and float(new @ kept[-1][0]) >= float(kept[-1][0] @ kept[-1][0])
+            ):
                 kept = []
             points = [*kept, (new, image.copy())]
             if count <= self.after or len(points) < 2:

@@ -45,7 +45,9 @@ class PreparedFixedPoint:
         self.method, self.delassus = method, ScaledDelassus(G, bilateral)
         self._tresca = method.tresca.prepare(G, bilateral)
 
-    def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
+    def solve(
+        self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None
+    ) -> FrictionResult:
         """Solve the small problem; see PreparedFriction."""
         step = self.delassus.problem(q, cohesion, slope)
         constant = np.zeros_like(slope)
@@ -56,11 +58,18 @@ class PreparedFixedPoint:
         found = self._tresca.solve(q, limit, constant, start)
         while len(history) < self.method.max_iterations:
             new = cohesion + slope * np.maximum(found.r[:, 0], 0.0)
-            change, size = max_abs((new - limit) / unit), max(max_abs(new / unit), max_abs(limit / unit))
-            if change <= max(self.method.tolerance * size, step.rounding(found.r / self.delassus.scale)):
+            change, size = (
+                max_abs((new - limit) / unit),
+                max(max_abs(new / unit), max_abs(limit / unit)),
+            )
+            if change <= max(
+                self.method.tolerance * size, step.rounding(found.r / self.delassus.scale)
+            ):
                 break
             history.append(change / size)
             limit = np.maximum(unit * following(limit / unit, new / unit), 0.0)
             found = self._tresca.solve(q, limit, constant, found.r)
         tolerance = 100.0 * self.method.tolerance
-        return step.result(self.method, tolerance, (found.r / self.delassus.scale, len(history) + 1, history))
+        return step.result(
+            self.method, tolerance, (found.r / self.delassus.scale, len(history) + 1, history)
+        )

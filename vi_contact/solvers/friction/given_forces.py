@@ -20,7 +20,15 @@ from ...core.algebra import Array, Mask, max_abs
 from ..normal.active_set import ActiveSet
 from .extrapolation import Extrapolation, Plain, accelerated
 from .newton import FrictionNewton
-from .problem import FrictionMethod, Iterated, PreparedFriction, ScaledDelassus, ScaledProblem, Settings, inner_method
+from .problem import (
+    FrictionMethod,
+    Iterated,
+    PreparedFriction,
+    ScaledDelassus,
+    ScaledProblem,
+    Settings,
+    inner_method,
+)
 
 
 @dataclass(frozen=True)
@@ -47,7 +55,9 @@ class GivenForces(Settings):
         apart[::d], apart[:, ::d] = 0.0, 0.0
         np.fill_diagonal(apart[::d, ::d], 1.0)
         tangential = self.tangential.prepare(apart, np.zeros_like(bilateral))
-        return PreparedFriction(self, 100.0 * self.tolerance, delassus, partial(self._loop, normal, tangential))
+        return PreparedFriction(
+            self, 100.0 * self.tolerance, delassus, partial(self._loop, normal, tangential)
+        )
 
     def _loop(self, normal: Any, tangential: Any, step: ScaledProblem, r: Array) -> Iterated:
         """Alternate the two prepared problems."""

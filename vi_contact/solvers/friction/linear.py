@@ -36,16 +36,26 @@ class States:
         limit = step.limit(y[:, 0])
         size = np.linalg.norm(y[:, 1:], axis=1)
         self.closed: Mask = (y[:, 0] > 0.0) | step.delassus.bilateral
-        back = np.zeros(m, dtype=bool) if before is None else np.sum(before.direction * y[:, 1:], axis=1) < 0.0
+        back = (
+            np.zeros(m, dtype=bool)
+            if before is None
+            else np.sum(before.direction * y[:, 1:], axis=1) < 0.0
+        )
         self.stick: Mask = ((size <= limit) | back) & (limit > 0.0)
         slip = ~self.stick & (limit > 0.0)
-        self.direction: Array = np.divide(y[:, 1:], size[:, None], out=np.zeros((m, d - 1)), where=slip[:, None])
+        self.direction: Array = np.divide(
+            y[:, 1:], size[:, None], out=np.zeros((m, d - 1)), where=slip[:, None]
+        )
         self.growth = np.where(slip & (y[:, 0] > 0.0), step.slope, 0.0)
         self.turns: Mask = slip if d == 3 else np.zeros(m, dtype=bool)
         self.exact = not self.turns.any()
         self.turning = size[self.turns] / limit[self.turns] - 1.0
-        self.fixed = np.column_stack([np.zeros(m), np.where(slip, step.cohesion, 0.0)[:, None] * self.direction])
-        self.key = b"".join(part.tobytes() for part in (self.closed, self.stick, self.direction, self.growth))
+        self.fixed = np.column_stack(
+            [np.zeros(m), np.where(slip, step.cohesion, 0.0)[:, None] * self.direction]
+        )
+        self.key = b"".join(
+            part.tobytes() for part in (self.closed, self.stick, self.direction, self.growth)
+        )
 
 
 class LinearProblems:
@@ -68,7 +78,11 @@ class LinearProblems:
                 del self._kept[next(iter(self._kept))]
             self._solved.add(states.key)
         z = factored.solve(-reduced.rows(w)) if factored.sound else None
-        return None if z is None or not np.isfinite(z).all() else np.asarray(states.fixed + reduced.columns(z))
+        return (
+            None
+            if z is None or not np.isfinite(z).all()
+            else np.asarray(states.fixed + reduced.columns(z))
+        )
 
 
 class Reduced:
@@ -115,7 +129,9 @@ class Reduced:
         turned = _block(G, self._turned.ravel(), places).reshape(*self._turned.shape, -1)
         part = np.vstack([part, np.einsum("ik,ikj->ij", self._across, turned)])
         across = part[:, len(self.plain) :].reshape(len(part), *self._turned.shape)
-        transpose = np.hstack([part[:, : len(self.plain)], np.einsum("ik,jik->ji", self._across, across)])
+        transpose = np.hstack(
+            [part[:, : len(self.plain)], np.einsum("ik,jik->ji", self._across, across)]
+        )
         turns = np.arange(len(self.plain), self.size)
         transpose[turns, turns] += self._turning
         return transpose.T
@@ -144,14 +160,18 @@ class Factored:
         self._others = others = np.flatnonzero(left)
         self._normals, self._rows = others // growth.shape[1] * growth.shape[1], H[others]
         self._growth = growth.ravel()[others]
-        return np.asarray(self._rows[:, others] - self._growth[:, None] * _block(H, self._normals, others))
+        return np.asarray(
+            self._rows[:, others] - self._growth[:, None] * _block(H, self._normals, others)
+        )
 
     def solve(self, right: Array) -> Array:
         """Return K⁻¹ right."""
         if self._H is None:
             return np.asarray(lapack.dgetrs(*self._lu, right)[0]) if self.reduced.size else right
         r = self._whole(self._H, right)
-        r += self._whole(self._H, right - self._delassus.product(r)[self.reduced.plain])  # H is less exact than factors
+        r += self._whole(
+            self._H, right - self._delassus.product(r)[self.reduced.plain]
+        )  # H is less exact than factors
         return np.asarray(r[self.reduced.plain])
 
     def _whole(self, H: Array, v: Array) -> Array:
@@ -160,7 +180,10 @@ class Factored:
         full[self.reduced.plain] = v
         r = H @ full
         if len(self._others):
-            r += lapack.dgetrs(*self._lu, self._growth * r[self._normals] - r[self._others])[0] @ self._rows
+            r += (
+                lapack.dgetrs(*self._lu, self._growth * r[self._normals] - r[self._others])[0]
+                @ self._rows
+            )
             r[self._others] = self._growth * r[self._normals]
         return np.asarray(r)
 

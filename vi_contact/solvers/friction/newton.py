@@ -54,7 +54,9 @@ class FrictionNewton(Settings):
     def prepare(self, G: Array, bilateral: Mask) -> PreparedFriction:
         """Check and scale G (m d, m d). Answers depend on their right-hand side alone, not on steps before."""
         delassus = ScaledDelassus(G, bilateral, unsymmetric=True)
-        compiled = library(SerialComm()) if delassus.symmetric else None  # its sweeps read half of G
+        compiled = (
+            library(SerialComm()) if delassus.symmetric else None
+        )  # its sweeps read half of G
         if compiled and delassus.count:
             delassus.short  # noqa: B018  a part of set-up
         return PreparedFriction(self, self.tolerance, delassus, partial(self._loop, compiled, {}))
@@ -74,12 +76,16 @@ class FrictionNewton(Settings):
             sweep, r, w = sweeper(step), step.admissible(r), None
             for _ in range(FIRST_SWEEPS * 2**attempt):
                 r, swept = sweep(r), swept + 1
-                if not step.delassus.symmetric and not step.rounding(r) <= step.unit:  # they lead nowhere
+                if (
+                    not step.delassus.symmetric and not step.rounding(r) <= step.unit
+                ):  # they lead nowhere
                     r = np.zeros_like(r)
                     break
         return r, len(history) + swept, history
 
-    def _newton(self, kept: Kept, step: ScaledProblem, y: Array, history: list[float]) -> tuple[Array, bool]:
+    def _newton(
+        self, kept: Kept, step: ScaledProblem, y: Array, history: list[float]
+    ) -> tuple[Array, bool]:
         """The best iterate r, and whether it solves the problem to rounding or to the tolerance."""
         best, smallest = np.zeros_like(y), step.unit
         linear = LinearProblems(step.delassus, kept)
@@ -110,7 +116,14 @@ def relaxed(compiled: Any, step: ScaledProblem, r: Array) -> tuple[Array, Array,
     left, before = np.inf, np.inf
     for _ in range(STAGES[of.dimension]):
         least = 0.5 * step.rounding(r) if of.dimension > 2 else 0.0
-        compiled.relax(of.count, of.dimension, *places[:-3], SWEEPS[of.dimension], c_double(least), *places[-3:])
+        compiled.relax(
+            of.count,
+            of.dimension,
+            *places[:-3],
+            SWEEPS[of.dimension],
+            c_double(least),
+            *places[-3:],
+        )
         if of.dimension > 2:
             w[:] = step.w(r)
         left, before = step.residual(r, w), left

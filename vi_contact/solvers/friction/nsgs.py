@@ -37,7 +37,9 @@ class NSGS(Settings):
             r = sweep(r)
             residual = step.residual(r, step.w(r))
             history.append(residual / step.unit)
-            if not np.isfinite(residual) or residual <= max(self.tolerance * step.unit, step.rounding(r)):
+            if not np.isfinite(residual) or residual <= max(
+                self.tolerance * step.unit, step.rounding(r)
+            ):
                 break
         return r, len(history), history
 
@@ -64,7 +66,11 @@ class _Node:
     def __init__(self, step: ScaledProblem, i: int) -> None:
         d = step.delassus.dimension
         block = step.delassus.matrix[i * d : (i + 1) * d, i * d : (i + 1) * d]
-        self.normal, self.coupling, self.tangential = float(block[0, 0]), block[0, 1:], block[1:, 1:]
+        self.normal, self.coupling, self.tangential = (
+            float(block[0, 0]),
+            block[0, 1:],
+            block[1:, 1:],
+        )
         self.pushed = block[1:, 0]  # the coupling, unless G is not symmetric
         self.condensed = self.tangential - np.outer(self.pushed, self.coupling) / self.normal
         self.cohesion, self.slope = float(step.cohesion[i]), float(step.slope[i])
@@ -81,8 +87,11 @@ class _Node:
         def pressure(r_t: Array) -> float:
             return float(-(q_n + self.coupling @ r_t) / self.normal)
 
-        r_t = on_disk(self.condensed, q_t - self.pushed * (q_n / self.normal),
-                      lambda r_t: self.cohesion + self.slope * max(pressure(r_t), 0.0))
+        r_t = on_disk(
+            self.condensed,
+            q_t - self.pushed * (q_n / self.normal),
+            lambda r_t: self.cohesion + self.slope * max(pressure(r_t), 0.0),
+        )
         r_n = pressure(r_t)
         return np.concatenate([[r_n if self.bilateral else max(r_n, 0.0)], r_t])
 

@@ -154,9 +154,11 @@ class ScaledProblem:
         residual, unit = self.residual(r, w), self.unit or 1.0
         rounding = self.rounding(r)
         if not residual <= max(tolerance * unit, rounding):
-            raise StepFailure(f"{method} stopped after {iterations} iterations with residual {residual / unit:.1e}: "
-                              "try another friction method (FrictionNewton, NSGS, FixedPoint), or a smaller step of "
-                              "time or load")
+            raise StepFailure(
+                f"{method} stopped after {iterations} iterations with residual {residual / unit:.1e}: "
+                "try another friction method (FrictionNewton, NSGS, FixedPoint), or a smaller step of "
+                "time or load"
+            )
         still = np.linalg.norm(w[:, 1:], axis=1) <= 4.0 * max(residual, rounding)
         active = (r[:, 0] > 0.0) | self.delassus.bilateral
         stick = still & (self.limit(r[:, 0]) > 0.0)
@@ -171,7 +173,9 @@ class ScaledDelassus:
         m = len(bilateral)
         d = G.shape[0] // m if m else 1
         if G.ndim != 2 or G.shape != (m * d, m * d):
-            raise InputError(f"the Delassus operator has shape {G.shape} for {m} points: give m d rows, node by node")
+            raise InputError(
+                f"the Delassus operator has shape {G.shape} for {m} points: give m d rows, node by node"
+            )
         scale = energy_scale(G).reshape(m, d)
         if d > 1:
             scale[:, 1:] = np.mean(scale[:, 1:] ** -2.0, axis=1)[:, None] ** -0.5
@@ -211,9 +215,13 @@ class ScaledDelassus:
         """Return problem (1) in scaled numbers."""
         check_gap(q[:, 0], self.bilateral)
         if not np.isfinite(q[:, 1:]).all():
-            raise InputError("the slip without reactions contains NaN or infinity: check the loads of this step")
+            raise InputError(
+                "the slip without reactions contains NaN or infinity: check the loads of this step"
+            )
         normal, tangential = self.scale[:, 0], self.scale[:, -1]
-        return ScaledProblem(self, q * self.scale, cohesion / tangential, slope * (normal / tangential))
+        return ScaledProblem(
+            self, q * self.scale, cohesion / tangential, slope * (normal / tangential)
+        )
 
 
 @dataclass(frozen=True)
@@ -227,7 +235,9 @@ class PreparedFriction:
     delassus: ScaledDelassus
     loop: Callable[[ScaledProblem, Array], Iterated]
 
-    def solve(self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None) -> FrictionResult:
+    def solve(
+        self, q: Array, cohesion: Array, slope: Array, guess: Array | Mask | None = None
+    ) -> FrictionResult:
         """Return the answer for q (m, d), cohesion (m,) [as r], slope (m,). ``guess``: predicted contact set (m,), or
         reactions (m, d). StepFailure when the tolerance is not reached."""
         step = self.delassus.problem(q, cohesion, slope)

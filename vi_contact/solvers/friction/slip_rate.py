@@ -39,8 +39,14 @@ class RateIteration:
         attributes(self, positive=("tolerance",), counts=("max_iterations",))
         accelerated("RateIteration", self.extrapolation)
 
-    def solve(self, step: StepProblem, rest: FrictionLaw, mu: Array, solved: Callable[[Array, Any], Any],
-              slip: Callable[[Any], Array]) -> Any:
+    def solve(
+        self,
+        step: StepProblem,
+        rest: FrictionLaw,
+        mu: Array,
+        solved: Callable[[Array, Any], Any],
+        slip: Callable[[Any], Array],
+    ) -> Any:
         """Iterate from mu, the coefficients of all conditions under the law at ``rest``; once for one without rates.
 
         ``solved``: the problem of given coefficients, starting from the last result, None at first; ``slip``: that of a
@@ -53,11 +59,15 @@ class RateIteration:
         while len(history) < self.max_iterations:
             found = solved(mu, found)
             spent += found.iterations
-            new = np.asarray(surface.everywhere(slope_of(step.friction_at(slip(found)), surface.weights)))
+            new = np.asarray(
+                surface.everywhere(slope_of(step.friction_at(slip(found)), surface.weights))
+            )
             size = max(max_abs(new), max_abs(mu))
             history.append(max_abs(new - mu) / size if size else 0.0)
             if history[-1] <= self.tolerance:
                 return replace(found, iterations=spent, history=tuple(history))
             mu = np.maximum(following(mu, new), 0.0)
-        raise StepFailure(f"{self} stopped with a change of {history[-1] if history else np.inf:.1e} of the friction "
-                          "coefficients: take a smaller time step, or let mu(v) vary less with the slip rate")
+        raise StepFailure(
+            f"{self} stopped with a change of {history[-1] if history else np.inf:.1e} of the friction "
+            "coefficients: take a smaller time step, or let mu(v) vary less with the slip rate"
+        )

@@ -21,8 +21,14 @@ from .preconditioners import Masked
 
 Watch = Callable[[int, Array, Callable[[], Array]], int]
 SOLVED, WRONG_SIGNS = 3, 2  # of PETSc's reasons: below an absolute, a relative tolerance
-STAGNATED, NOT_A_NUMBER, INDEFINITE = -3, -9, -10  # too many iterations; not a number; indefinite matrix
-SAID = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))  # what happened, what helps
+STAGNATED, NOT_A_NUMBER, INDEFINITE = (
+    -3,
+    -9,
+    -10,
+)  # too many iterations; not a number; indefinite matrix
+SAID = tomllib.loads(
+    Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+)  # what happened, what helps
 SHOWN = 6  # residuals
 
 
@@ -51,22 +57,34 @@ class ConjugateGradients:
         self._b.array[:] = residual
         self.ksp.solve(self._b, self._x)
         self._operator.work.linear_iterations += self.ksp.getIterationNumber()
-        return x + self._x.array_r, np.array(self._residual.array_r), int(self.ksp.getConvergedReason())
+        return (
+            x + self._x.array_r,
+            np.array(self._residual.array_r),
+            int(self.ksp.getConvergedReason()),
+        )
 
     def _test(self, ksp: Any, iteration: int, _norm: float) -> int:
         ksp.buildResidual(self._residual)
-        return self._watch(iteration, self._residual.array_r, lambda: self._start + ksp.getSolution().array_r)
+        return self._watch(
+            iteration, self._residual.array_r, lambda: self._start + ksp.getSolution().array_r
+        )
 
 
 def stopped(name: str, reason: int, iterations: int, history: Sequence[float]) -> StepFailure:
     """Return the failure of a solver that stopped for PETSc's ``reason``; ``history``: residuals over the forces."""
     words, remedy = SAID.get(str(reason), SAID["cg"])
-    return StepFailure(f"{name} stopped after {iterations} linear iterations, {words} (residuals {told(history)}): "
-                       f"{remedy}")
+    return StepFailure(
+        f"{name} stopped after {iterations} linear iterations, {words} (residuals {told(history)}): "
+        f"{remedy}"
+    )
 
 
 def told(history: Sequence[float]) -> str:
     """Return the first residual, some, and the last."""
     last = len(history) - 1
-    chosen = sorted({round(i * last / (SHOWN - 1)) for i in range(SHOWN)}) if last > 0 else range(len(history))
+    chosen = (
+        sorted({round(i * last / (SHOWN - 1)) for i in range(SHOWN)})
+        if last > 0
+        else range(len(history))
+    )
     return ", ".join(f"{history[i]:.1e}" for i in chosen) or "none"

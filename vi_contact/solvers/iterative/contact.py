@@ -19,8 +19,20 @@ CLOSING = 1e-12  # penetration, relative to |x|, that closes a condition at the 
 class Contact:
     """Hold the closed set of one step. ``rows``: where the normal unknowns stand in the padded vectors of ``size``."""
 
-    def __init__(self, surface: ContactSurface, scale: float, rows: Indices, diagonal: Array, missing: Indices) -> None:
-        self._owned, self.rows, self._size, self._missing = surface.owned, rows, len(diagonal), missing
+    def __init__(
+        self,
+        surface: ContactSurface,
+        scale: float,
+        rows: Indices,
+        diagonal: Array,
+        missing: Indices,
+    ) -> None:
+        self._owned, self.rows, self._size, self._missing = (
+            surface.owned,
+            rows,
+            len(diagonal),
+            missing,
+        )
         self.bilateral, self.soft = surface.bilateral, surface.compliance > 0.0
         self.k = np.zeros(len(rows))
         self.k[self.soft] = scale / surface.compliance[self.soft]
@@ -30,7 +42,9 @@ class Contact:
     def begin(self, step: StepProblem) -> None:
         """Take the bounds of a step, and its predicted set with the points that the guess lets penetrate."""
         if step.surface.some(np.isnan(step.bound)):
-            raise InputError("the bound of the contact conditions contains NaN: check the gap and the time scheme")
+            raise InputError(
+                "the bound of the contact conditions contains NaN: check the gap and the time scheme"
+            )
         self.reach = np.isfinite(step.bound)
         self.bound = np.where(self.reach, step.bound, 0.0)
         inside = step.guess[self._owned] > self.bound
@@ -69,12 +83,16 @@ class Contact:
         w[self._missing] = 0.0
         w[self.held] = 0.0
         chosen = self.closed & self.soft
-        w[self.rows[chosen]] = np.sqrt(self.diagonal[chosen] / (self.diagonal[chosen] + self.k[chosen]))
+        w[self.rows[chosen]] = np.sqrt(
+            self.diagonal[chosen] / (self.diagonal[chosen] + self.k[chosen])
+        )
         return w
 
     def reactions(self, x: Array, residual: Array) -> Array:
         """Return r_n of the closed conditions, zero of the others; ``residual``: load - (A + K_s) x."""
-        return np.where(self.soft, self.spring_forces(x), np.where(self.closed, residual[self.rows], 0.0))
+        return np.where(
+            self.soft, self.spring_forces(x), np.where(self.closed, residual[self.rows], 0.0)
+        )
 
     def spring_forces(self, x: Array) -> Array:
         """Return the forces of the closed springs, zero of all other conditions."""
@@ -121,7 +139,9 @@ class Contact:
 
     def spring_slope(self, x: Array, d: Array, t: float) -> float:
         """Return sum k max(x + t d - bound, 0) d over the one-sided springs of this rank."""
-        rows, bound, k = (values[self._one_sided_springs] for values in (self.rows, self.bound, self.k))
+        rows, bound, k = (
+            values[self._one_sided_springs] for values in (self.rows, self.bound, self.k)
+        )
         return float(np.sum(k * np.maximum(x[rows] + t * d[rows] - bound, 0.0) * d[rows]))
 
     def fingerprint(self) -> float:

@@ -32,8 +32,19 @@ STEPS = 150  # of Newton
 class Friction:
     """Solve steps with friction of one A. ``last``: r_n (m,), r_t and slip (m, d - 1) of the answer before."""
 
-    def __init__(self, surface: ContactSurface, contact: Contact, layout: Layout, diagonal: Array, operator: Operator,
-                 inverse: Inverse, *, tolerance: float, patience: int, name: str) -> None:
+    def __init__(
+        self,
+        surface: ContactSurface,
+        contact: Contact,
+        layout: Layout,
+        diagonal: Array,
+        operator: Operator,
+        inverse: Inverse,
+        *,
+        tolerance: float,
+        patience: int,
+        name: str,
+    ) -> None:
         self.comm: Comm = surface.comm
         self.surface, self.contact, self.layout, self.operator = surface, contact, layout, operator
         self.inverse, self.tolerance, self.name = inverse, tolerance, name
@@ -76,13 +87,23 @@ class Newton:
         if of.last is None:
             none = np.zeros(len(slip))
             limits = self.law(np.zeros_like(slip), none, none)
-            return States(of.tangents, limits, (none, of.tangents.c[:, None] * slip), slip,
-                          stuck=of.contact.closed & (limits.slope > 0.0))
+            return States(
+                of.tangents,
+                limits,
+                (none, of.tangents.c[:, None] * slip),
+                slip,
+                stuck=of.contact.closed & (limits.slope > 0.0),
+            )
         last_r_n, last_r_t, last_slip = of.last
         r_n = np.where(of.contact.closed, last_r_n, 0.0)
         y_t = last_r_t + of.tangents.c[:, None] * slip
-        return States(of.tangents, self._limits(slip, r_n, y_t), (r_n, y_t), slip,
-                      stuck=of.contact.closed & ~np.any(last_slip, axis=1) & (last_r_n > 0.0))
+        return States(
+            of.tangents,
+            self._limits(slip, r_n, y_t),
+            (r_n, y_t),
+            slip,
+            stuck=of.contact.closed & ~np.any(last_slip, axis=1) & (last_r_n > 0.0),
+        )
 
     def _slip(self) -> Array:
         """B_t x - slip0 (m, d - 1), zero where a tangent is prescribed."""
@@ -125,7 +146,9 @@ class Newton:
         y_t = self.r_t + self.of.tangents.c[:, None] * self.slip
         along = self.slip * (limit / np.where(size > 0.0, size, 1.0))[:, None]
         goal = self.of.tolerance * self.scales.force
-        certain = (np.linalg.norm(y_t, axis=1) > limit) & (np.linalg.norm(self.r_t - along, axis=1) <= 0.5 * goal)
+        certain = (np.linalg.norm(y_t, axis=1) > limit) & (
+            np.linalg.norm(self.r_t - along, axis=1) <= 0.5 * goal
+        )
         return np.where(certain[:, None], along, project(y_t, limit))
 
     def solved(self) -> bool:
@@ -134,13 +157,17 @@ class Newton:
         error = np.where(of.contact.weights() > 0.0, self.residual, 0.0)
         error[of.tangents.rows] = of.tangents.flat(self.r_t - self._rubbed())
         wrong = self._wrong(0.0)
-        local = np.array([max_abs(error), np.any(wrong), max_abs(self.limits(self.r_n))], dtype=float)
+        local = np.array(
+            [max_abs(error), np.any(wrong), max_abs(self.limits(self.r_n))], dtype=float
+        )
         self.error, any_wrong, limit = of.comm.max(np.where(np.isnan(local), np.inf, local))
         force = self.scales.force
         self.history.append(self.error / force if 0.0 < force < np.inf else self.error)
         if not np.isfinite(self.error):
             raise self._stopped(*SAID[str(NOT_A_NUMBER)])
-        self.goal = of.worth.goal(self.error, self.scales, self.x, self.r_n, self.r_t, begin=self.steps == 0)
+        self.goal = of.worth.goal(
+            self.error, self.scales, self.x, self.r_n, self.r_t, begin=self.steps == 0
+        )
         if self.law.settled and self.error <= self.goal and not any_wrong:
             return True
         if not self.law.settled and not any_wrong and self.error <= max(ROUND * limit, self.goal):
@@ -148,7 +175,9 @@ class Newton:
             self.limits = self._limits(self.slip, self.r_n, self.r_t)
             return self.solved()
         if self.steps == STEPS:
-            raise self._stopped("the states of friction did not settle", "take a smaller step of time or load")
+            raise self._stopped(
+                "the states of friction did not settle", "take a smaller step of time or load"
+            )
         self._newton += self.law.settled
         if self._newton > CIRCLES:
             self._leave_the_circle()
@@ -163,14 +192,19 @@ class Newton:
     def _wrong(self, error: float) -> Mask:
         """Conditions whose signs are wrong by more than the error of the residual."""
         least = 0.5 * self.of.tolerance * self.scales.reaction
-        return self.of.contact.wrong(self.x, self.r_n, error=error, least_force=least, x_ref=self.scales.displacement)
+        return self.of.contact.wrong(
+            self.x, self.r_n, error=error, least_force=least, x_ref=self.scales.displacement
+        )
 
     def advance(self) -> None:
         """Solve the linear problem of the states, and take those of its solution."""
         of = self.of
         residual = np.where(of.gmres.free > 0.0, self.residual, 0.0)
         rows = of.tangents.rows
-        residual[rows] = of.tangents.flat(self.states.residual(self.r_n, self.r_t, self.slip)) * of.gmres.free[rows]
+        residual[rows] = (
+            of.tangents.flat(self.states.residual(self.r_n, self.r_t, self.slip))
+            * of.gmres.free[rows]
+        )
         last = self.history[-2:]
         share = min(SHARE, AHEAD * last[1] / last[0]) if last[0] > 0.0 and len(last) > 1 else SHARE
         dx, left, reason = of.gmres.solve(residual, share, 0.5 * self.goal)
@@ -207,11 +241,21 @@ class Newton:
         there = (of.surface.tangents >= 0) & still[:, None]
         x[of.surface.tangents[there]] = self.slip0[there]
         slip = np.where(still[:, None], 0.0, self.slip)
-        result = StepResult(x=x, r_n=self.r_n, active=contact.closed.copy(), iterations=self.steps, method=of.name,
-                            r_t=r_t, history=tuple(self.history), aim=of.tolerance)
+        result = StepResult(
+            x=x,
+            r_n=self.r_n,
+            active=contact.closed.copy(),
+            iterations=self.steps,
+            method=of.name,
+            r_t=r_t,
+            history=tuple(self.history),
+            aim=of.tolerance,
+        )
         return result, (self.r_n, r_t, slip)
 
     def _stopped(self, words: str, remedy: str) -> StepFailure:
         """The failure, with the history of residuals."""
-        return StepFailure(f"{self.of.name} stopped after {self.steps} Newton steps, {words} (residuals "
-                           f"{told(self.history)}): {remedy}")
+        return StepFailure(
+            f"{self.of.name} stopped after {self.steps} Newton steps, {words} (residuals "
+            f"{told(self.history)}): {remedy}"
+        )

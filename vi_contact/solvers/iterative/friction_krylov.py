@@ -64,9 +64,13 @@ class Gmres:
     """Run PETSc's KSP ``gmres``, preconditioned from the right, or ``cg`` where no point slips, on the matrix of the
     linear problem, as whose context it serves. ``free``: 1 in rows that are not held, and 0."""
 
-    def __init__(self, comm: Comm, operator: Operator, contact: Contact, turned: Turned, patience: int) -> None:
+    def __init__(
+        self, comm: Comm, operator: Operator, contact: Contact, turned: Turned, patience: int
+    ) -> None:
         self._comm, self._operator, self._turned, self._contact = comm, operator, turned, contact
-        shell = PETSc.Mat().createPython(operator.blocks.getSizes(), Lent(self), comm=operator.blocks.comm)
+        shell = PETSc.Mat().createPython(
+            operator.blocks.getSizes(), Lent(self), comm=operator.blocks.comm
+        )
         shell.setUp()
         self._b, self._x = shell.createVecs()
         self._patience = patience

@@ -49,7 +49,6 @@ class Tangents:
         return np.asarray(table[self._free])
 
 
-
 @dataclass(frozen=True)
 class Limits:
     """Hold the friction limit cohesion + slope r_n of every point, its ``rise`` [A] with the slip, and that at rest."""
@@ -78,8 +77,16 @@ class States:
 
     Slip that turned back since ``before`` overshot, and sticks first. ``stuck``: points that stick, whatever y says."""
 
-    def __init__(self, tangents: Tangents, limits: Limits, y: tuple[Array, Array], slip: Array, *,
-                 before: "States | None" = None, stuck: Mask | None = None) -> None:
+    def __init__(
+        self,
+        tangents: Tangents,
+        limits: Limits,
+        y: tuple[Array, Array],
+        slip: Array,
+        *,
+        before: "States | None" = None,
+        stuck: Mask | None = None,
+    ) -> None:
         self._tangents = tangents
         y_n, y_t = y
         limit, size, c = limits(y_n), np.linalg.norm(y_t, axis=1), tangents.c
@@ -90,9 +97,17 @@ class States:
         if stuck is not None:
             self.stick |= stuck & tangents.rubs
         self.slips: Mask = tangents.rubs & (limit > 0.0) & ~self.stick
-        over = np.where(self.slips, np.where(size > limit, size - limit, c * np.linalg.norm(slip, axis=1)), 1.0)
-        self.direction: Array = np.where(self.slips[:, None], y_t, 0.0) / np.where(self.slips, size, 1.0)[:, None]
-        self.kappa = np.where(self.slips, np.minimum(limit * c / np.maximum(over, limit / STIFFEST), STIFFEST * c), 0.0)
+        over = np.where(
+            self.slips, np.where(size > limit, size - limit, c * np.linalg.norm(slip, axis=1)), 1.0
+        )
+        self.direction: Array = (
+            np.where(self.slips[:, None], y_t, 0.0) / np.where(self.slips, size, 1.0)[:, None]
+        )
+        self.kappa = np.where(
+            self.slips,
+            np.minimum(limit * c / np.maximum(over, limit / STIFFEST), STIFFEST * c),
+            0.0,
+        )
         if y_t.shape[1] < 2:
             self.kappa[:] = 0.0
         self._growth = np.where(self.slips & (y_n > 0.0), limits.slope, 0.0)
@@ -109,7 +124,9 @@ class States:
     def turned(self, p: Array) -> Array:
         """Return kappa (p - n n·p) + rise n n·p of tangential values p (m, d - 1)."""
         along = dot(self.direction, p)
-        return self.kappa[:, None] * p + ((self._rise - self.kappa) * along)[:, None] * self.direction
+        return (
+            self.kappa[:, None] * p + ((self._rise - self.kappa) * along)[:, None] * self.direction
+        )
 
     def apply(self, contact: Contact, p: Array, y: Array) -> None:
         """Turn y = A p into the product of p with the matrix of the linear problem, in the rows of the tangents."""
@@ -173,7 +190,11 @@ class LawOfStep:
             return Limits(self._limit, none, none)
         if self._constant or self._left:
             return self._at(self._given)
-        here, rest, size = self._at(slip), self._at(np.zeros_like(slip)), np.linalg.norm(slip, axis=1)
+        here, rest, size = (
+            self._at(slip),
+            self._at(np.zeros_like(slip)),
+            np.linalg.norm(slip, axis=1),
+        )
         moved = size > 0.0
         h = DIFFERENCE * np.where(moved, size, reach)
         change = self._at(np.column_stack([size + h, *np.zeros_like(slip.T[1:])]))(r_n) - here(r_n)

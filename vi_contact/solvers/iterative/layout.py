@@ -76,7 +76,12 @@ class Nodewise:
         stored = getattr(self.A.matrix, "stored", None)
         if d == 1:
             return self.source
-        if layout.complete and stored is not None and "sbaij" in stored.getType() and stored.getBlockSize() == d:
+        if (
+            layout.complete
+            and stored is not None
+            and "sbaij" in stored.getType()
+            and stored.getBlockSize() == d
+        ):
             stored.setOption(PETSc.Mat.Option.SPD, True)
             return stored
         mat = assembled(self.A) if layout.complete else self.entries()
@@ -110,8 +115,13 @@ class Nodewise:
         first = self.source.comm.tompi4py().scan(layout.size) - layout.size
         columns = (layout.places // d * d)[:, None] + np.arange(d)
         values = (columns == layout.places[:, None]).astype(float)
-        csr = (np.arange(0, d * n + 1, d).astype(kind), (first + columns).ravel().astype(kind), values.ravel())
-        selection = PETSc.Mat().createAIJ((self.source.getSizes()[0], (layout.size, None)), csr=csr,
-                                          comm=self.source.comm)
+        csr = (
+            np.arange(0, d * n + 1, d).astype(kind),
+            (first + columns).ravel().astype(kind),
+            values.ravel(),
+        )
+        selection = PETSc.Mat().createAIJ(
+            (self.source.getSizes()[0], (layout.size, None)), csr=csr, comm=self.source.comm
+        )
         selection.assemble()
         return selection

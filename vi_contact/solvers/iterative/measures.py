@@ -35,8 +35,15 @@ class Measured:
 
     def __call__(self, contact: Contact, x: Array, residual: Array, load: Array) -> Measures:
         """Return the references at x, where ``residual`` is ``load`` - (A + K_s) x. Collective."""
-        local = np.array([self._b, contact.body_forces(x, residual, load), max_abs(x), self._guess,
-                          max_abs(contact.reactions(x, residual))])
+        local = np.array(
+            [
+                self._b,
+                contact.body_forces(x, residual, load),
+                max_abs(x),
+                self._guess,
+                max_abs(contact.reactions(x, residual)),
+            ]
+        )
         b, Ax, size, guess, reaction = self._comm.max(np.where(np.isnan(local), np.inf, local))
         whole = self._largest * size
         force = max(b, Ax, ROUNDED * whole)

@@ -144,12 +144,16 @@ class Multigrid(Inverse):
 
     The interpolation is that of the whole A with its rigid modes, in which no set has left a trace."""
 
-    def __init__(self, nodewise: Nodewise, surface: ContactSurface, layers: OptionLayers, work: Work) -> None:
+    def __init__(
+        self, nodewise: Nodewise, surface: ContactSurface, layers: OptionLayers, work: Work
+    ) -> None:
         self._nodewise, self._work, self._comm = nodewise, work, surface.comm
         self._matrix = nodewise.entries()
         if nodewise.A.space is not None:
             modes = rigid_modes(nodewise.A, surface, nodewise.layout, self._matrix.createVecLeft())
-            self._matrix.setNearNullSpace(PETSc.NullSpace().create(vectors=modes, comm=self._matrix.comm))
+            self._matrix.setNearNullSpace(
+                PETSc.NullSpace().create(vectors=modes, comm=self._matrix.comm)
+            )
         super().__init__(self._matrix, layers)
         self._built: Mask = np.zeros(nodewise.layout.size, dtype=bool)
         self._left = RENEWALS
@@ -162,7 +166,9 @@ class Multigrid(Inverse):
         """Make the Galerkin products anew when more than a tenth of the held rows have changed since."""
         mask = np.zeros_like(self._built)
         mask[held] = True
-        moved, size = self._comm.sum(np.array([np.sum(mask ^ self._built), np.sum(mask)], dtype=float))
+        moved, size = self._comm.sum(
+            np.array([np.sum(mask ^ self._built), np.sum(mask)], dtype=float)
+        )
         if self._left and moved > DRIFT * size:
             self._left -= 1
             self._built = mask
@@ -195,14 +201,20 @@ def made(matrix: Any, layers: OptionLayers) -> Any:
                 ones.set(1.0)
                 pc.apply(ones, image)
             if pc.getType() in ("gamg", "mg") and pc.getMGLevels() < FEW_LEVELS:
-                layers.read.update(key for key in layers.own if key.startswith("mg_levels_"))  # of none that is there
+                layers.read.update(
+                    key for key in layers.own if key.startswith("mg_levels_")
+                )  # of none that is there
         except PETSc.Error as error:
-            raise InputError(f"PETSc makes no preconditioner of the options under {layers.prefix} "
-                             f"({last_line(error)}): correct or drop them") from error
+            raise InputError(
+                f"PETSc makes no preconditioner of the options under {layers.prefix} "
+                f"({last_line(error)}): correct or drop them"
+            ) from error
     return pc
 
 
-def rigid_modes(A: EffectiveMatrix, surface: ContactSurface, layout: Layout, template: Any) -> list[Any]:
+def rigid_modes(
+    A: EffectiveMatrix, surface: ContactSurface, layout: Layout, template: Any
+) -> list[Any]:
     """Return orthonormal PETSc vectors of the rigid motions, in nodal frames and relative at two bodies."""
     space, comm = A.space, A.algebra.comm
     d, points = int(space.dimension), np.asarray(space.coordinates)
@@ -233,4 +245,3 @@ def orthonormal(vectors: list[Any]) -> list[Any]:
             vector.scale(1.0 / size)
             kept.append(vector)
     return kept
-

@@ -35,7 +35,9 @@ class Projected:
         self._one_sided = contact.reach & ~contact.soft & ~contact.bilateral
         self._rows, self._bound = contact.rows[self._one_sided], contact.bound[self._one_sided]
         contact.closed = contact.closed & ~self._one_sided
-        self._weights = contact.weights()  # 0 where held on both sides, and where there is no unknown
+        self._weights = (
+            contact.weights()
+        )  # 0 where held on both sides, and where there is no unknown
         self._fixed: Mask = self._weights == 0.0
         self.lower = np.full(len(diagonal), -np.inf)
         self.lower[self._rows] = -self._root[self._rows] * self._bound
@@ -72,7 +74,9 @@ class Projected:
         """Advance until the projected gradient is as small as the measures of the step ask for."""
         of, mark, since, count = self.of, np.inf, 0, 0
         while True:
-            norm = largest(of.comm, np.max(np.abs(self._root * (face.phi + face.beta)), initial=0.0))
+            norm = largest(
+                of.comm, np.max(np.abs(self._root * (face.phi + face.beta)), initial=0.0)
+            )
             if not np.isfinite(norm):
                 return NOT_A_NUMBER
             if norm <= mark:
@@ -164,7 +168,9 @@ def largest_eigenvalue(of: Search, diagonal: Array, rounds: int = 15) -> float:
     return 1.05 * max(value, 1.0)
 
 
-def projected_gradients(of: Search, diagonal: Array, norm: float, x: Array) -> tuple[Array, Array, int]:
+def projected_gradients(
+    of: Search, diagonal: Array, norm: float, x: Array
+) -> tuple[Array, Array, int]:
     """Return (x, residual formed afresh, reason) of the step from x: SOLVED, or why there is no answer. Collective."""
     contact, residual = of.contact, of.load
     for _ in range(ROUNDS):

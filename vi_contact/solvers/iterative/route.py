@@ -30,7 +30,18 @@ from .friction import Friction
 from .layout import Nodewise
 from .measures import Worth
 from .operator import Operator, Work
-from .preconditioners import GAMG, ICC, KINDS, RAISED, Inverse, Masked, Multigrid, chosen, courant, defaults
+from .preconditioners import (
+    GAMG,
+    ICC,
+    KINDS,
+    RAISED,
+    Inverse,
+    Masked,
+    Multigrid,
+    chosen,
+    courant,
+    defaults,
+)
 from .projected_gradients import largest_eigenvalue, projected_gradients
 from .search import Search, search
 
@@ -65,18 +76,24 @@ class Iterative:
         check_word("preconditioner", self.preconditioner, (AUTO, *KINDS))
         remedy = "give a dict of PETSc options without prefix"
         instance("Iterative", "petsc_options", self.petsc_options, Mapping, remedy)
-        instance("Iterative", "prefix", self.prefix, str, "give a text such as 'vi_contact_iterative_'")
+        instance(
+            "Iterative", "prefix", self.prefix, str, "give a text such as 'vi_contact_iterative_'"
+        )
         attributes(self, positive=("tolerance",), counts=("patience",))
         whole("Iterative", "changes", self.changes)
         if not self.tolerance < 1.0:
-            raise InputError(f"Iterative: tolerance is {shown(self.tolerance)}; give a relative error below 1, such as "
-                             "3e-10")
+            raise InputError(
+                f"Iterative: tolerance is {shown(self.tolerance)}; give a relative error below 1, such as "
+                "3e-10"
+            )
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for friction without a tangential direction, or of a wrong number of values."""
         check_laws("Iterative()", problem)
 
-    def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> "PreparedIterative":
+    def prepare(
+        self, A: EffectiveMatrix, surface: ContactSurface, scale: float
+    ) -> "PreparedIterative":
         """Choose and make the preconditioner; collective. InputError for options that cannot work."""
         return PreparedIterative(self, A, surface, scale)
 
@@ -84,7 +101,9 @@ class Iterative:
 class PreparedIterative:
     """Solve steps of one A. ``work``: what it has done; ``kind``: its preconditioner; ``ksp``: PETSc's object."""
 
-    def __init__(self, settings: Iterative, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
+    def __init__(
+        self, settings: Iterative, A: EffectiveMatrix, surface: ContactSurface, scale: float
+    ) -> None:
         self._settings, self.work = settings, Work()
         nodewise = Nodewise(A)
         self._layout = layout = nodewise.layout
@@ -92,15 +111,22 @@ class PreparedIterative:
         blocks = nodewise.blocks()
         PETSc.garbage_cleanup(blocks.comm)
         self._operator = Operator(blocks, self.work)
-        self._layers = OptionLayers(settings.prefix, defaults(self.kind, A.algebra.comm.size), settings.petsc_options)
+        self._layers = OptionLayers(
+            settings.prefix, defaults(self.kind, A.algebra.comm.size), settings.petsc_options
+        )
         self._blocks, self._raised = blocks, False
-        self._take(Multigrid(nodewise, surface, self._layers, self.work) if self.kind == GAMG
-                   else Inverse(blocks, self._layers))
+        self._take(
+            Multigrid(nodewise, surface, self._layers, self.work)
+            if self.kind == GAMG
+            else Inverse(blocks, self._layers)
+        )
         if settings.preconditioner == AUTO:
             self._layers.excuse_known()  # they may be for a kind that another time step makes
         self._layers.refuse_unread(self._name, surface.comm)
         self._diagonal = np.array(blocks.getDiagonal().array_r)
-        self._contact = Contact(surface, scale, layout.places[surface.owned], self._diagonal, layout.missing)
+        self._contact = Contact(
+            surface, scale, layout.places[surface.owned], self._diagonal, layout.missing
+        )
         self._norm: float | None = None
         self._surface, self._worth = surface, Worth(surface.comm, 2, settings.tolerance)
 
@@ -110,8 +136,13 @@ class PreparedIterative:
         kind = chosen(number, A.space is not None) if asked == AUTO else asked
         if A.algebra.comm.rank == 0:
             layer = kind == ICC and A.algebra.comm.size > 1
-            log.info("Iterative: preconditioner %s, %s at Courant number %.3g%s", kind,
-                     "chosen" if asked == AUTO else "asked for", number, "; ranks overlap by a layer" if layer else "")
+            log.info(
+                "Iterative: preconditioner %s, %s at Courant number %.3g%s",
+                kind,
+                "chosen" if asked == AUTO else "asked for",
+                number,
+                "; ranks overlap by a layer" if layer else "",
+            )
         return kind
 
     def _take(self, inverse: Inverse) -> None:
@@ -130,11 +161,16 @@ class PreparedIterative:
         if self.kind != ICC or self._raised:
             return self._attempt(step)
         try:
-            with np.errstate(over="ignore", invalid="ignore"):  # of factors that are not positive definite
+            with np.errstate(
+                over="ignore", invalid="ignore"
+            ):  # of factors that are not positive definite
                 return self._attempt(step)
         except StepFailure as error:
             if self._surface.comm.rank == 0:
-                log.info("%s: the step is tried again with incomplete factors of a larger diagonal", error)
+                log.info(
+                    "%s: the step is tried again with incomplete factors of a larger diagonal",
+                    error,
+                )
         self._raised = True
         self._take(Inverse(self._blocks, self._layers, RAISED))
         return self._attempt(step)
@@ -152,8 +188,17 @@ class PreparedIterative:
     def _friction(self) -> Friction:
         """The solver of steps with friction."""
         settings = self._settings
-        return Friction(self._surface, self._contact, self._layout, self._diagonal, self._operator, self._inverse,
-                        tolerance=settings.tolerance, patience=settings.patience, name=self._name)
+        return Friction(
+            self._surface,
+            self._contact,
+            self._layout,
+            self._diagonal,
+            self._operator,
+            self._inverse,
+            tolerance=settings.tolerance,
+            patience=settings.patience,
+            name=self._name,
+        )
 
     @property
     def _name(self) -> str:
@@ -162,9 +207,20 @@ class PreparedIterative:
     def _solve(self, step: StepProblem) -> StepResult:
         settings, contact, layout = self._settings, self._contact, self._layout
         before = self.work.linear_iterations
-        of = Search(step, layout.padded(step.b), contact, operator=self._operator, masked=self._masked,
-                    inverse=self._inverse, worth=self._worth, tolerance=settings.tolerance, patience=settings.patience)
-        x, residual, changes, reason = search(of, self._cg, layout.padded(step.guess), settings.changes)
+        of = Search(
+            step,
+            layout.padded(step.b),
+            contact,
+            operator=self._operator,
+            masked=self._masked,
+            inverse=self._inverse,
+            worth=self._worth,
+            tolerance=settings.tolerance,
+            patience=settings.patience,
+        )
+        x, residual, changes, reason = search(
+            of, self._cg, layout.padded(step.guess), settings.changes
+        )
         if reason == WRONG_SIGNS:
             self.work.fallbacks += 1
             if self._norm is None:
@@ -173,5 +229,11 @@ class PreparedIterative:
         if reason != SOLVED:
             raise stopped(self._name, reason, self.work.linear_iterations - before, of.history)
         self._worth.keep()
-        return StepResult(x=layout.stripped(x), r_n=contact.reactions(x, residual), active=contact.closed.copy(),
-                          iterations=changes, method=self._name, aim=settings.tolerance)
+        return StepResult(
+            x=layout.stripped(x),
+            r_n=contact.reactions(x, residual),
+            active=contact.closed.copy(),
+            iterations=changes,
+            method=self._name,
+            aim=settings.tolerance,
+        )

@@ -27,8 +27,19 @@ FALL = 0.1  # of the residual between two looks at the signs
 class Search:
     """Search the contact set of one step. ``history``: residuals over the forces, at every look."""
 
-    def __init__(self, step: StepProblem, b: Array, contact: Contact, *, operator: Operator, masked: Masked,
-                 inverse: Inverse, worth: Worth, tolerance: float, patience: int) -> None:
+    def __init__(
+        self,
+        step: StepProblem,
+        b: Array,
+        contact: Contact,
+        *,
+        operator: Operator,
+        masked: Masked,
+        inverse: Inverse,
+        worth: Worth,
+        tolerance: float,
+        patience: int,
+    ) -> None:
         self.contact, self.operator, self.masked, self.inverse = contact, operator, masked, inverse
         self.comm: Comm = step.surface.comm
         self.b, self.tolerance, self.patience = b, tolerance, patience
@@ -72,14 +83,18 @@ class Search:
         """Take the references at x, and note the residual; ``goal``: how small it has to become."""
         self._mark, self._since = FALL * norm, iteration
         self.scales = self.measured(self.contact, x, residual, self.load)
-        self.goal = self.worth.goal(norm, self.scales, x, self.contact.reactions(x, residual), begin=iteration == 0)
+        self.goal = self.worth.goal(
+            norm, self.scales, x, self.contact.reactions(x, residual), begin=iteration == 0
+        )
         self.history.append(norm / self.scales.force if self.scales.force > 0.0 else norm)
 
     def wrong(self, x: Array, residual: Array, error: float) -> Mask:
         """Return the conditions of this rank whose signs are wrong by more than the error, the largest residual."""
         r = self.contact.reactions(x, residual)
         least = 0.5 * self.tolerance * self.scales.reaction
-        return self.contact.wrong(x, r, error=error, least_force=least, x_ref=self.scales.displacement)
+        return self.contact.wrong(
+            x, r, error=error, least_force=least, x_ref=self.scales.displacement
+        )
 
     def afresh(self, x: Array) -> tuple[Array, float]:
         """Return (residual, largest of the free unknowns), formed anew at x: one product."""
@@ -106,7 +121,9 @@ class Search:
         return x, residual, new
 
 
-def search(of: Search, cg: ConjugateGradients, x: Array, changes: int) -> tuple[Array, Array, int, int]:
+def search(
+    of: Search, cg: ConjugateGradients, x: Array, changes: int
+) -> tuple[Array, Array, int, int]:
     """Return (x, residual, changes of the set, reason) of the search from x. The reason is SOLVED, or PETSc's for
     stopping, or WRONG_SIGNS when a set came twice or the set changed more often than ``changes``. Collective."""
     contact, count, refinements = of.contact, 0, 0

@@ -6,4 +6,4 @@ from .lemke import Lemke as Lemke
 from .uniqueness import PMatrix as PMatrix
 from .uniqueness import p_matrix as p_matrix
 
-__all__: list[str] = ['ActiveSet', 'Hildreth', 'Lemke', 'PMatrix', 'p_matrix']
+__all__: list[str] = ["ActiveSet", "Hildreth", "Lemke", "PMatrix", "p_matrix"]

@@ -65,13 +65,17 @@ class PreparedSets(PreparedLCP):
     def _solved(self, q: Array, guess: Array | Mask | None) -> LCPResult:
         known = q.shape == self.scaled.bilateral.shape and (guess is None or guess.shape == q.shape)
         if known and self._compiled is not None:
-            r, active, residual, changes, moved = self._compiled(q, q < 0.0 if guess is None else guess > 0)
+            r, active, residual, changes, moved = self._compiled(
+                q, q < 0.0 if guess is None else guess > 0
+            )
             if (count := int(changes[0])) >= 0:
                 history = tuple(moved[0, :count].tolist())
                 return LCPResult(r[0], active[0], count, float(residual[0]), self.method, history)
         return super()._solved(q, guess)
 
-    def solve_many(self, q: Array, guess: Mask) -> tuple[Array, Mask, list[int], dict[int, ViContactError]]:
+    def solve_many(
+        self, q: Array, guess: Mask
+    ) -> tuple[Array, Mask, list[int], dict[int, ViContactError]]:
         """Return r and active of several q, all (k, m), the iterations, and what those raise that have no answer."""
         none = np.zeros(q.shape), np.zeros(q.shape, dtype=bool), None, np.full(len(q), -1), None
         r, active, _, changes, _ = none if self._compiled is None else self._compiled(q, guess)
@@ -96,11 +100,35 @@ class Exchanges:
         scaled, method = self._prepared.scaled, cast(ActiveSet, self._prepared.method)
         m, most = scaled.bilateral.size, min(PATIENCE, method.max_iterations)
         self._rows, self._q, self._guess = k, np.empty((k, m)), np.empty((k, m), dtype=bool)
-        sets = np.full((k, m), 2, np.uint8), np.empty((k, m, m)), np.empty(3 * m), np.empty(m, np.int32)
-        self._found: Any = (np.empty((k, m)), np.empty((k, m), dtype=bool), np.empty(k), np.empty(k, np.int32),
-                       np.empty((k, most), np.int32))
-        self._kept = scaled.matrix, scaled.scale, scaled.bilateral, self._q, self._guess, *sets, *self._found
-        self._arguments = (m, most, c_double(4.0 * EPS * scaled.norm), c_double(method.tolerance), *map(at, self._kept))
+        sets = (
+            np.full((k, m), 2, np.uint8),
+            np.empty((k, m, m)),
+            np.empty(3 * m),
+            np.empty(m, np.int32),
+        )
+        self._found: Any = (
+            np.empty((k, m)),
+            np.empty((k, m), dtype=bool),
+            np.empty(k),
+            np.empty(k, np.int32),
+            np.empty((k, most), np.int32),
+        )
+        self._kept = (
+            scaled.matrix,
+            scaled.scale,
+            scaled.bilateral,
+            self._q,
+            self._guess,
+            *sets,
+            *self._found,
+        )
+        self._arguments = (
+            m,
+            most,
+            c_double(4.0 * EPS * scaled.norm),
+            c_double(method.tolerance),
+            *map(at, self._kept),
+        )
 
     def __call__(self, q: Array, guess: Mask) -> tuple[Array, Mask, Array, Indices, Indices]:
         """Return r, active, residual, iterations (-1: not solved) and rows that each moved; q, guess (k, m) or (m,)."""

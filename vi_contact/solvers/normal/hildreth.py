@@ -32,7 +32,9 @@ class Hildreth:
     record: bool = False
 
     def __post_init__(self) -> None:
-        attributes(self, positive=("tolerance",), counts=("max_sweeps",), flags=("primal", "record"))
+        attributes(
+            self, positive=("tolerance",), counts=("max_sweeps",), flags=("primal", "record")
+        )
 
     def prepare(self, G: Array, bilateral: Mask) -> PreparedLCP:
         """Check G (m, m), and invert it for the primal form. InputError when it is not SPD."""
@@ -46,7 +48,9 @@ class _Sweeps:
     def __init__(self, method: Hildreth, scaled: ScaledLCP) -> None:
         self.method, self._scaled, bilateral = method, scaled, scaled.bilateral
         factor = cholesky(scaled.matrix)
-        self._H, self._unit = _inverse(factor) if method.primal else (scaled.matrix, np.ones(bilateral.size))
+        self._H, self._unit = (
+            _inverse(factor) if method.primal else (scaled.matrix, np.ones(bilateral.size))
+        )
         fixed = bilateral & method.primal  # s = -q there; in the dual form r is free there
         self._rows = [(i, self._H[i]) for i in np.flatnonzero(~fixed).tolist()]
 
@@ -61,9 +65,14 @@ class _Sweeps:
             change = sweep(self._rows, x, lower, gradient)
             if method.record:
                 history.append(self._objective(x, gap))
-            if change > method.tolerance * max(abs(value) for value in x) and sweeps < method.max_sweeps:
+            if (
+                change > method.tolerance * max(abs(value) for value in x)
+                and sweeps < method.max_sweeps
+            ):
                 continue
-            gradient = self._gradient(x, gap)  # afresh: the updates of a sweep accumulate rounding errors
+            gradient = self._gradient(
+                x, gap
+            )  # afresh: the updates of a sweep accumulate rounding errors
             r = self._reaction(np.array(x), np.array(lower), gradient)
             error = scaled.complementarity(r, gap + scaled.matrix @ r)
             if error <= max(method.tolerance * unit, self._rounding(x, r)):
@@ -72,7 +81,11 @@ class _Sweeps:
         raise failure(method, iterations=method.max_sweeps, residual=error / unit, advice=advice)
 
     def _lower(self, gap: Array) -> list[float]:
-        lower = -gap / self._unit if self.method.primal else np.where(self._scaled.bilateral, -np.inf, 0.0)
+        lower = (
+            -gap / self._unit
+            if self.method.primal
+            else np.where(self._scaled.bilateral, -np.inf, 0.0)
+        )
         return list(lower.tolist())
 
     def _start(self, gap: Array, lower: list[float], guess: Array | Mask | None) -> list[float]:
@@ -95,7 +108,9 @@ class _Sweeps:
 
     def _objective(self, x: list[float], gap: Array) -> float:
         at = np.array(x)
-        linear = 0.0 if self.method.primal else float(at[at != 0.0] @ gap[at != 0.0])  # q = inf where r = 0
+        linear = (
+            0.0 if self.method.primal else float(at[at != 0.0] @ gap[at != 0.0])
+        )  # q = inf where r = 0
         return 0.5 * float(at @ (self._H @ at)) + linear
 
     def _rounding(self, x: list[float], r: Array) -> float:
@@ -106,7 +121,9 @@ class _Sweeps:
         return 4.0 * EPS * self._scaled.norm * max_abs(product)
 
 
-def sweep(rows: list[tuple[int, Array]], x: list[float], lower: list[float], gradient: Array) -> float:
+def sweep(
+    rows: list[tuple[int, Array]], x: list[float], lower: list[float], gradient: Array
+) -> float:
     """Sweep once over ``rows`` (index, row of H with unit diagonal), in place; return the largest |change|.
 
     Keeps gradient = H x + c up to date by columns, so that rows at rest cost a comparison."""

@@ -25,7 +25,9 @@ from ...core.algebra import Array, Mask, lowest, max_abs
 from ...core.errors import InputError, StepFailure
 
 EPS = float(np.finfo(float).eps)
-Found = tuple[Array, float, int, Sequence[float]]  # scaled r, residual over the unit, iterations, history
+Found = tuple[
+    Array, float, int, Sequence[float]
+]  # scaled r, residual over the unit, iterations, history
 
 
 @dataclass(frozen=True)
@@ -58,10 +60,18 @@ class ScaledLCP:
         """Return a start for iterative methods: the guess itself, one Jacobi step on a guessed set, or zero."""
         if guess is None:
             return np.zeros(q.size)
-        start = np.where(guess, np.where(np.isfinite(q), -q, 0.0), 0.0) if guess.dtype == bool else guess / self.scale
+        start = (
+            np.where(guess, np.where(np.isfinite(q), -q, 0.0), 0.0)
+            if guess.dtype == bool
+            else guess / self.scale
+        )
         if not np.isfinite(start).all():
-            raise InputError("the guessed reactions contain NaN or infinity: give finite numbers or None")
-        return np.where(self.bilateral, start, np.where(np.isfinite(q), np.maximum(start, 0.0), 0.0))
+            raise InputError(
+                "the guessed reactions contain NaN or infinity: give finite numbers or None"
+            )
+        return np.where(
+            self.bilateral, start, np.where(np.isfinite(q), np.maximum(start, 0.0), 0.0)
+        )
 
     def rounding(self, r: Array) -> float:
         """Return the gap below which there are rounding errors of q + G r only."""
@@ -101,12 +111,18 @@ class PreparedLCP:
         scaled = self.scaled
         check_gap(q, scaled.bilateral)
         if guess is not None and guess.shape != q.shape:
-            raise InputError(f"the guess has shape {guess.shape} for {q.size} rows: give a mask or all reactions")
+            raise InputError(
+                f"the guess has shape {guess.shape} for {q.size} rows: give a mask or all reactions"
+            )
         gap = q * scaled.scale
         unit = scaled.violation(gap)
-        r, residual, iterations, history = self.search(gap, guess, unit) if unit else (np.zeros(q.size), 0.0, 0, ())
+        r, residual, iterations, history = (
+            self.search(gap, guess, unit) if unit else (np.zeros(q.size), 0.0, 0, ())
+        )
         active = (r > 0.0) | scaled.bilateral
-        return LCPResult(r * scaled.scale, active, iterations, residual, self.method, tuple(history))
+        return LCPResult(
+            r * scaled.scale, active, iterations, residual, self.method, tuple(history)
+        )
 
 
 def scaled_dense(G: Array, bilateral: Mask, *, unsymmetric: bool = False) -> ScaledLCP:
@@ -125,8 +141,10 @@ def scaled_matrix(G: Array, d: Array, *, unsymmetric: bool = False) -> tuple[Arr
     if max_abs(matrix - matrix.T) <= 1e-8:
         matrix = 0.5 * (matrix + matrix.T)
     elif not unsymmetric:
-        raise InputError("the Delassus operator is not symmetric: use a symmetric effective matrix A, or the methods "
-                         "Lemke() and, with friction, FrictionNewton()")
+        raise InputError(
+            "the Delassus operator is not symmetric: use a symmetric effective matrix A, or the methods "
+            "Lemke() and, with friction, FrictionNewton()"
+        )
     return matrix, float(np.abs(matrix).sum(axis=1).max(initial=0.0))
 
 
@@ -134,13 +152,17 @@ def energy_scale(G: Array, *, signed: bool = False) -> Array:
     """Return d = |G_ii|^(-1/2) (m,). InputError where G_ii is not positive, unless it may be: 0 is then as good as the
     largest entry."""
     if not np.isfinite(G).all():
-        raise InputError("the Delassus operator contains NaN or infinity: check the factorisation it came from")
+        raise InputError(
+            "the Delassus operator contains NaN or infinity: check the factorisation it came from"
+        )
     diagonal = np.asarray(G.diagonal(), dtype=float)
     if signed:
         diagonal = np.where(diagonal == 0.0, max_abs(G) or 1.0, np.abs(diagonal))
     wrong = np.flatnonzero(~(diagonal > 0.0))
     if wrong.size:
-        raise InputError(f"contact row {wrong[0]} cannot move, as G_ii is not positive: leave it out of the contact")
+        raise InputError(
+            f"contact row {wrong[0]} cannot move, as G_ii is not positive: leave it out of the contact"
+        )
     return diagonal**-0.5
 
 
@@ -150,8 +172,10 @@ def cholesky(G: Array) -> Array:
         return G
     factor, info = lapack.dpotrf(G, lower=1, clean=0)
     if info > 0:
-        raise InputError(f"the Delassus operator is not positive definite at contact row {info - 1}: remove "
-                         "constraints that act on the same motion twice")
+        raise InputError(
+            f"the Delassus operator is not positive definite at contact row {info - 1}: remove "
+            "constraints that act on the same motion twice"
+        )
     return factor
 
 
@@ -160,17 +184,25 @@ def check_operator(G: Array, bilateral: Mask) -> None:
     if len(G.shape) != 2 or G.shape[0] != G.shape[1]:
         raise InputError(f"the Delassus operator has shape {tuple(G.shape)}: give a square matrix")
     if getattr(bilateral, "shape", None) != (G.shape[0],) or bilateral.dtype != bool:
-        raise InputError(f"'bilateral' is no mask: give booleans for the {G.shape[0]} rows of the Delassus operator")
+        raise InputError(
+            f"'bilateral' is no mask: give booleans for the {G.shape[0]} rows of the Delassus operator"
+        )
 
 
 def check_gap(q: Array, bilateral: Mask) -> None:
     """Raise InputError unless q has one entry a row, finite or (in unilateral rows) +inf."""
     if q.shape != bilateral.shape:
-        raise InputError(f"q has shape {q.shape} but the Delassus operator has {bilateral.size} rows: give as many")
+        raise InputError(
+            f"q has shape {q.shape} but the Delassus operator has {bilateral.size} rows: give as many"
+        )
     if not isfinite(max_abs(q)) and not np.where(bilateral, np.isfinite(q), q > -np.inf).all():
-        raise InputError("q contains NaN, -inf, or +inf in a bilateral row: give numbers, or +inf in other rows")
+        raise InputError(
+            "q contains NaN, -inf, or +inf in a bilateral row: give numbers, or +inf in other rows"
+        )
 
 
 def failure(method: object, *, iterations: int, residual: float, advice: str) -> StepFailure:
     """Return the error of a method that did not reach its tolerance."""
-    return StepFailure(f"{method} stopped after {iterations} iterations with residual {residual:.1e}: {advice}")
+    return StepFailure(
+        f"{method} stopped after {iterations} iterations with residual {residual:.1e}: {advice}"
+    )

@@ -55,8 +55,10 @@ class _Pivots:
         self.method, self._scaled = method, scaled
         G, b = scaled.matrix, scaled.bilateral
         if b.any() and np.linalg.cond(G[np.ix_(b, b)]) > 0.1 / EPS:
-            raise InputError("bilateral rows of the Delassus operator depend on each other: remove constraints that "
-                             "act on the same motion twice")
+            raise InputError(
+                "bilateral rows of the Delassus operator depend on each other: remove constraints that "
+                "act on the same motion twice"
+            )
         self._carry = np.linalg.solve(G[np.ix_(b, b)].T, G[:, b].T).T
         self._matrix = G - self._carry @ G[b]
 
@@ -64,11 +66,15 @@ class _Pivots:
         """Try the guessed set, or that of guessed reactions; where it is wrong, pivot."""
         history: list[float] = []
         r, residual = self._on_set(gap < 0.0 if guess is None else guess > 0, gap)
-        if residual > min(self._scaled.rounding(r), self.method.tolerance * unit):  # huge r round to anything
+        if residual > min(
+            self._scaled.rounding(r), self.method.tolerance * unit
+        ):  # huge r round to anything
             r, residual = self._on_set(self._closed(gap, unit, history), gap)
         if not residual <= self.method.tolerance * unit:
             advice = "G is too ill-conditioned: remove contacts that nearly depend on others"
-            raise failure(self.method, iterations=len(history), residual=residual / unit, advice=advice)
+            raise failure(
+                self.method, iterations=len(history), residual=residual / unit, advice=advice
+            )
         return r, residual / unit, len(history), history
 
     def _on_set(self, active: Mask, gap: Array) -> tuple[Array, float]:
@@ -90,12 +96,19 @@ class _Pivots:
         if not (q < 0.0).any():
             return closed
         basis, z = np.arange(m), 2 * m  # numbers of w, then of r, then of z
-        d = 1.5 + probe(np.arange(m), 0)  # covers q, and is parallel to none that a model would have
+        d = 1.5 + probe(
+            np.arange(m), 0
+        )  # covers q, and is parallel to none that a model would have
         tableau = np.column_stack([np.eye(m), -self._matrix[np.ix_(rows, rows)], -d, q])
         row, entering, left = m - 1 - int(np.argmin((q / d)[::-1])), z, -1
         while left != z:
             if len(history) == self.method.max_iterations:
-                raise failure(self.method, iterations=len(history), residual=history[-1], advice="raise max_iterations")
+                raise failure(
+                    self.method,
+                    iterations=len(history),
+                    residual=history[-1],
+                    advice="raise max_iterations",
+                )
             tableau[row] /= tableau[row, entering]
             others = np.where(np.arange(m) == row, 0.0, tableau[:, entering])
             tableau -= np.outer(others, tableau[row])
@@ -113,8 +126,10 @@ def _leaving(tableau: Array, basis: Indices, entering: int, pivots: int) -> int:
     m, column = len(tableau), tableau[:, entering]
     rows = np.flatnonzero(column > TINY * max_abs(column))
     if not rows.size:
-        raise StepFailure(f"Lemke's method ended on a ray after {pivots} pivots: there is no solution, or G is not "
-                          "copositive-plus; take a smaller time step, a finer mesh, or a symmetric G")
+        raise StepFailure(
+            f"Lemke's method ended on a ray after {pivots} pivots: there is no solution, or G is not "
+            "copositive-plus; take a smaller time step, a finer mesh, or a symmetric G"
+        )
     for place in (-1, *range(m)):
         ratio = tableau[rows, place] / column[rows]
         rows = rows[ratio <= ratio.min() + TIED * max(1.0, abs(ratio.min()))]

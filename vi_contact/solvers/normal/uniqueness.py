@@ -37,10 +37,15 @@ def p_matrix(G: Array) -> PMatrix:
     matrix = energy_scale(G)[:, None] * G * energy_scale(G)
     norm = float(np.abs(matrix).sum(axis=1).max(initial=0.0))
     if np.linalg.eigvalsh(0.5 * (matrix + matrix.T)).min(initial=1.0) > len(G) * EPS * norm:
-        return PMatrix(True, "is a P-matrix, its symmetric part is positive definite: the solution is unique")
+        return PMatrix(
+            True, "is a P-matrix, its symmetric part is positive definite: the solution is unique"
+        )
     if len(G) > MOST:
-        return PMatrix(None, f"may be a P-matrix or none: its symmetric part is not positive definite, and {len(G)} "
-                             "rows are too many for all minors")
+        return PMatrix(
+            None,
+            f"may be a P-matrix or none: its symmetric part is not positive definite, and {len(G)} "
+            "rows are too many for all minors",
+        )
     parts, errors, sure = matrix[None], 2.0 * EPS * np.abs(matrix)[None], True
     while parts.shape[1]:
         if (parts[:, 0, 0] < -errors[:, 0, 0]).any():
@@ -48,9 +53,14 @@ def p_matrix(G: Array) -> PMatrix:
         clear = parts[:, 0, 0] > errors[:, 0, 0]
         sure = sure and bool(clear.all())
         rest, doubt = _complements(parts[clear], errors[clear])
-        parts, errors = np.concatenate([parts[:, 1:, 1:], rest]), np.concatenate([errors[:, 1:, 1:], doubt])
+        parts, errors = (
+            np.concatenate([parts[:, 1:, 1:], rest]),
+            np.concatenate([errors[:, 1:, 1:], doubt]),
+        )
     if sure:
-        return PMatrix(True, "is a P-matrix, all its principal minors are positive: the solution is unique")
+        return PMatrix(
+            True, "is a P-matrix, all its principal minors are positive: the solution is unique"
+        )
     return PMatrix(None, "may be a P-matrix or none: a principal minor is zero to rounding")
 
 

@@ -5,4 +5,4 @@ from .snes import ReducedNewton as ReducedNewton
 from .snes import SemismoothNewton as SemismoothNewton
 from .tao import TaoTron as TaoTron
 
-__all__: list[str] = ['ReducedNewton', 'SemismoothNewton', 'TaoTron', 'Volume']
+__all__: list[str] = ["ReducedNewton", "SemismoothNewton", "TaoTron", "Volume"]

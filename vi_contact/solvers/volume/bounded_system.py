@@ -70,7 +70,9 @@ class BoundedSystem:
     def bounds(self, step: StepProblem) -> tuple[Array, Array]:
         """Return (lower, upper) of the owned unknowns; an infinite bound leaves its point free, bilateral or not."""
         if self.surface.some(np.isnan(step.bound)):
-            raise InputError("the bound of the contact conditions contains NaN: check the gap and the time scheme")
+            raise InputError(
+                "the bound of the contact conditions contains NaN: check the gap and the time scheme"
+            )
         lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
         if step.lower is not None:
             lower[self.bounded] = step.lower

@@ -23,7 +23,9 @@ from ..friction.extrapolation import Anderson
 from ..friction.slip_rate import RateIteration
 from .friction_system import FrictionUnknowns, ScaledFrictionStep
 
-TOLERANCE = 1e-11  # change of the thresholds relative to the largest: the error of the friction cone
+TOLERANCE = (
+    1e-11  # change of the thresholds relative to the largest: the error of the friction cone
+)
 NOISE = 1e-10  # below this, changes that do not shrink are those of round-off
 PROBLEMS = 200
 EXTRAPOLATION = Anderson(depth=5, after=3)
@@ -58,17 +60,23 @@ class VolumeFriction:
         def solved(mu: Array, before: Found | None) -> Found:
             return self._sequence(step, cohesion, mu[surface.slots], before)
 
-        found = RateIteration().solve(step, rest, slope, solved, lambda found: self._friction.by_point(found.slip))
+        found = RateIteration().solve(
+            step, rest, slope, solved, lambda found: self._friction.by_point(found.slip)
+        )
         return self._result(step, found)
 
-    def _sequence(self, step: StepProblem, cohesion: Array, slope: Array, before: Found | None) -> Found:
+    def _sequence(
+        self, step: StepProblem, cohesion: Array, slope: Array, before: Found | None
+    ) -> Found:
         """Coulomb's problem with a coefficient (m,) that is given, from the solution of another one. The thresholds are
         those of all conditions: every rank extrapolates and judges them alike."""
         following, spent = EXTRAPOLATION.start(), 0
         history: list[float] = []
         surface = self._body.surface
         none, mine = np.zeros(surface.count), surface.slots
-        limit = surface.everywhere(cohesion + slope * np.maximum(none if before is None else before.r_n, 0.0))
+        limit = surface.everywhere(
+            cohesion + slope * np.maximum(none if before is None else before.r_n, 0.0)
+        )
         if before is None:
             start, spent = self._first(step, limit)
         else:
@@ -80,18 +88,24 @@ class VolumeFriction:
             size = max(max_abs(new), max_abs(limit))
             change = max_abs(new - limit) / size if size else 0.0
             if change <= TOLERANCE or (change <= NOISE and history and change >= history[-1]):
-                return Found(found.state, found.r_n, found.active, found.slip, spent, tuple(history))
+                return Found(
+                    found.state, found.r_n, found.active, found.slip, spent, tuple(history)
+                )
             history.append(change)
             limit = np.maximum(following(limit, new), 0.0)
             start = self._scaled.moved(found.state, found.slip, limit[mine])
-        raise StepFailure(f"{self._name} stopped after {PROBLEMS} Tresca problems with a change of {history[-1]:.1e} "
-                          "of the friction thresholds: take a smaller step of time or load, or use Condensed()")
+        raise StepFailure(
+            f"{self._name} stopped after {PROBLEMS} Tresca problems with a change of {history[-1]:.1e} "
+            "of the friction thresholds: take a smaller step of time or load, or use Condensed()"
+        )
 
     def _first(self, step: StepProblem, limit: Array) -> tuple[FrictionUnknowns, int]:
         """The guess, sliding as predicted, and no iterations; with disks the solution without friction, whose slip
         gives the directions that Newton's method needs."""
         friction, scaled, own = self._friction, self._scaled, limit[self._body.surface.slots]
-        state = FrictionUnknowns(self._body.start(step), np.zeros(len(friction.tangent)), np.zeros(len(friction.pairs)))
+        state = FrictionUnknowns(
+            self._body.start(step), np.zeros(len(friction.tangent)), np.zeros(len(friction.pairs))
+        )
         if not (friction.any_disk and limit.any()):
             return scaled.moved(state, state.z[friction.tangent] - friction.origin(step), own), 0
         free = self._tresca(step, np.zeros_like(own), state)
@@ -114,4 +128,6 @@ class VolumeFriction:
         stick = (found.slip == 0.0) & (limit > 0.0)[friction.point]
         x[friction.tangent[stick]] = friction.origin(step)[stick]
         r_t = project(friction.by_point(found.state.reaction), limit)
-        return StepResult(x, found.r_n, found.active, found.iterations, self._name, r_t=r_t, history=found.history)
+        return StepResult(
+            x, found.r_n, found.active, found.iterations, self._name, r_t=r_t, history=found.history
+        )

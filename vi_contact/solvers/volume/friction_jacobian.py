@@ -23,9 +23,13 @@ class FrictionJacobian:
         self._ratio = np.nan
         total, parts = self._entries()
         rows, columns = (np.concatenate([part[i] for part in parts.values()]) for i in (0, 1))
-        places = sp.csr_matrix((np.arange(1.0, 1.0 + len(rows)), (rows, columns)), shape=(self._system.size, total))
+        places = sp.csr_matrix(
+            (np.arange(1.0, 1.0 + len(rows)), (rows, columns)), shape=(self._system.size, total)
+        )
         places.sort_indices()
-        self._order = places.data.astype(np.int64) - 1  # of the entries of all parts, none of which is given twice
+        self._order = (
+            places.data.astype(np.int64) - 1
+        )  # of the entries of all parts, none of which is given twice
         self._values = {name: values for name, (_, _, values) in parts.items()}
         self._A, self._inverse = parts["A"][2], 1.0 / self._system.stiffness[self._system.line]
         self.mat = aij(places, self._system.body.comm)
@@ -37,11 +41,17 @@ class FrictionJacobian:
         body, line, pairs = system.body, system.line, system.pairs
         indptr, columns, A = _rows_of(body)
         first, columns, total = renumbered(system.surface.comm, body.size, system.size, columns)
-        lam, gamma = body.size + np.arange(len(system.tangent)), system.first_gamma + np.arange(len(pairs))
+        lam, gamma = (
+            body.size + np.arange(len(system.tangent)),
+            system.first_gamma + np.arange(len(pairs)),
+        )
         slices = [np.arange(*indptr[row : row + 2]) for row in system.tangent[line]]
         row, entry = _spread(lam[line], slices)
         column = columns[entry]
-        tangent, stiffness = _spread(system.tangent[line], slices)[0], _spread(system.stiffness[line], slices)[0]
+        tangent, stiffness = (
+            _spread(system.tangent[line], slices)[0],
+            _spread(system.stiffness[line], slices)[0],
+        )
         both, twice = body.size + pairs.T.ravel(), np.tile(gamma, 2)
         moved = system.tangent[pairs.T.ravel()]
         none = np.zeros(len(both))
@@ -76,9 +86,13 @@ class FrictionJacobian:
         pairs, still, gamma = self._scaled.disks(y)
         c, over = self._scaled.disk_stiffness, self._scaled.disk_inverse
         by_reaction = (c[:, None] * (still + gamma[:, None] * pairs) - 2.0 * pairs) * over[:, None]
-        self._values |= {"disk lambda": np.tile(gamma, 2), "disk gamma": pairs.T.ravel(),
-                         "gamma lambda": by_reaction.T.ravel(), "gamma x": -((c * over)[:, None] * pairs).T.ravel(),
-                         "gamma gamma": c * over * np.sum(pairs**2, axis=1)}
+        self._values |= {
+            "disk lambda": np.tile(gamma, 2),
+            "disk gamma": pairs.T.ravel(),
+            "gamma lambda": by_reaction.T.ravel(),
+            "gamma x": -((c * over)[:, None] * pairs).T.ravel(),
+            "gamma gamma": c * over * np.sum(pairs**2, axis=1),
+        }
 
     def _write(self) -> None:
         self.mat.setValuesCSR(*self._csr, np.concatenate(list(self._values.values()))[self._order])
@@ -101,4 +115,6 @@ def _rows_of(body: Any) -> Any:
 def _spread(values: Any, slices: list[Indices]) -> tuple[Any, Any]:
     """values[i] for every entry of slices[i], and these entries."""
     lengths = [len(part) for part in slices]
-    return np.repeat(values, lengths), np.concatenate(slices) if slices else np.zeros(0, dtype=np.int64)
+    return np.repeat(values, lengths), np.concatenate(slices) if slices else np.zeros(
+        0, dtype=np.int64
+    )

@@ -115,7 +115,9 @@ class ScaledFrictionStep(ScaledStep):
     @property
     def disk_stiffness(self) -> Array:
         """Return (D,) scaled stiffness of the points with disks."""
-        return np.asarray(self.friction.stiffness[self.friction.pairs].mean(axis=1) * (self.x_ref / self.r_ref))
+        return np.asarray(
+            self.friction.stiffness[self.friction.pairs].mean(axis=1) * (self.x_ref / self.r_ref)
+        )
 
     def _parts(self, y: Array) -> tuple[Array, Array, Array]:
         """E, F_lambda and F_gamma."""
@@ -133,7 +135,11 @@ class ScaledFrictionStep(ScaledStep):
         friction = self.friction
         z, reaction, gamma = friction.split(y)
         pairs = reaction[friction.pairs]
-        return pairs, (self._origin - z[friction.tangent])[friction.pairs] + gamma[:, None] * pairs, gamma
+        return (
+            pairs,
+            (self._origin - z[friction.tangent])[friction.pairs] + gamma[:, None] * pairs,
+            gamma,
+        )
 
     def residual(self, y: Array) -> Array:
         """Return F(y) as SNES sees it."""
@@ -142,8 +148,12 @@ class ScaledFrictionStep(ScaledStep):
         pairs, moved, _ = self.disks(y)
         room += self.disk_stiffness * self.disk_inverse * np.sum(pairs * moved, axis=1)
         line = friction.line
-        still[line] += body[friction.tangent[line]] * (self.r_ref / self.x_ref) / friction.stiffness[line]
-        held = self.limit == 0.0  # lambda and gamma on both their bounds, where any F but zero keeps them
+        still[line] += (
+            body[friction.tangent[line]] * (self.r_ref / self.x_ref) / friction.stiffness[line]
+        )
+        held = (
+            self.limit == 0.0
+        )  # lambda and gamma on both their bounds, where any F but zero keeps them
         still[held[friction.point]], room[held[friction.disk]] = 1.0, 1.0
         return np.concatenate([body, still, room])
 
@@ -175,7 +185,9 @@ class ScaledFrictionStep(ScaledStep):
     def physical(self, y: Array) -> FrictionUnknowns:
         """Return y in the units of the step."""
         z, reaction, gamma = self.friction.split(y)
-        return FrictionUnknowns(z * self.x_ref, reaction * self.r_ref, gamma * (self.x_ref / self.r_ref))
+        return FrictionUnknowns(
+            z * self.x_ref, reaction * self.r_ref, gamma * (self.x_ref / self.r_ref)
+        )
 
     def slip(self, z: Array, sliding: Mask) -> Array:
         """Return (L,) B_t x - slip0 of the owned points, zero where they stick."""
@@ -190,4 +202,6 @@ class ScaledFrictionStep(ScaledStep):
         speed = np.linalg.norm(way, axis=1)
         table = np.divide(way * s[:, None], speed[:, None], out=inside, where=speed[:, None] > 0.0)
         gamma = np.divide(speed, s, out=np.zeros_like(s), where=s > 0.0)
-        return FrictionUnknowns(state.z, table[friction.point, friction.component], gamma[friction.disk])
+        return FrictionUnknowns(
+            state.z, table[friction.point, friction.component], gamma[friction.disk]
+        )

@@ -31,7 +31,9 @@ class OptionLayers:
 
     own: the user's options; read: those of them that PETSc has read."""
 
-    def __init__(self, prefix: str, defaults: Options, own: Options, read: set[str] | None = None) -> None:
+    def __init__(
+        self, prefix: str, defaults: Options, own: Options, read: set[str] | None = None
+    ) -> None:
         """``read``: the user's own options that PETSc has read so far, shared with other layers of one solver."""
         self.prefix = prefix
         self._defaults, self.own = defaults, {key.lstrip("-"): value for key, value in own.items()}
@@ -43,8 +45,10 @@ class OptionLayers:
             try:
                 solver.setFromOptions()
             except PETSc.Error as error:
-                raise InputError(f"PETSc does not accept the options under {self.prefix} ({last_line(error)}): correct "
-                                 "or drop them") from error
+                raise InputError(
+                    f"PETSc does not accept the options under {self.prefix} ({last_line(error)}): correct "
+                    "or drop them"
+                ) from error
             check(solver, self)
 
     @contextmanager
@@ -54,14 +58,18 @@ class OptionLayers:
         values = {**self._defaults, **self.own}
         pc = database.getString(self.prefix + "pc_type", str(values.get("pc_type", "")))
         if pc not in DIRECT and "pc_factor_mat_solver_type" not in self.own:
-            values.pop("pc_factor_mat_solver_type", None)  # the default is for our own direct solver
+            values.pop(
+                "pc_factor_mat_solver_type", None
+            )  # the default is for our own direct solver
         added = [key for key in values if not database.hasName(self.prefix + key)]
         for key in added:
             database.setValue(self.prefix + key, "" if values[key] is None else values[key])
         try:
             yield
         finally:
-            self.read.update(key for key in self.own if key not in added or was_read(self.prefix + key))
+            self.read.update(
+                key for key in self.own if key not in added or was_read(self.prefix + key)
+            )
             for key in added:
                 database.delValue(self.prefix + key)
 
@@ -70,13 +78,17 @@ class OptionLayers:
 
         To be called when all has been read that ever will be: after a solve with at least one iteration. Collective."""
         for key in self._unread(comm) if self.own else ():
-            raise InputError(f"{owner}: nothing reads '{key}' of petsc_options: {self._remedy(key)}")
+            raise InputError(
+                f"{owner}: nothing reads '{key}' of petsc_options: {self._remedy(key)}"
+            )
         self._tell_unread(owner, comm)
 
     def _unread(self, comm: Comm) -> list[str]:
         """Return the user's options that no rank has read: one without rows makes no blocks. Collective."""
         lists = comm.gather([key for key in self.own if key not in self.read])
-        everywhere = None if lists is None else [key for key in lists[0] if all(key in one for one in lists)]
+        everywhere = (
+            None if lists is None else [key for key in lists[0] if all(key in one for one in lists)]
+        )
         return list(comm.bcast(everywhere))
 
     def _tell_unread(self, owner: str, comm: Comm) -> None:
@@ -155,15 +167,25 @@ def direct(kind: str, ranks: int, *, exchanges: bool = False) -> Options:
     if exchanges:
         found = [name for name in EXCHANGE if packages.petsc_has(name)]
         if not found:
-            raise InputError("Volume() with friction needs a direct solver that exchanges rows, and this PETSc has "
-                             "none (MUMPS, SuiteSparse or SuperLU): take Condensed() or Iterative()")
+            raise InputError(
+                "Volume() with friction needs a direct solver that exchanges rows, and this PETSc has "
+                "none (MUMPS, SuiteSparse or SuperLU): take Condensed() or Iterative()"
+            )
         own["pc_factor_mat_solver_type"] = found[0]
     else:
         own["pc_factor_mat_ordering_type"] = "nd"
-    log.info("Volume: %s of '%s' factorises, as this PETSc has no MUMPS", kind, own["pc_factor_mat_solver_type"])
+    log.info(
+        "Volume: %s of '%s' factorises, as this PETSc has no MUMPS",
+        kind,
+        own["pc_factor_mat_solver_type"],
+    )
     if ranks == 1:
         return own
-    return {"ksp_type": "preonly", "pc_type": "redundant", **{f"redundant_{key}": one for key, one in own.items()}}
+    return {
+        "ksp_type": "preonly",
+        "pc_type": "redundant",
+        **{f"redundant_{key}": one for key, one in own.items()},
+    }
 
 
 def check_reduced(snes: Any, layers: OptionLayers) -> None:
@@ -171,7 +193,11 @@ def check_reduced(snes: Any, layers: OptionLayers) -> None:
     _check_type(snes, "vinewtonrsls", layers)
     pc, ksp = snes.ksp.pc.getType(), snes.ksp.getType()
     if pc in REDUCED_PC:
-        refuse(f"pc_type {pc} with vinewtonrsls", REDUCED_PC[pc], "use cholesky with MUMPS, hypre or bjacobi")
+        refuse(
+            f"pc_type {pc} with vinewtonrsls",
+            REDUCED_PC[pc],
+            "use cholesky with MUMPS, hypre or bjacobi",
+        )
     if ksp == "preonly" and pc not in EXACT:
         refuse(f"ksp_type preonly with pc_type {pc}", NOT_EXACT, "use ksp_type cg")
     _check_line_search(layers)
@@ -190,12 +216,21 @@ def check_friction(snes: Any, layers: OptionLayers) -> None:
     _check_unsymmetric(snes, layers, "vinewtonrsls", "friction", "the system with friction")
 
 
-def _check_unsymmetric(snes: Any, layers: OptionLayers, wanted: str, what: str, matrix: str) -> None:
+def _check_unsymmetric(
+    snes: Any, layers: OptionLayers, wanted: str, what: str, matrix: str
+) -> None:
     _check_type(snes, wanted, layers)
     pc, ksp = snes.ksp.pc.getType(), snes.ksp.getType()
-    for kind, name, symmetric in (("pc", pc, ("cholesky", "icc")), ("ksp", ksp, TABLES["symmetric_ksp"])):
+    for kind, name, symmetric in (
+        ("pc", pc, ("cholesky", "icc")),
+        ("ksp", ksp, TABLES["symmetric_ksp"]),
+    ):
         if name in symmetric:
-            refuse(f"{kind}_type {name} with {what}", f"{matrix} is not symmetric", "use lu with preonly")
+            refuse(
+                f"{kind}_type {name} with {what}",
+                f"{matrix} is not symmetric",
+                "use lu with preonly",
+            )
     if ksp == "preonly" and pc not in ("lu", "redundant"):
         refuse(f"ksp_type preonly with pc_type {pc}", NOT_EXACT, "use lu or gmres")
     _check_line_search(layers)
@@ -203,11 +238,18 @@ def _check_unsymmetric(snes: Any, layers: OptionLayers, wanted: str, what: str, 
 
 def _check_type(snes: Any, wanted: str, layers: OptionLayers) -> None:
     if snes.getType() != wanted:
-        refuse(f"option {layers.prefix}snes_type {snes.getType()}", f"the method was set up for {wanted}",
-               "choose the method by Volume(method=...)")
+        refuse(
+            f"option {layers.prefix}snes_type {snes.getType()}",
+            f"the method was set up for {wanted}",
+            "choose the method by Volume(method=...)",
+        )
 
 
 def _check_line_search(layers: OptionLayers) -> None:
     kind = layers.chosen("snes_linesearch_type")
     if kind in ("cp", "bisection") and PETSc.Sys.getVersion() < (3, 23, 0):
-        refuse(f"snes_linesearch_type {kind}", "PETSc before 3.23 ignores the bounds in its slope", "use none or bt")
+        refuse(
+            f"snes_linesearch_type {kind}",
+            "PETSc before 3.23 ignores the bounds in its slope",
+            "use none or bt",
+        )

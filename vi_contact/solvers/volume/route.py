@@ -60,20 +60,34 @@ class Volume:
     def __post_init__(self) -> None:
         names = ("carries_friction", "defaults", "driver")
         provides("Volume", "method", self.method, names, "give ReducedNewton() or another")
-        instance("Volume", "petsc_options", self.petsc_options, Mapping, "give a dict of PETSc options without prefix")
+        instance(
+            "Volume",
+            "petsc_options",
+            self.petsc_options,
+            Mapping,
+            "give a dict of PETSc options without prefix",
+        )
         instance("Volume", "prefix", self.prefix, str, "give a text such as 'vi_contact_volume_'")
         if not 0.0 < real(self.tolerance) < 1.0:
             tolerance = shown(self.tolerance)
-            raise InputError(f"Volume tolerance is {tolerance}: give a relative error below 1, such as 1e-9")
+            raise InputError(
+                f"Volume tolerance is {tolerance}: give a relative error below 1, such as 1e-9"
+            )
 
     def check(self, problem: ContactProblem) -> None:
         """Raise InputError for friction that the method cannot carry, without a tangent, or of wrong length."""
         if problem.frictional and not self.method.carries_friction:
-            raise InputError(f"Volume({self.method}) only enforces bounds on displacements and would ignore "
-                             f"{problem.friction}: use Volume(ReducedNewton()), or Condensed(), the condensed route")
-        check_laws(f"Volume({self.method})", problem, unsymmetric=not isinstance(self.method, TaoTron))
+            raise InputError(
+                f"Volume({self.method}) only enforces bounds on displacements and would ignore "
+                f"{problem.friction}: use Volume(ReducedNewton()), or Condensed(), the condensed route"
+            )
+        check_laws(
+            f"Volume({self.method})", problem, unsymmetric=not isinstance(self.method, TaoTron)
+        )
 
-    def prepare(self, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> "PreparedVolume":
+    def prepare(
+        self, A: EffectiveMatrix, surface: ContactSurface, scale: float
+    ) -> "PreparedVolume":
         """Return the solver for one effective matrix; collective. InputError for options that cannot work."""
         return PreparedVolume(self, A, surface, scale)
 
@@ -83,21 +97,29 @@ class PreparedVolume:
 
     Without ``close`` it is freed at the first ``prepare`` after its last reference: to free it is collective."""
 
-    def __init__(self, settings: Volume, A: EffectiveMatrix, surface: ContactSurface, scale: float) -> None:
+    def __init__(
+        self, settings: Volume, A: EffectiveMatrix, surface: ContactSurface, scale: float
+    ) -> None:
         self._system = BoundedSystem(A, surface, scale)
         PETSc.garbage_cleanup(self._system.comm)
         self._settings, self._method = settings, settings.method
         self._comm, self._read, self._all_read = surface.comm, set[str](), False
         ranks = surface.comm.size
         own = settings.method.defaults(ranks)
-        self._layers = self._layered(own if self._system.symmetric else {**own, **direct("lu", ranks)})
+        self._layers = self._layered(
+            own if self._system.symmetric else {**own, **direct("lu", ranks)}
+        )
         self._scaled = ScaledStep(self._system, settings.tolerance)
         self._name = f"Volume({type(settings.method).__name__})"
         self._friction: VolumeFriction | None = None
-        self._driver: SnesDriver | TaoDriver | None = self._method.driver(self._scaled, self._layers)
+        self._driver: SnesDriver | TaoDriver | None = self._method.driver(
+            self._scaled, self._layers
+        )
 
     def _layered(self, defaults: Options) -> OptionLayers:
-        return OptionLayers(self._settings.prefix, defaults, self._settings.petsc_options, self._read)
+        return OptionLayers(
+            self._settings.prefix, defaults, self._settings.petsc_options, self._read
+        )
 
     def _friction_method(self) -> VolumeFriction:
         """The problem with friction, made at the first step that has some, in the place of the other one."""

@@ -31,7 +31,9 @@ class ScaledStep:
         system = self.system
         self.b = system.load(step.b)
         lower, upper = system.bounds(step)
-        reach = upper[np.isfinite(upper) & (step.lower is None)]  # boxes may be wider than anything in them
+        reach = upper[
+            np.isfinite(upper) & (step.lower is None)
+        ]  # boxes may be wider than anything in them
         z_max, bound_max, b_max = system.max(max_abs(start), max_abs(reach), max_abs(self.b))
         if z_max == 0.0:
             z_max = self._along(self.b, b_max)
@@ -48,7 +50,9 @@ class ScaledStep:
         if b_max == 0.0:
             return 0.0
         unit = b / b_max
-        bb, bAb = self.system.surface.comm.sum(np.array([unit @ unit, unit @ self.system.apply(unit)]))
+        bb, bAb = self.system.surface.comm.sum(
+            np.array([unit @ unit, unit @ self.system.apply(unit)])
+        )
         return b_max * bb / bAb if bAb > 0.0 else 0.0
 
     def residual(self, y: Array) -> Array:
@@ -78,7 +82,9 @@ class ScaledStep:
         H is not positive definite. Collective."""
         dy, dF = y - self._zero[0], F - self._zero[1]
         comm = self.system.surface.comm
-        curvature, sizes = comm.sum(np.array([dy @ dF, np.abs(dy) @ (np.abs(F) + np.abs(self._zero[1]))]))
+        curvature, sizes = comm.sum(
+            np.array([dy @ dF, np.abs(dy) @ (np.abs(F) + np.abs(self._zero[1]))])
+        )
         return bool(curvature < -INDEFINITE * sizes)
 
     def active(self, y: Array, F: Array) -> Mask:
@@ -91,18 +97,32 @@ class ScaledStep:
         """Return the largest |F| off the active set and |gap| on it, as in the certificate; backward error of F."""
         system, i = self.system, self.system.bounded
         active = self.active(y, F)
-        gap = np.where(y[i] - self.lower[i] < F[i], y[i] - self.lower[i], self.upper[i] - y[i])[active]
+        gap = np.where(y[i] - self.lower[i] < F[i], y[i] - self.lower[i], self.upper[i] - y[i])[
+            active
+        ]
         force = F.copy()
         force[i[active]] = 0.0
-        force[system.feet] += force[system.rows :]  # the body feels what is left over on its springs
+        force[system.feet] += force[
+            system.rows :
+        ]  # the body feels what is left over on its springs
         Ax = F + self.b / self.r_ref
         Ax[system.feet] += F[system.rows :]
-        local = (max_abs(force), max_abs(gap), max_abs(y), max_abs(Ax[: system.rows]), float(np.isnan(F).any()))
+        local = (
+            max_abs(force),
+            max_abs(gap),
+            max_abs(y),
+            max_abs(Ax[: system.rows]),
+            float(np.isnan(F).any()),
+        )
         force_max, gap_max, y_max, Ax_max, broken = system.max(*local)
         if broken:
             return np.nan, np.nan, np.nan
         size = self._norm * y_max * self.x_ref / self.r_ref + self._b_max
-        return (fraction(force_max, max(self._b_max, Ax_max)), fraction(gap_max, y_max), fraction(force_max, size))
+        return (
+            fraction(force_max, max(self._b_max, Ax_max)),
+            fraction(gap_max, y_max),
+            fraction(force_max, size),
+        )
 
     def verdict(self, y: Array, F: Array) -> int:
         """Return SNES's reason: 0 to go on, 2 solved to round-off, 4 below the tolerance and no longer improving.

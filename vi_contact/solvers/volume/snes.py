@@ -35,8 +35,15 @@ class SnesDriver:
 
     reasons = PETSc.SNES.ConvergedReason
 
-    def __init__(self, scaled: ScaledStep, layers: OptionLayers, jacobian: "AssembledJacobian | FrictionJacobian", *,
-                 snes_type: str, check: Callable[[Any, OptionLayers], None]) -> None:
+    def __init__(
+        self,
+        scaled: ScaledStep,
+        layers: OptionLayers,
+        jacobian: "AssembledJacobian | FrictionJacobian",
+        *,
+        snes_type: str,
+        check: Callable[[Any, OptionLayers], None],
+    ) -> None:
         self._scaled, self._layers, self._jacobian = scaled, layers, jacobian
         self._y, self._F = jacobian.mat.createVecs()
         self._lower, self._upper = self._y.duplicate(), self._y.duplicate()
@@ -180,7 +187,9 @@ class ReducedNewton:
 
     def friction_driver(self, scaled: ScaledFrictionStep, layers: OptionLayers) -> SnesDriver:
         """Return the SNES object of a step with friction."""
-        return SnesDriver(scaled, layers, FrictionJacobian(scaled), snes_type="vinewtonrsls", check=check_friction)
+        return SnesDriver(
+            scaled, layers, FrictionJacobian(scaled), snes_type="vinewtonrsls", check=check_friction
+        )
 
 
 @dataclass(frozen=True)
@@ -198,4 +207,6 @@ class SemismoothNewton:
     def driver(self, scaled: ScaledStep, layers: OptionLayers) -> SnesDriver:
         """Return the SNES object."""
         jacobian = SemismoothJacobian(scaled.system)
-        return SnesDriver(scaled, layers, jacobian, snes_type="vinewtonssls", check=check_semismooth)
+        return SnesDriver(
+            scaled, layers, jacobian, snes_type="vinewtonssls", check=check_semismooth
+        )

@@ -19,7 +19,11 @@ def check_tao(tao: Any, layers: OptionLayers) -> None:
     """Refuse other types and preconditioners that give wrong answers, also when they come from options
     (docs/reference/petsc.md: many types ignore bounds, and bqpip reports garbage as converged)."""
     if tao.getType() != "tron":
-        refuse(f"TAO type {tao.getType()}", "other types ignore bounds, or stop short or wrong", "leave it out")
+        refuse(
+            f"TAO type {tao.getType()}",
+            "other types ignore bounds, or stop short or wrong",
+            "leave it out",
+        )
     pc = layers.chosen("pc_type")
     if pc in REDUCED_PC:
         refuse(f"pc_type {pc} with TAO tron", REDUCED_PC[pc], "use icc, bjacobi or hypre")
@@ -62,7 +66,9 @@ class TaoDriver:
             failed = reason == PETSc.TAO.Reason.DIVERGED_LS_FAILURE and not scaled.accepts(y, F)
             if not (failed and scaled.worst <= 0.9 * before):  # NaN ends it too
                 return y, F, reason, iterations
-            before = scaled.worst  # the values compared were round-off: measured from here they have all digits again
+            before = (
+                scaled.worst
+            )  # the values compared were round-off: measured from here they have all digits again
 
     def destroy(self) -> None:
         """Free the PETSc objects; collective."""

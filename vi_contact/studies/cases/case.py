@@ -1,11 +1,11 @@
 """Read and run case files: a contact problem and its run in TOML, table by table the calls of the Python interface.
 
-    [mesh]            fem.build_mesh, fem.read_mesh        [scheme] [solver] [[escalation]]
-    [material.NAME]   LinearElastic, Orthotropic           [[record]] [fields]
-    [system]          fem.assemble                         [run]      the other arguments of simulate
-    [[contact]]       fem.contact_surface, .contact_pair   [gravity]  with_weight, then static_equilibrium
-    [friction] [impact] [mass] [[excitation]]              [[check]]  formulas to compare with (engineering.checks)
-    [[stage]]  what replaces these tables in stages that follow one another"""
+[mesh]            fem.build_mesh, fem.read_mesh        [scheme] [solver] [[escalation]]
+[material.NAME]   LinearElastic, Orthotropic           [[record]] [fields]
+[system]          fem.assemble                         [run]      the other arguments of simulate
+[[contact]]       fem.contact_surface, .contact_pair   [gravity]  with_weight, then static_equilibrium
+[friction] [impact] [mass] [[excitation]]              [[check]]  formulas to compare with (engineering.checks)
+[[stage]]  what replaces these tables in stages that follow one another"""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -53,7 +53,9 @@ from .toml_file import read_toml, with_settings
 from .unread_choices import Part, findings, refuse_unread
 from .vocabulary import MeshFile, Parts, weight, words
 
-_TABLES: dict[str, Any] = {  # in the order in which they are read: type of what a table makes, or the one call it is
+_TABLES: dict[
+    str, Any
+] = {  # in the order in which they are read: type of what a table makes, or the one call it is
     "title": str,
     "mesh": MeshScript | MeshFile,
     "material": Mapping[str, LinearElastic | Orthotropic | Heterogeneous],
@@ -68,8 +70,10 @@ _TABLES: dict[str, Any] = {  # in the order in which they are read: type of what
     "scheme": Scheme,
     "solver": Solver,
     "escalation": Solver | Sequence[Solver],
-    "run": replace(callee(simulate, only=("dt", "t_end", "steps", "tolerance", "checkpoint_every", "out")),
-                   function=dict),
+    "run": replace(
+        callee(simulate, only=("dt", "t_end", "steps", "tolerance", "checkpoint_every", "out")),
+        function=dict,
+    ),
     "record": Recorder | Sequence[Recorder],
     "fields": FieldWriter,
     "check": Check | Sequence[Check],
@@ -112,11 +116,15 @@ class Case:
         for stage in self.stages[:-1]:
             stage.case.check()
         for table, node in self.nodes.items():
-            if table not in ("title", "mesh", "system", "contact", "gravity") and not needs_body(node):
+            if table not in ("title", "mesh", "system", "contact", "gravity") and not needs_body(
+                node
+            ):
                 self._made(table)
         if not needs_body(self.nodes["run"]):
             own = self._made("run")
-            steps = own.get("steps") if "steps" in own or "t_end" in own else 1  # else as long as the excitation
+            steps = (
+                own.get("steps") if "steps" in own or "t_end" in own else 1
+            )  # else as long as the excitation
             try:
                 step_plan(own["dt"], steps, own.get("t_end"))
             except InputError as error:
@@ -144,16 +152,28 @@ class Case:
         recorders = [Steps(), *((Energy(), Contact()) if own is None else own)]
         problem, _ = with_defaults(problem, self._made("scheme"))
         state = initial_state(problem)
-        return frozenset(name for one in recorders for name, value in one.start(problem, state).items()
-                         if np.ndim(value) == 0)
+        return frozenset(
+            name
+            for one in recorders
+            for name, value in one.start(problem, state).items()
+            if np.ndim(value) == 0
+        )
 
     def _recorders(self, parts: Parts) -> tuple[Recorder, ...] | None:
         """Return the recorders of [[record]]; None for those of ``simulate``."""
         return self._several("record", tags=parts.tags) if "record" in self.nodes else None
 
-    def run(self, comm: Any, *, out: str | Path | None = None, restart: bool | str | Path = False,
-            progress: bool = True, changed: bool = False, wall_time: str | None = None,
-            reached: Reached | None = None) -> Solution:
+    def run(
+        self,
+        comm: Any,
+        *,
+        out: str | Path | None = None,
+        restart: bool | str | Path = False,
+        progress: bool = True,
+        changed: bool = False,
+        wall_time: str | None = None,
+        reached: Reached | None = None,
+    ) -> Solution:
         """Compute the whole run; collective. ``out``: the run folder, by default the one of [run], if any.
 
         Without ``steps`` and ``t_end`` it lasts as long as the excitation. A problem with weight starts from its static
@@ -161,17 +181,31 @@ class Case:
         that are ``reached`` already. Raises as ``simulate``."""
         self.check()
         folder = self.out if out is None else Path(out)
-        if folder is not None:  # before any work; ``simulate`` looks once more, with the folder's lock
+        if (
+            folder is not None
+        ):  # before any work; ``simulate`` looks once more, with the folder's lock
             on_root(MpiComm(comm), partial(self._refuse_files_of_others, folder))
         if "strain_compatible" in self.nodes:
-            return iterate(self, comm, folder, restart=restart, progress=progress, wall_time=wall_time)
+            return iterate(
+                self, comm, folder, restart=restart, progress=progress, wall_time=wall_time
+            )
         if self.stages:
-            return run_stages(self, comm, folder, restart=restart, reached=reached, progress=progress,
-                              changed=changed, wall_time=wall_time)
+            return run_stages(
+                self,
+                comm,
+                folder,
+                restart=restart,
+                reached=reached,
+                progress=progress,
+                changed=changed,
+                wall_time=wall_time,
+            )
         parts = self.parts(comm)
         with self.call(parts, folder) as call:
             self.keep_model(comm, parts, folder)
-            return simulate(**call, restart=restart, progress=progress, changed=changed, wall_time=wall_time)
+            return simulate(
+                **call, restart=restart, progress=progress, changed=changed, wall_time=wall_time
+            )
 
     def _refuse_files_of_others(self, folder: Path) -> None:
         """InputError for what the run would replace in a folder, and which no run has made."""
@@ -186,12 +220,16 @@ class Case:
             write_model(parts.system.algebra.comm, describe(self, comm, parts, most=FEW), folder)
 
     @contextmanager
-    def call(self, parts: Parts, folder: Path | None, state: State | None = None) -> Iterator[dict[str, Any]]:
+    def call(
+        self, parts: Parts, folder: Path | None, state: State | None = None
+    ) -> Iterator[dict[str, Any]]:
         """Hold the run folder, with a copy of the case, and what the run gives to ``simulate``; collective.
 
         parts: as of ``parts``, of this case or of one with the same body; state: at rest, when it is known."""
         if "strain_compatible" in self.nodes:
-            raise InputError(f"{self.path}: [strain_compatible] is for single runs: leave it out of stages and studies")
+            raise InputError(
+                f"{self.path}: [strain_compatible] is for single runs: leave it out of stages and studies"
+            )
         problem = self._problem(parts)
         own = {name: value for name, value in self._timed(parts).items() if name != "out"}
         solver = self._made("solver")
@@ -205,9 +243,15 @@ class Case:
             if folder is not None:
                 keep_copy(self.path, self.settings, folder, ranks)
             yield own | {
-                "problem": problem, "scheme": self._made("scheme"), "solver": solver, "state": state, "out": folder,
-                "record": self._recorders(parts), "escalation": self._several("escalation"),
-                "fields": self._made("fields"), "cross_check": solver if isinstance(solver, CrossChecked) else None,
+                "problem": problem,
+                "scheme": self._made("scheme"),
+                "solver": solver,
+                "state": state,
+                "out": folder,
+                "record": self._recorders(parts),
+                "escalation": self._several("escalation"),
+                "fields": self._made("fields"),
+                "cross_check": solver if isinstance(solver, CrossChecked) else None,
             }
 
     def _made(self, table: str, **context: Any) -> Any:
@@ -222,16 +266,26 @@ class Case:
     def parts(self, comm: Any) -> Parts:
         """Return what the problem is made of; collective."""
         mesh, tags = self.meshed(comm)
-        early = "excitation" not in self.nodes or not needs_body(self.nodes["excitation"])  # else they need the system
+        early = "excitation" not in self.nodes or not needs_body(
+            self.nodes["excitation"]
+        )  # else they need the system
         shaking = {"excitations": self.excitations()} if early else {}
-        body = with_known_damping(self.nodes["system"]) if "strain_compatible" in self.nodes else self.nodes["system"]
+        body = (
+            with_known_damping(self.nodes["system"])
+            if "strain_compatible" in self.nodes
+            else self.nodes["system"]
+        )
         system = build(body, {"mesh": mesh, "tags": tags, **shaking})
-        system = self._made("gravity", system=system, tags=tags) if "gravity" in self.nodes else system
+        system = (
+            self._made("gravity", system=system, tags=tags) if "gravity" in self.nodes else system
+        )
         none = empty_surface(system.algebra.comm, system.space.dimension)
         surfaces = self._several("contact", system=system, tags=tags) or (none,)
         surface = joined_surfaces(*surfaces) if len(surfaces) > 1 else surfaces[0]
         calls = [one for one in nodes_in(self.nodes["system"]) if isinstance(one, Call)]
-        rising = any(one.callee.name == "upgoing" and "motion" not in one.arguments for one in calls)
+        rising = any(
+            one.callee.name == "upgoing" and "motion" not in one.arguments for one in calls
+        )
         return Parts(system, surface, tags, "gravity" in self.nodes, moved=rising)
 
     def meshed(self, comm: Any) -> tuple[Any, Tags]:
@@ -239,24 +293,39 @@ class Case:
         if self.ready is not None:
             return self.ready
         script = self._made("mesh")
-        mesh, tags = read_mesh(script.path, comm) if isinstance(script, MeshFile) else build_mesh(script, comm)
+        mesh, tags = (
+            read_mesh(script.path, comm)
+            if isinstance(script, MeshFile)
+            else build_mesh(script, comm)
+        )
         for case in [stage.case for stage in self.stages] or [self]:
-            for table, one in ((table, one) for table, node in case.nodes.items() for one in nodes_in(node)):
+            for table, one in (
+                (table, one) for table, node in case.nodes.items() for one in nodes_in(node)
+            ):
                 check_axes(one, mesh.geometry.dim, f"{self.path}: [{table}]")
                 if isinstance(one, Group):
                     one.build({"tags": tags})
         return mesh, tags
 
     def _problem(self, parts: Parts) -> ContactProblem:
-        return ContactProblem(parts.system, parts.surface, friction=self._made("friction") or Frictionless(),
-                              impact=self._made("impact"), mass=self._made("mass"),
-                              excitation=() if parts.moved else self.excitations(system=parts.system))
+        return ContactProblem(
+            parts.system,
+            parts.surface,
+            friction=self._made("friction") or Frictionless(),
+            impact=self._made("impact"),
+            mass=self._made("mass"),
+            excitation=() if parts.moved else self.excitations(system=parts.system),
+        )
 
     def _duration(self, parts: Parts) -> float:
         """Return the time until the last excitation ends [s]."""
-        longest = max((one.duration for one in self.excitations(system=parts.system)), default=math.inf)
+        longest = max(
+            (one.duration for one in self.excitations(system=parts.system)), default=math.inf
+        )
         if not math.isfinite(longest):
-            raise InputError(f"{self.path}: [run] has neither steps nor t_end, and the excitation has no end: give one")
+            raise InputError(
+                f"{self.path}: [run] has neither steps nor t_end, and the excitation has no end: give one"
+            )
         return longest
 
 
@@ -276,20 +345,30 @@ def read_case(path: str | Path, settings: Sequence[str] = (), *, allow: Sequence
     return case
 
 
-def _read(path: Path, tables: Mapping[str, Any], settings: Sequence[str], allow: Sequence[str]) -> Case:
+def _read(
+    path: Path, tables: Mapping[str, Any], settings: Sequence[str], allow: Sequence[str]
+) -> Case:
     """Return the case of tables that have their settings."""
     allowed = packages(allow)
     known = words(base_folder(path), allowed)
     check_format(path, tables)
     for name in tables:
         if name not in ("format", *_TABLES, "stage"):
-            raise InputError(f"{path}: the table [{name}] is unknown: {nearest(name, ('format', *_TABLES, 'stage'))}")
+            raise InputError(
+                f"{path}: the table [{name}] is unknown: {nearest(name, ('format', *_TABLES, 'stage'))}"
+            )
     if "mesh" not in tables:
         raise InputError(f"{path}: the table [mesh] is missing: give the mesh of the body")
     whole = Case(path, tables, tuple(settings), {}, allowed)
-    stages = tuple(replace(one, case=replace(whole, nodes=_nodes(one.tables, one.label, known)))
-                   for one in split(path, tables))
-    return replace(whole, nodes=stages[-1].case.nodes if stages else _nodes(tables, str(path), known), stages=stages)
+    stages = tuple(
+        replace(one, case=replace(whole, nodes=_nodes(one.tables, one.label, known)))
+        for one in split(path, tables)
+    )
+    return replace(
+        whole,
+        nodes=stages[-1].case.nodes if stages else _nodes(tables, str(path), known),
+        stages=stages,
+    )
 
 
 def _unread(case: Case) -> list[tuple[str, str]]:
@@ -301,7 +380,9 @@ def _unread(case: Case) -> list[tuple[str, str]]:
     return list(findings(case.path, case.tables, parts))
 
 
-def _unread_in(path: Path, tables: Mapping[str, Any], allow: Sequence[str]) -> list[tuple[str, str]]:
+def _unread_in(
+    path: Path, tables: Mapping[str, Any], allow: Sequence[str]
+) -> list[tuple[str, str]]:
     """Return the same of a file alone; none where it is no case without the settings that complete it."""
     try:
         return _unread(_read(path, tables, (), allow))
@@ -311,7 +392,9 @@ def _unread_in(path: Path, tables: Mapping[str, Any], allow: Sequence[str]) -> l
 
 def _nodes(tables: Mapping[str, Any], source: str, known: Words) -> dict[str, Node]:
     given = {"run": {}, "system": {}} | dict(tables)
-    return {name: _node(name, given, Spot(source, "", name), known) for name in _TABLES if name in given}
+    return {
+        name: _node(name, given, Spot(source, "", name), known) for name in _TABLES if name in given
+    }
 
 
 def _node(name: str, tables: Mapping[str, Any], spot: Spot, known: Words) -> Node:
@@ -319,15 +402,33 @@ def _node(name: str, tables: Mapping[str, Any], spot: Spot, known: Words) -> Nod
     if isinstance(asked, Callee):
         if not isinstance(value, dict):
             raise spot.wrong("is not a table: write its keys below it")
-        materials = list(tables.get("material", {})) if name == "system" and "material" not in value else []
-        if materials:  # those that [system] does not name: one for the whole body, or each for its cell group
-            value = {"material": materials[0] if len(materials) == 1 else [[one, one] for one in materials]} | value
+        materials = (
+            list(tables.get("material", {})) if name == "system" and "material" not in value else []
+        )
+        if (
+            materials
+        ):  # those that [system] does not name: one for the whole body, or each for its cell group
+            value = {
+                "material": materials[0]
+                if len(materials) == 1
+                else [[one, one] for one in materials]
+            } | value
         return arguments(value, asked, spot, known)
-    if name == "material" and isinstance(value, dict) and not all(isinstance(one, dict) for one in value.values()):
-        raise spot.inside("has the keys of one material and no name: write [material.NAME], with a name of your own")
+    if (
+        name == "material"
+        and isinstance(value, dict)
+        and not all(isinstance(one, dict) for one in value.values())
+    ):
+        raise spot.inside(
+            "has the keys of one material and no name: write [material.NAME], with a name of your own"
+        )
     node = read(value, asked, spot, known)
     if name == "contact":
-        given = (one.arguments for one in nodes_in(node) if isinstance(one, Call) and "name" in one.arguments)
+        given = (
+            one.arguments
+            for one in nodes_in(node)
+            if isinstance(one, Call) and "name" in one.arguments
+        )
         known.named[name] = {one["name"]: one.get("facets", one.get("facets1")) for one in given}
     if name == "material" and isinstance(node, dict):
         known.named[LinearElastic] = node  # before the system names them

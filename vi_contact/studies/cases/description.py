@@ -26,9 +26,13 @@ from .table_calls import Call, Group, build, nodes_in
 from .unread_choices import left_over
 from .vocabulary import Parts
 
-ELEMENTS = 8.0  # of first order in a wave length: Kuhlemeyer and Lysmer (1973); the cautious take 10
+ELEMENTS = (
+    8.0  # of first order in a wave length: Kuhlemeyer and Lysmer (1973); the cautious take 10
+)
 STEPS = 20.0  # in a period
-COARSER = 1.2  # edges of side 2 over those of side 1: more points than a softer side can follow (CHOSEN)
+COARSER = (
+    1.2  # edges of side 2 over those of side 1: more points than a softer side can follow (CHOSEN)
+)
 ENERGY = 0.95  # of a record, the integral of |A(f)|², below the frequency that is told
 ROUNDED = 1e-9  # of a time step
 FEW = 10_000  # unknowns: up to so many a run tells its periods, which take two seconds; more when it is checked
@@ -37,7 +41,9 @@ RATIO_DIGITS = 4  # of the damping ratio of a mode, which is found less sharply 
 WORDS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 
 
-def describe(case: Any, comm: Any, parts: Parts | None = None, *, most: int = 50_000) -> dict[str, Any]:
+def describe(
+    case: Any, comm: Any, parts: Parts | None = None, *, most: int = 50_000
+) -> dict[str, Any]:
     """Return what the model of a ``Case`` is, plain values in SI units; computes no step.
 
     Keys: title, dimension, unknowns, degree, mass; groups (name, kind); bodies (name, cells, mass, material);
@@ -58,31 +64,65 @@ def describe(case: Any, comm: Any, parts: Parts | None = None, *, most: int = 50
     bodies = [_body(space, tags, volumes, *one) for one in space.forms.materials]
     run = {"dt": plan.dt(0), "t_end": plan.length, "steps": plan.steps}
     model = {
-        "title": case.tables.get("title") or case.path.stem, "dimension": space.dimension, "unknowns": space.unknowns,
-        "degree": space.degree, "mass": sum(one["mass"] for one in bodies),
-        "groups": [{"name": name, "kind": type(one).__name__.lower()} for name, one in tags.items()],
-        "bodies": [{key: one[key] for key in ("name", "cells", "mass", "material")} for one in bodies],
-        "supports": list(_supports(space)), "contact": list(_contact(case, problem, tags)),
-        "waves": [{"body": one["name"], "c_s": one["c_s"], "h": one["h"], "f_max": one["c_s"] / (ELEMENTS * one["h"]),
-                   "dt_ratio": run["dt"] * one["c_s"] / one["h"]} for one in bodies],
+        "title": case.tables.get("title") or case.path.stem,
+        "dimension": space.dimension,
+        "unknowns": space.unknowns,
+        "degree": space.degree,
+        "mass": sum(one["mass"] for one in bodies),
+        "groups": [
+            {"name": name, "kind": type(one).__name__.lower()} for name, one in tags.items()
+        ],
+        "bodies": [
+            {key: one[key] for key in ("name", "cells", "mass", "material")} for one in bodies
+        ],
+        "supports": list(_supports(space)),
+        "contact": list(_contact(case, problem, tags)),
+        "waves": [
+            {
+                "body": one["name"],
+                "c_s": one["c_s"],
+                "h": one["h"],
+                "f_max": one["c_s"] / (ELEMENTS * one["h"]),
+                "dt_ratio": run["dt"] * one["c_s"] / one["h"],
+            }
+            for one in bodies
+        ],
         "records": _records(case, parts.system),
-        "run": run, "outline": outline(space, tags, [cells for cells, _ in space.forms.materials]),
+        "run": run,
+        "outline": outline(space, tags, [cells for cells, _ in space.forms.materials]),
     } | _modes(case, problem, most)
-    model |= {"defects": list(_defects(model)), "warnings": [*_warnings(model), *left_over(case.path, case.tables)]}
+    model |= {
+        "defects": list(_defects(model)),
+        "warnings": [*_warnings(model), *left_over(case.path, case.tables)],
+    }
     for sentence, refused in judge_loose_bodies(problem) if problem.system.floating else ():
         model["defects" if refused else "warnings"].append(sentence)
-    if not any(run["dt"] > one["dt"] * (1.0 + ROUNDED) for one in model["records"]):  # that is a defect
-        model["warnings"] += filter(None, [sampling_warning(problem, max(dt for dt, _ in plan.parts))])
-    return dict(json.loads(to_json(model), parse_float=lambda text: float(f"{float(text):.{DIGITS}g}")))
+    if not any(
+        run["dt"] > one["dt"] * (1.0 + ROUNDED) for one in model["records"]
+    ):  # that is a defect
+        model["warnings"] += filter(
+            None, [sampling_warning(problem, max(dt for dt, _ in plan.parts))]
+        )
+    return dict(
+        json.loads(to_json(model), parse_float=lambda text: float(f"{float(text):.{DIGITS}g}"))
+    )
 
 
 def in_words(model: Mapping[str, Any]) -> str:
     """Return what ``describe`` found, as lines of text."""
     lines = []
     for part in WORDS["part"]:
-        rows = model[part["key"]] if "key" in part else [model] if part.get("needs", "title") in model else []
+        rows = (
+            model[part["key"]]
+            if "key" in part
+            else [model]
+            if part.get("needs", "title") in model
+            else []
+        )
         lines += [part["heading"]] if rows and "heading" in part else []
-        lines += [part["text"].format(**{key: _word(one) for key, one in row.items()}) for row in rows]
+        lines += [
+            part["text"].format(**{key: _word(one) for key, one in row.items()}) for row in rows
+        ]
     return "\n".join([*lines, *(f"warning: {one}" for one in model["warnings"])])
 
 
@@ -90,14 +130,23 @@ def _word(value: Any) -> Any:
     """Lists and materials as texts, all else as it is."""
     if isinstance(value, Mapping) and "type" in value:
         value = [f"{key} {one:.4g}" for key, one in value.items() if key != "type"]
-    return ", ".join(f"{one:.4g}" if isinstance(one, float) else str(one) for one in value) if isinstance(
-        value, list) else value
+    return (
+        ", ".join(f"{one:.4g}" if isinstance(one, float) else str(one) for one in value)
+        if isinstance(value, list)
+        else value
+    )
 
 
-def _body(space: Any, tags: Mapping[str, Any], volumes: Array, cells: Any, material: Any) -> dict[str, Any]:
+def _body(
+    space: Any, tags: Mapping[str, Any], volumes: Array, cells: Any, material: Any
+) -> dict[str, Any]:
     """What is made of one material, by the name of its cell group, with its slowest waves and longest edge."""
-    names = [name for name, one in tags.items() if isinstance(one, Cells)
-             and not largest(space.comm, not np.array_equal(one.indices, cells))]
+    names = [
+        name
+        for name, one in tags.items()
+        if isinstance(one, Cells)
+        and not largest(space.comm, not np.array_equal(one.indices, cells))
+    ]
     own = cells[cells < len(volumes)]
     density, shear = (space.forms.cellwise(field)[own] for field in ("rho", "shear"))
     if hasattr(material, "G12"):
@@ -107,16 +156,26 @@ def _body(space: Any, tags: Mapping[str, Any], volumes: Array, cells: Any, mater
     numbers = {key: one for key, one in vars(material).items() if isinstance(one, int | float)}
     if not numbers.get("xi", 1.0):  # a material without damping has no ratio to tell
         numbers.pop("xi")
-    return {"name": (names or ["body"])[0], "cells": round(total(space.comm, len(own))),
-            "mass": total(space.comm, volumes[own] @ density), "material": {"type": type(material).__name__} | numbers,
-            "c_s": -largest(space.comm, np.max(-np.sqrt(shear / density), initial=-np.inf)),
-            "h": largest(space.comm, longest_edge(space.mesh, own)) / space.degree}
+    return {
+        "name": (names or ["body"])[0],
+        "cells": round(total(space.comm, len(own))),
+        "mass": total(space.comm, volumes[own] @ density),
+        "material": {"type": type(material).__name__} | numbers,
+        "c_s": -largest(space.comm, np.max(-np.sqrt(shear / density), initial=-np.inf)),
+        "h": largest(space.comm, longest_edge(space.mesh, own)) / space.degree,
+    }
 
 
 def _supports(space: Any) -> Iterator[dict[str, Any]]:
     """Yield what holds the bodies, moves them, absorbs or lets in waves, or ties sides to each other."""
-    held = [("moved" if one.moves else "clamped" if one.components is None else "held", [one.name], one.components)
-            for one in space.prescribed]
+    held = [
+        (
+            "moved" if one.moves else "clamped" if one.components is None else "held",
+            [one.name],
+            one.components,
+        )
+        for one in space.prescribed
+    ]
     absorbing = [(type(one).__name__, [one.facets.name], None) for one in space.forms.boundaries]
     tied = [("tied", [one.first.name, one.second.name], one.components) for one in space.ties]
     for kind, groups, components in (*held, *absorbing, *tied):
@@ -124,16 +183,22 @@ def _supports(space: Any) -> Iterator[dict[str, Any]]:
         yield {"kind": kind, "groups": groups, "components": [AXES[one] for one in chosen]}
 
 
-def _contact(case: Any, problem: ContactProblem, tags: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+def _contact(
+    case: Any, problem: ContactProblem, tags: Mapping[str, Any]
+) -> Iterator[dict[str, Any]]:
     """Yield the parts of the contact, one for each table: by its name, or by those of its groups."""
     surface, tables = problem.surface, case.nodes.get("contact", ())
     nodes = tables if isinstance(tables, tuple) else (tables,)
     grouped = [[one for one in nodes_in(node) if isinstance(one, Group)] for node in nodes]
-    names = [node.arguments.get("name") or " on ".join(one.name for one in groups)
-             for node, groups in zip(nodes, grouped, strict=True)]
+    names = [
+        node.arguments.get("name") or " on ".join(one.name for one in groups)
+        for node, groups in zip(nodes, grouped, strict=True)
+    ]
     whole, parts = surface.whole(), getattr(surface, "parts", ())
     ends = np.cumsum([0, *(round(total(surface.comm, len(part.slots))) for part in parts)])
-    for number, (name, groups, (a, b)) in enumerate(zip(names, grouped, pairwise(ends), strict=True)):
+    for number, (name, groups, (a, b)) in enumerate(
+        zip(names, grouped, pairwise(ends), strict=True)
+    ):
         census = surface.censuses[number] if len(surface.censuses) == len(parts) else None
         yield {
             "name": name,
@@ -143,11 +208,15 @@ def _contact(case: Any, problem: ContactProblem, tags: Mapping[str, Any]) -> Ite
             "nodes": "" if census is None else census.in_words(),
             "places": whole.points[a:b],
             "others": {} if census is None else census.places,
-            "sides": _sides(problem.system.space, tags, [one.name for one in groups], whole.points[a:b]),
+            "sides": _sides(
+                problem.system.space, tags, [one.name for one in groups], whole.points[a:b]
+            ),
         }
 
 
-def _sides(space: Any, tags: Mapping[str, Any], names: Sequence[str], points: Array) -> list[dict[str, Any]]:
+def _sides(
+    space: Any, tags: Mapping[str, Any], names: Sequence[str], points: Array
+) -> list[dict[str, Any]]:
     """Return (name, mean edge h [m], shear modulus G [Pa]) of both sides of a pair, of their facets that are no further
     from the box of the contact points than an edge; none where a table has no two groups of facets."""
     sides = [tags[name] for name in names if isinstance(tags.get(name), Facets)]
@@ -157,7 +226,10 @@ def _sides(space: Any, tags: Mapping[str, Any], names: Sequence[str], points: Ar
     for side in sides:
         middles, edges, cells = facets_with_cells(space.mesh, side.indices)
         slack = largest(space.comm, edges.max(initial=0.0))
-        near = np.all((middles >= points.min(axis=0) - slack) & (middles <= points.max(axis=0) + slack), axis=1)
+        near = np.all(
+            (middles >= points.min(axis=0) - slack) & (middles <= points.max(axis=0) + slack),
+            axis=1,
+        )
         shear = space.forms.cellwise("shear")[cells[near]]
         count, h, G = space.comm.sum(np.array([near.sum(), edges[near].sum(), shear.sum()]))
         found.append({"name": side.name, "h": h / max(count, 1.0), "G": G / max(count, 1.0)})
@@ -166,9 +238,16 @@ def _sides(space: Any, tags: Mapping[str, Any], names: Sequence[str], points: Ar
 
 def _records(case: Any, system: Any) -> list[dict[str, Any]]:
     """Return the records of the excitations, and of motions that come up through the base alone, each once."""
-    calls = (one for one in nodes_in(case.nodes["system"]) if isinstance(one, Call) and one.callee.name == "upgoing")
+    calls = (
+        one
+        for one in nodes_in(case.nodes["system"])
+        if isinstance(one, Call) and one.callee.name == "upgoing"
+    )
     rising = (build(one.arguments.get("motion", ()), {"system": system}) for one in calls)
-    motions = chain(case.excitations(system=system), *(one if isinstance(one, tuple) else (one,) for one in rising))
+    motions = chain(
+        case.excitations(system=system),
+        *(one if isinstance(one, tuple) else (one,) for one in rising),
+    )
     shaking = (GroundMotion(one) if isinstance(one, Record) else one for one in motions)
     told = [_record(one) for one in shaking if isinstance(one, GroundMotion)]
     return [one for number, one in enumerate(told) if one not in told[:number]]
@@ -178,10 +257,17 @@ def _record(motion: GroundMotion) -> dict[str, Any]:
     """A record and the frequency [Hz] below which ENERGY of its energy is; a synthetic one is named by its seed."""
     record = motion.record
     power = np.cumsum(np.abs(np.fft.rfft(record.acceleration)) ** 2)
-    highest = np.fft.rfftfreq(record.acceleration.size, record.dt)[np.searchsorted(power, ENERGY * power[-1])]
-    return {"file": Path(record.source).name or f"synthetic, {record.title.rpartition(', ')[2]}", "scale": motion.scale,
-            "dt": record.dt, "duration": record.duration, "f_95": float(highest),
-            "pga": float(np.abs(motion.scale * record.acceleration).max())}
+    highest = np.fft.rfftfreq(record.acceleration.size, record.dt)[
+        np.searchsorted(power, ENERGY * power[-1])
+    ]
+    return {
+        "file": Path(record.source).name or f"synthetic, {record.title.rpartition(', ')[2]}",
+        "scale": motion.scale,
+        "dt": record.dt,
+        "duration": record.duration,
+        "f_95": float(highest),
+        "pga": float(np.abs(motion.scale * record.acceleration).max()),
+    }
 
 
 def _modes(case: Any, problem: ContactProblem, most: int) -> dict[str, Any]:

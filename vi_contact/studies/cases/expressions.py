@@ -19,9 +19,23 @@ from ...core.errors import InputError
 LENGTH, DEPTH, POWER = 500, 20, 100
 _WORD = re.compile(r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?|[A-Za-z]\w*|[-+*/^(),]", re.ASCII)
 _Functions = Mapping[str, Callable[..., Any]]
-_OF_ONE: _Functions = {"sqrt": np.sqrt, "sin": np.sin, "cos": np.cos, "tan": np.tan, "exp": np.exp, "log": np.log,
-                       "abs": np.abs, "step": lambda a: np.heaviside(a, 1.0)}
-_OF_TWO: _Functions = {"Add": np.add, "Sub": np.subtract, "Mult": np.multiply, "Div": np.divide, "Pow": np.power}
+_OF_ONE: _Functions = {
+    "sqrt": np.sqrt,
+    "sin": np.sin,
+    "cos": np.cos,
+    "tan": np.tan,
+    "exp": np.exp,
+    "log": np.log,
+    "abs": np.abs,
+    "step": lambda a: np.heaviside(a, 1.0),
+}
+_OF_TWO: _Functions = {
+    "Add": np.add,
+    "Sub": np.subtract,
+    "Mult": np.multiply,
+    "Div": np.divide,
+    "Pow": np.power,
+}
 _OF_MORE: _Functions = {"min": np.minimum, "max": np.maximum}
 
 
@@ -34,7 +48,9 @@ class Expression:
 
     text: str
     variables: str = ""
-    program: tuple[Any, ...] = field(init=False, repr=False, compare=False)  # numbers, variables, (function, count)
+    program: tuple[Any, ...] = field(
+        init=False, repr=False, compare=False
+    )  # numbers, variables, (function, count)
 
     def __post_init__(self) -> None:
         if len(self.text) > LENGTH:
@@ -44,7 +60,11 @@ class Expression:
         words = " ".join(word[0] for word in _WORD.finditer(self.text))
         try:
             tree = ast.parse(words.replace("^", "**").strip(), mode="eval").body
-        except (SyntaxError, RecursionError, MemoryError):  # MemoryError: the parser's stack is full
+        except (
+            SyntaxError,
+            RecursionError,
+            MemoryError,
+        ):  # MemoryError: the parser's stack is full
             raise InputError("its brackets, signs or commas are not arithmetic") from None
         object.__setattr__(self, "program", tuple(self._program(tree, 0)))
 
@@ -60,7 +80,11 @@ class Expression:
         if depth > DEPTH:
             raise InputError(f"brackets, signs or powers in it are nested more than {DEPTH} deep")
         name = getattr(getattr(node, "func", node), "id", "")
-        if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool):
+        if (
+            isinstance(node, ast.Constant)
+            and isinstance(node.value, int | float)
+            and not isinstance(node.value, bool)
+        ):
             yield float(str(node.value))  # of a whole number with too many digits: infinite
         elif isinstance(node, ast.Name) and name == "pi":
             yield np.pi
@@ -79,7 +103,9 @@ class Expression:
                 if not abs(_run(right, {})) <= POWER:
                     raise InputError(f"an exponent is larger than {POWER}")
             yield from (*right, (_OF_TWO[type(node.op).__name__], 2))
-        elif isinstance(node, ast.Call) and (name in _OF_MORE if len(node.args) > 1 else node.args and name in _OF_ONE):
+        elif isinstance(node, ast.Call) and (
+            name in _OF_MORE if len(node.args) > 1 else node.args and name in _OF_ONE
+        ):
             yield from self._program(node.args[0], depth + 1)
             for one in node.args[1:]:
                 yield from self._program(one, depth + 1)
@@ -87,8 +113,10 @@ class Expression:
             yield from [(_OF_ONE[name], 1)] if name in _OF_ONE else []
         else:
             there = "".join(f", {one}" for one in self.variables)
-            raise InputError(f"'{name or ast.unparse(node)[:20]}' in it is not a number{there}, pi or one of "
-                             f"{', '.join((*_OF_ONE, *_OF_MORE))} with its values in brackets")
+            raise InputError(
+                f"'{name or ast.unparse(node)[:20]}' in it is not a number{there}, pi or one of "
+                f"{', '.join((*_OF_ONE, *_OF_MORE))} with its values in brackets"
+            )
 
 
 @dataclass(frozen=True)
@@ -104,7 +132,9 @@ class Places:
         check_axes(self, points.shape[1], "the expression")
         places = dict(zip("xyz", points.T, strict=False))
         if isinstance(self.of, tuple):
-            return np.column_stack([np.broadcast_to(one(t, **places), len(points)) for one in self.of])
+            return np.column_stack(
+                [np.broadcast_to(one(t, **places), len(points)) for one in self.of]
+            )
         return np.array(np.broadcast_to(self.of(t, **places), len(points)))
 
 
@@ -113,8 +143,10 @@ def check_axes(node: Any, d: int, source: str) -> None:
     of = node.of if isinstance(node, Places) else node
     for one in of if isinstance(of, tuple) else (of,):
         if isinstance(one, Expression) and (beyond := one.used & {*"xyz"[d:]}):
-            raise InputError(f"{source} {shown(one.text)} has {min(beyond)}, and a model of dimension {d} has only "
-                             f"{', '.join('xyz'[:d])}: use these only")
+            raise InputError(
+                f"{source} {shown(one.text)} has {min(beyond)}, and a model of dimension {d} has only "
+                f"{', '.join('xyz'[:d])}: use these only"
+            )
 
 
 def _run(program: Any, values: Mapping[str, Any]) -> Any:

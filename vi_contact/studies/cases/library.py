@@ -36,7 +36,10 @@ def copy_starter(name: str, folder: Path) -> list[Path]:
     that nobody knows, and for files that are there: they may have been changed."""
     if name not in starters():
         raise InputError(f"there is no starter case {shown(name)}: {nearest(name, starters())}")
-    copies = {folder / one.name: one.read_bytes() for one in sorted(STARTERS.glob(f"{name}.*"), reverse=True)}
+    copies = {
+        folder / one.name: one.read_bytes()
+        for one in sorted(STARTERS.glob(f"{name}.*"), reverse=True)
+    }
     for path in (path for path in copies if path.exists()):
         raise InputError(f"'{path}' exists already: give another folder, or move the file")
 
@@ -54,8 +57,10 @@ def located(case: str) -> Path:
     if case.endswith(".toml"):
         return Path(case)
     if case not in builtin_cases():
-        raise InputError(f"there is no built-in case {shown(case)}: {nearest(case, builtin_cases())}; a file ends in "
-                         ".toml")
+        raise InputError(
+            f"there is no built-in case {shown(case)}: {nearest(case, builtin_cases())}; a file ends in "
+            ".toml"
+        )
     return FOLDER / f"{case}.toml"
 
 
@@ -63,8 +68,10 @@ def check_format(path: Path, tables: Mapping[str, Any]) -> None:
     """Raise InputError for the format of another version."""
     found = tables.get("format", FORMAT)
     if found != FORMAT or isinstance(found, bool):
-        raise InputError(f"{path}: format is {shown(found)}, and this version of vi_contact reads format {FORMAT}: "
-                         "use the version that it was written for, or correct the number")
+        raise InputError(
+            f"{path}: format is {shown(found)}, and this version of vi_contact reads format {FORMAT}: "
+            "use the version that it was written for, or correct the number"
+        )
 
 
 def base_folder(path: Path) -> Path:
@@ -87,7 +94,9 @@ def keep_copy(path: Path, settings: Sequence[str], folder: Path, comm: Comm) -> 
     made += f"{_FROM}{base_folder(path).resolve()}\n"
 
     def copy() -> None:
-        text = re.sub(rb"(?m)^# (set|its paths) ", rb"# once \1 ", path.read_bytes())  # of the run this is a copy of
+        text = re.sub(
+            rb"(?m)^# (set|its paths) ", rb"# once \1 ", path.read_bytes()
+        )  # of the run this is a copy of
         if not _is_the_copy(path, folder):
             write_atomically(folder / COPY, made.encode() + text)
 
@@ -96,9 +105,15 @@ def keep_copy(path: Path, settings: Sequence[str], folder: Path, comm: Comm) -> 
 
 def refuse_case_of_others(path: Path, folder: Path) -> None:
     """Raise InputError for a case file in a run folder that no run has written, and that this run would replace."""
-    if is_own(folder / COPY) and not _is_the_copy(path, folder) and not _marked(read_bytes(folder / COPY), _FROM):
-        raise InputError(f"'{folder / COPY}' is not the copy of a case that a run has made, and this run would replace "
-                         "it: choose another output folder, or move the file")
+    if (
+        is_own(folder / COPY)
+        and not _is_the_copy(path, folder)
+        and not _marked(read_bytes(folder / COPY), _FROM)
+    ):
+        raise InputError(
+            f"'{folder / COPY}' is not the copy of a case that a run has made, and this run would replace "
+            "it: choose another output folder, or move the file"
+        )
 
 
 def _is_the_copy(path: Path, folder: Path) -> bool:

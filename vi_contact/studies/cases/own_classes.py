@@ -29,7 +29,9 @@ def packages(names: Iterable[str]) -> tuple[str, ...]:
     found = (names,) if isinstance(names, str) else tuple(names)
     for name in found:
         if not isinstance(name, str) or not _PACKAGE.fullmatch(name):
-            raise InputError(f"--allow {shown(name)}: give the name of a Python package, such as mypackage")
+            raise InputError(
+                f"--allow {shown(name)}: give the name of a Python package, such as mypackage"
+            )
     return found
 
 
@@ -37,29 +39,42 @@ def own_class(text: str, kinds: Sequence[Any], allowed: Sequence[str], spot: Spo
     """Return how to call the class "package.module:Name"; InputError unless it is allowed and of one of the kinds."""
     found = _CLASS.fullmatch(text)
     if found is None:
-        raise spot.inside(f"has the type {shown(text)}: give package.module:Name, in plain letters, digits and "
-                          "underscores")
+        raise spot.inside(
+            f"has the type {shown(text)}: give package.module:Name, in plain letters, digits and "
+            "underscores"
+        )
     asked = [kind for kind in kinds if is_protocol(kind)]
     if not asked:
-        raise spot.inside(f"has the type '{text}', but accepts built-in classes only: leave it out to see them")
+        raise spot.inside(
+            f"has the type '{text}', but accepts built-in classes only: leave it out to see them"
+        )
     from importlib.metadata import entry_points  # late: it takes a while
 
     module, name = found.groups()
-    allowed = (*allowed, *(one.value.partition(":")[0].strip() for one in entry_points(group=GROUP)))
+    allowed = (
+        *allowed,
+        *(one.value.partition(":")[0].strip() for one in entry_points(group=GROUP)),
+    )
     if not _within(module, allowed):
         package = module.partition(".")[0]
-        raise spot.inside(f"has the type '{text}' of the package '{package}', and a case file imports nothing by "
-                          f"itself: give --allow {package} if you trust it")
+        raise spot.inside(
+            f"has the type '{text}' of the package '{package}', and a case file imports nothing by "
+            f"itself: give --allow {package} if you trust it"
+        )
     cls = _imported(module, name, spot)
     if not isinstance(cls, type):
         raise spot.inside(f"has the type '{text}', which is not a class: give one")
     if not _within(cls.__module__, allowed):
-        raise spot.inside(f"has the type '{text}', which {cls.__module__} defines: name it there, and allow that "
-                          "package if you trust it")
+        raise spot.inside(
+            f"has the type '{text}', which {cls.__module__} defines: name it there, and allow that "
+            "package if you trust it"
+        )
     defects = [defect(cls, kind) for kind in asked]
     if all(defects):
-        raise spot.inside(f"has the type '{text}', which {defects[0]}, as {asked[0].__name__} must: see "
-                          "docs/reference/api.md")
+        raise spot.inside(
+            f"has the type '{text}', which {defects[0]}, as {asked[0].__name__} must: see "
+            "docs/reference/api.md"
+        )
     return _callee(cls, text, asked, spot)
 
 
@@ -76,7 +91,9 @@ def _imported(module: str, name: str, spot: Spot) -> Any:
         if isinstance(error, ModuleNotFoundError):
             missing = (error.name or package).partition(".")[0]
             remedy = f"correct the name, install {missing}, or set PYTHONPATH to its folder"
-        raise spot.inside(f"has the type '{module}:{name}', which Python cannot import ({why}): {remedy}") from error
+        raise spot.inside(
+            f"has the type '{module}:{name}', which Python cannot import ({why}): {remedy}"
+        ) from error
 
 
 def _line(error: BaseException) -> str:
@@ -96,14 +113,18 @@ def _callee(cls: type, text: str, asked: Sequence[Any], spot: Spot) -> Callee:
             raise InputError(f"{text}: {_line(error)}") from error
         defects = [lacks(one, kind) for kind in asked if not defect(cls, kind)]
         if all(defects):
-            raise InputError(f"{text} {defects[0]}, as {asked[0].__name__} must: see docs/reference/api.md")
+            raise InputError(
+                f"{text} {defects[0]}, as {asked[0].__name__} must: see docs/reference/api.md"
+            )
         return one
 
     try:
         return replace(callee(cls, name=text, given=()), function=made)
     except Exception as error:  # type hints are evaluated
-        raise spot.inside(f"has the type '{text}', whose arguments cannot be read ({_line(error)}): correct the type "
-                          "hints of its constructor") from error
+        raise spot.inside(
+            f"has the type '{text}', whose arguments cannot be read ({_line(error)}): correct the type "
+            "hints of its constructor"
+        ) from error
 
 
 def is_protocol(kind: Any) -> bool:
@@ -119,13 +140,19 @@ def defect(cls: type, kind: Any) -> str:
     missing = [name for name in methods if not callable(_plain(cls, name))]
     if missing:
         return f"has no method {', '.join(missing)}"
-    wrong = [f"{name}{_shown(asked)}" for name, asked in methods.items() if not _takes(cls, name, asked)]
+    wrong = [
+        f"{name}{_shown(asked)}" for name, asked in methods.items() if not _takes(cls, name, asked)
+    ]
     return f"cannot be called as {', '.join(wrong)}" if wrong else ""
 
 
 def lacks(value: object, kind: Any) -> str:
     """Return the attributes of a protocol that an object of a fitting class lacks, "has no …"; empty when none."""
-    missing = [name for name, _ in _asked(kind, lambda one: isinstance(one, property)) if not hasattr(value, name)]
+    missing = [
+        name
+        for name, _ in _asked(kind, lambda one: isinstance(one, property))
+        if not hasattr(value, name)
+    ]
     return f"has no {', '.join(missing)}" if missing else ""
 
 
@@ -150,10 +177,15 @@ def _takes(cls: type, name: str, asked: Callable[..., Any]) -> bool:
         parameters = parameters[1:]
     named = {one.name: one for one in parameters if one.kind is Parameter.KEYWORD_ONLY}
     try:
-        signature(_plain(cls, name)).bind(*(one for one in parameters if one.name not in named), **named)
+        signature(_plain(cls, name)).bind(
+            *(one for one in parameters if one.name not in named), **named
+        )
     except TypeError:
         return False
-    except (ValueError, NameError):  # compiled, and without a signature; type hints that Python 3.14 cannot resolve
+    except (
+        ValueError,
+        NameError,
+    ):  # compiled, and without a signature; type hints that Python 3.14 cannot resolve
         pass
     return True
 

@@ -37,14 +37,18 @@ class Words:
 def read(value: Any, hint: Any, spot: Spot, words: Words) -> Node:
     """Return the node of a value for a parameter with this hint. InputError when it does not fit."""
     members = members_of(hint)
-    if any(is_path(member) for member in members):  # a text is the path then, and belongs to the case file's folder
+    if any(
+        is_path(member) for member in members
+    ):  # a text is the path then, and belongs to the case file's folder
         members = [member for member in members if member is not str]
     if isinstance(value, dict):
         return _table(value, members, spot, words)
     if isinstance(value, list):
         field = list_node(value, members, spot)
         return _list(value, members, spot, words) if field is None else field
-    if {str, *words.groups} & {*members} > {str} and value in words.named.get("contact", ()):  # a group, or such a name
+    if {str, *words.groups} & {*members} > {str} and value in words.named.get(
+        "contact", ()
+    ):  # a group, or such a name
         return replace(words.named["contact"][value], alias=value, spot=spot)
     for member in members:
         node = _scalar(value, member, spot, words)
@@ -61,12 +65,16 @@ def arguments(table: Mapping[str, Any], target: Callee, spot: Spot, words: Words
     given = {key: value for key, value in table.items() if key != "type"}
     for key in given:
         if key not in target.hints:
-            raise spot.inside(f"has the unknown key '{key}' for {target.name}: {nearest(key, target.hints)}")
+            raise spot.inside(
+                f"has the unknown key '{key}' for {target.name}: {nearest(key, target.hints)}"
+            )
     missing = sorted(target.required - set(given))
     if missing:
         raise spot.inside(f"lacks the key '{missing[0]}', which {target.name} needs: give it")
-    nodes = {key: read(value, target.hints[key], spot.at(key, unit_of(target.name, key)), words)
-             for key, value in given.items()}
+    nodes = {
+        key: read(value, target.hints[key], spot.at(key, unit_of(target.name, key)), words)
+        for key, value in given.items()
+    }
     return Call(target, nodes, spot)
 
 
@@ -104,7 +112,9 @@ def _scalar(value: Any, member: Any, spot: Spot, words: Words) -> Node | None:
         return Group(value, member, spot)
     if member in words.named:
         if value not in words.named[member]:
-            raise spot.wrong(f"names '{value}', which does not exist: {nearest(value, words.named[member])}")
+            raise spot.wrong(
+                f"names '{value}', which does not exist: {nearest(value, words.named[member])}"
+            )
         return words.named[member][value]
     if member in words.short:
         return _table({words.short[member]: value}, [member], spot, words)
@@ -141,7 +151,9 @@ def is_list(member: Any) -> bool:
     return get_origin(member) in (tuple, list, Sequence)
 
 
-def _items(value: list[Any], kinds: tuple[Any, ...], fixed: bool, spot: Spot, words: Words) -> tuple[Node, ...]:
+def _items(
+    value: list[Any], kinds: tuple[Any, ...], fixed: bool, spot: Spot, words: Words
+) -> tuple[Node, ...]:
     if not fixed or kinds[-1] is Ellipsis:
         kinds = (kinds[0],) * len(value)
     elif len(kinds) != len(value):
@@ -153,19 +165,28 @@ def _items(value: list[Any], kinds: tuple[Any, ...], fixed: bool, spot: Spot, wo
 def _table(value: dict[str, Any], members: list[Any], spot: Spot, words: Words) -> Node:
     found: list[Any] = [one for one in (choices_of(member, words) for member in members) if one]
     if found:
-        choices = ChainMap(*found[::-1])  # in which words come in the order of ``found``, and are looked up one by one
-        word = value.get("type", next((words.default[member] for member in members if member in words.default), None))
+        choices = ChainMap(
+            *found[::-1]
+        )  # in which words come in the order of ``found``, and are looked up one by one
+        word = value.get(
+            "type",
+            next((words.default[member] for member in members if member in words.default), None),
+        )
         if word is None and len(choices) == 1:
             word = next(iter(choices))
         return arguments(value, _chosen(word, choices, members, spot, words), spot, words)
     for member in members:
         if get_origin(member) in (Mapping, dict):
             kind = get_args(member)[1]
-            return {key: read(one, kind, spot.at(key, spot.unit), words) for key, one in value.items()}
+            return {
+                key: read(one, kind, spot.at(key, spot.unit), words) for key, one in value.items()
+            }
     raise spot.wrong(f"is a table: give {_expected(members, words)}")
 
 
-def _chosen(word: Any, choices: Mapping[str, Callee], kinds: Sequence[Any], spot: Spot, words: Words) -> Callee:
+def _chosen(
+    word: Any, choices: Mapping[str, Callee], kinds: Sequence[Any], spot: Spot, words: Words
+) -> Callee:
     """Return what the ``type`` of a table calls: one of the choices, or a class of others of these kinds."""
     if isinstance(word, str) and ":" in word:
         return own_class(word, kinds, words.allowed, spot)
@@ -211,13 +232,22 @@ def _expected(members: Sequence[Any], words: Words) -> str:
                 found.append(f"one of the names {', '.join(words.named[member])}")
         elif is_list(member):
             inner = [one for one in get_args(member) if one is not Ellipsis]
-            found.append(f"a list of {_expected(inner[:1], words).removeprefix('a ')}s" if _EXPECTED.get(inner[0])
-                         else "a list")
+            found.append(
+                f"a list of {_expected(inner[:1], words).removeprefix('a ')}s"
+                if _EXPECTED.get(inner[0])
+                else "a list"
+            )
         elif get_origin(member) in (Mapping, dict):
             found.append("a table of names")
         elif member in (FIELD, HISTORY, Expression):
             vector = "expressions of x, y, z, t, one per dimension"
-            found.append("an expression of t" if member == HISTORY else "an expression" if float in members else vector)
+            found.append(
+                "an expression of t"
+                if member == HISTORY
+                else "an expression"
+                if float in members
+                else vector
+            )
     if not found or any(get_origin(member) is Callable or member is Callable for member in members):
         found.append("a function, which only the Python interface takes")
     return " or ".join(dict.fromkeys(found))

@@ -16,16 +16,22 @@ from ...core.errors import InputError
 from .expressions import LENGTH, Expression, Places
 from .table_calls import Spot
 
-FIELD, AT_START, HISTORY = Callable[[Array, float], Array], Callable[[Array], Array], Callable[[float], float]
+FIELD, AT_START, HISTORY = (
+    Callable[[Array, float], Array],
+    Callable[[Array], Array],
+    Callable[[float], float],
+)
 """Functions of points and time, of points, of the time, for which expressions may stand."""
 Dimension = tuple[int, ...]  # exponents of metre, kilogram, second, radian
 _NUMBER, _NAME = r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?", "[A-Za-zµμ°%]+"
 _VALUE = re.compile(rf"(?<![\w.\s])\s*((?>{_NUMBER}))\s*((?:1\s*/\s*)?{_NAME}[^()+]*)")
 _FACTOR = re.compile(rf"([*·/]?)(?:(?<!\s)\s+)?(1(?=\s*/|$)|{_NAME})(?:\^?(-?[0-9])|([²³]))?\s*")
 _TABLES = tomllib.loads(files(__package__).joinpath("units.toml").read_text(encoding="utf-8"))
-_UNITS = _TABLES["alone"] | {start + name: [factor * unit[0], *unit[1:]]
-                             for start, factor in _TABLES["prefixes"].items()
-                             for name, unit in _TABLES["with_prefix"].items()}
+_UNITS = _TABLES["alone"] | {
+    start + name: [factor * unit[0], *unit[1:]]
+    for start, factor in _TABLES["prefixes"].items()
+    for name, unit in _TABLES["with_prefix"].items()
+}
 KEYS = {unit: keys.split() for unit, keys in _TABLES["keys"].items()}
 _UNIT_OF = {key: unit for unit, keys in KEYS.items() for key in keys}
 
@@ -39,7 +45,9 @@ def text_node(text: str, members: Sequence[Any], spot: Spot) -> Any:
     """Return the number or function that a text stands for; None where a key of these types takes neither.
 
     InputError: no arithmetic, a unit of another dimension than that of the key, a value that is not finite or whole."""
-    one_value = float in members or not any(get_origin(member) in (tuple, list, Sequence) for member in members)
+    one_value = float in members or not any(
+        get_origin(member) in (tuple, list, Sequence) for member in members
+    )
     kinds = ((FIELD, "xyzt"), (Expression, "xyz"), (HISTORY, "t"))
     kind, letters = next((one for one in kinds if one[0] in members and one_value), (None, ""))
     if kind is None and float not in members and int not in members:
@@ -48,18 +56,32 @@ def text_node(text: str, members: Sequence[Any], spot: Spot) -> Any:
     if kind is None or (float in members and not expression.used):
         value = float(expression())
         if not math.isfinite(value) or (float not in members and value != int(value)):
-            raise spot.wrong(f"is {shown(text)}, which is {value:g}: give a finite number, a whole one of things")
+            raise spot.wrong(
+                f"is {shown(text)}, which is {value:g}: give a finite number, a whole one of things"
+            )
         return value if float in members else int(value)
     return Places(expression) if kind == FIELD else expression
 
 
 def list_node(values: list[Any], members: Sequence[Any], spot: Spot) -> Places | None:
     """Return the vector field that a list stands for; None where none is asked for or nothing in it has variables."""
-    letters = "xyzt" if FIELD in members else "xyz" if AT_START in members and spot.unit in ("m", "m/s") else ""
+    letters = (
+        "xyzt"
+        if FIELD in members
+        else "xyz"
+        if AT_START in members and spot.unit in ("m", "m/s")
+        else ""
+    )
     if not letters or float in members or not any(isinstance(one, str) for one in values):
         return None
-    texts = [one if isinstance(one, str) else repr(one) for one in values if isinstance(one, str | int | float)]
-    found = tuple(_expression(one, letters, spot.entry(number)) for number, one in enumerate(texts, start=1))
+    texts = [
+        one if isinstance(one, str) else repr(one)
+        for one in values
+        if isinstance(one, str | int | float)
+    ]
+    found = tuple(
+        _expression(one, letters, spot.entry(number)) for number, one in enumerate(texts, start=1)
+    )
     return Places(found) if len(found) == len(values) and any(one.used for one in found) else None
 
 
@@ -78,7 +100,11 @@ def _expression(text: str, letters: str, spot: Spot) -> Expression:
         return Expression(repr(float(found[1]) * (factor / own)))
     except InputError as error:
         arithmetic = f" of {', '.join(letters)}" if letters else ""
-        ask = f"give a number, one with its unit, or arithmetic{arithmetic}; " if found is None else ""
+        ask = (
+            f"give a number, one with its unit, or arithmetic{arithmetic}; "
+            if found is None
+            else ""
+        )
         raise spot.wrong(f"is {shown(text)}: {ask}{error}") from None
 
 

@@ -14,10 +14,18 @@ from .stage_tables import refuse_own
 from .table_calls import Spot
 from .toml_file import toml_value, with_settings
 
-ROLLERS = [{"facets": side, "components": [1]} for side in ("left_side", "right_side")]  # of a layer shaken sideways
-TIED = ["system.prescribed=", 'system.tied={first="left_side", second="right_side"}']  # of one shaken both ways
+ROLLERS = [
+    {"facets": side, "components": [1]} for side in ("left_side", "right_side")
+]  # of a layer shaken sideways
+TIED = [
+    "system.prescribed=",
+    'system.tied={first="left_side", second="right_side"}',
+]  # of one shaken both ways
 REFERENCE = {"type": "Volume", "method": {"type": "ReducedNewton"}}
-IMPULSIVE = ("ZienkiewiczWoodTaylor", "SS22")  # whose contact points have mass: they take an impact law
+IMPULSIVE = (
+    "ZienkiewiczWoodTaylor",
+    "SS22",
+)  # whose contact points have mass: they take an impact law
 
 
 @dataclass(frozen=True)
@@ -53,14 +61,29 @@ class ShortOptions:
         direction = before[0].get("direction") if before else None
         axes = len(direction) if isinstance(direction, list) else 2
         if not all(files) or len(files) > 2:
-            raise InputError(f"--motion {shown(self.motion)}: give FILE, or FILE,FILE with a vertical motion")
+            raise InputError(
+                f"--motion {shown(self.motion)}: give FILE, or FILE,FILE with a vertical motion"
+            )
         motions: list[dict[str, Any]] = []
         for number, file in enumerate(files):
-            old = before[number] if number < len(before) and before[number].get("type") == "GroundMotion" else {}
+            old = (
+                before[number]
+                if number < len(before) and before[number].get("type") == "GroundMotion"
+                else {}
+            )
             record, axis = old.get("record"), 0 if number == 0 else axes - 1
-            motions.append({"type": "GroundMotion", "direction": [float(k == axis) for k in range(axes)]} | old | {
-                "record": ({} if not isinstance(record, dict) or record.get("type") == "synthetic" else record)
-                | {"path": str(Path(file).absolute())}})
+            motions.append(
+                {"type": "GroundMotion", "direction": [float(k == axis) for k in range(axes)]}
+                | old
+                | {
+                    "record": (
+                        {}
+                        if not isinstance(record, dict) or record.get("type") == "synthetic"
+                        else record
+                    )
+                    | {"path": str(Path(file).absolute())}
+                }
+            )
         found = [f"excitation={toml_value(motions)}"]
         system = next(iter(_tables(tables.get("system"))), {})
         if system.get("base_inertia") is False:
@@ -80,15 +103,24 @@ class ShortOptions:
         from ...core.step import Scheme
         from ...solvers.condensed import SmallMethod
         from ...solvers.volume.route import Method
-        from .vocabulary import names_of  # late: it needs the finite elements, which not every case does
+        from .vocabulary import (
+            names_of,
+        )  # late: it needs the finite elements, which not every case does
 
         found = []
         if self.scheme is not None:
-            found.append(f"scheme={_named('scheme', self.scheme, dict.fromkeys(names_of(Scheme), ()))}")
+            found.append(
+                f"scheme={_named('scheme', self.scheme, dict.fromkeys(names_of(Scheme), ()))}"
+            )
             if "impact" in tables and self.scheme not in IMPULSIVE and ":" not in self.scheme:
                 found.append("impact=")
         if self.solver is not None:
-            methods = {"Automatic": (), "Condensed": names_of(SmallMethod), "Iterative": (), "Volume": names_of(Method)}
+            methods = {
+                "Automatic": (),
+                "Condensed": names_of(SmallMethod),
+                "Iterative": (),
+                "Volume": names_of(Method),
+            }
             found.append(f"solver={_named('solver', self.solver, methods)}")
         return found
 
@@ -101,13 +133,19 @@ class ShortOptions:
             key = "scale" if one.get("type") == "GroundMotion" else "amplitude"
             value = one.get(key, 1.0 if key == "scale" else None)
             if isinstance(value, str):
-                value = text_node(value, [float], Spot("--scale", f"excitation[{number}]", key, unit_of("", key)))
+                value = text_node(
+                    value, [float], Spot("--scale", f"excitation[{number}]", key, unit_of("", key))
+                )
             if not isinstance(value, int | float) or isinstance(value, bool):
-                raise InputError(f"--scale: [excitation] {number} has no amplitude to scale: change its own numbers")
+                raise InputError(
+                    f"--scale: [excitation] {number} has no amplitude to scale: change its own numbers"
+                )
             place = f"excitation.{number}" if isinstance(shaking, list) else "excitation"
             found.append(f"{place}.{key}={value * self.scale!r}")
         if not found:
-            raise InputError("the case cannot use --scale, as nothing shakes it: leave it out, or give --motion")
+            raise InputError(
+                "the case cannot use --scale, as nothing shakes it: leave it out, or give --motion"
+            )
         return found
 
     def _cross_check(self, tables: Mapping[str, Any]) -> list[str]:
@@ -117,9 +155,13 @@ class ShortOptions:
         solver = tables.get("solver", {"type": "Condensed"})
         if not isinstance(solver, dict) or solver.get("type") == "CrossChecked":
             return []
-        routes = [one for one in _tables(tables.get("escalation")) if one.get("type") == "Volume"] or [REFERENCE]
+        routes = [
+            one for one in _tables(tables.get("escalation")) if one.get("type") == "Volume"
+        ] or [REFERENCE]
         other = routes[0] if solver.get("type") == "Condensed" else {"type": "Condensed"}
-        return [f"solver={toml_value({'type': 'CrossChecked', 'primary': solver, 'others': [other]})}"]
+        return [
+            f"solver={toml_value({'type': 'CrossChecked', 'primary': solver, 'others': [other]})}"
+        ]
 
 
 def _tables(value: Any) -> list[dict[str, Any]]:
@@ -133,5 +175,7 @@ def _named(kind: str, name: str, methods: Mapping[str, Sequence[str]]) -> str:
         if name in names:
             return toml_value({"type": owner, "method": {"type": name}})
     if name not in methods and ":" not in name:
-        raise InputError(f"unknown {kind} {shown(name)}: {nearest(name, [*methods, *chain(*methods.values())])}")
+        raise InputError(
+            f"unknown {kind} {shown(name)}: {nearest(name, [*methods, *chain(*methods.values())])}"
+        )
     return toml_value({"type": name})

@@ -12,10 +12,27 @@ from ...core.errors import InputError
 from .parsing import nearest
 
 BY_KEY = ("system", "run")
-WHOLE = ("gravity", "contact", "friction", "impact", "mass", "excitation", "scheme", "solver", "escalation", "record",
-         "fields")
+WHOLE = (
+    "gravity",
+    "contact",
+    "friction",
+    "impact",
+    "mass",
+    "excitation",
+    "scheme",
+    "solver",
+    "escalation",
+    "record",
+    "fields",
+)
 KEYS = ("name", "type", "release", *BY_KEY, *WHOLE)
-OF_MOTION = ("excitation", "scheme", "impact", "mass", "escalation")  # what a static stage has no use for
+OF_MOTION = (
+    "excitation",
+    "scheme",
+    "impact",
+    "mass",
+    "escalation",
+)  # what a static stage has no use for
 AT_REST = {"dt": 1.0, "steps": 0}  # [run] of a static stage: a row at t = 0
 _NAME = re.compile(r"\w{1,40}", re.ASCII)
 
@@ -40,15 +57,24 @@ def split(path: Path, tables: Mapping[str, Any]) -> list[Stage]:
         return []
     given = tables["stage"]
     if not isinstance(given, list) or not given or not all(isinstance(one, dict) for one in given):
-        raise InputError(f"{path}: [stage] is not a list of tables: write [[stage]] above the keys of each stage")
-    stages = [_stage(f"{path}: [[stage]] {number}", one, tables) for number, one in enumerate(given, start=1)]
+        raise InputError(
+            f"{path}: [stage] is not a list of tables: write [[stage]] above the keys of each stage"
+        )
+    stages = [
+        _stage(f"{path}: [[stage]] {number}", one, tables)
+        for number, one in enumerate(given, start=1)
+    ]
     if stages[0].release:
-        raise InputError(f"{stages[0].label} has release = true, and is the first stage: leave it out")
+        raise InputError(
+            f"{stages[0].label} has release = true, and is the first stage: leave it out"
+        )
     for before, one in pairwise(stages):
         for key in ("contact", "friction"):
             if not one.static and one.tables.get(key) != before.tables.get(key):
-                raise InputError(f"{one.label} has another [{key}] than the stage before it, and would jump at t = 0: "
-                                 "give both the same, or put a static stage with this one between them")
+                raise InputError(
+                    f"{one.label} has another [{key}] than the stage before it, and would jump at t = 0: "
+                    "give both the same, or put a static stage with this one between them"
+                )
     return stages
 
 
@@ -60,22 +86,35 @@ def _stage(where: str, given: Mapping[str, Any], tables: Mapping[str, Any]) -> S
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         raise InputError(f"{where} has name = {shown(name)}: give letters, digits and underscores")
     if kind not in ("static", "dynamic"):
-        raise InputError(f"{where} has type = {shown(kind)}: give \"static\" or \"dynamic\"")
+        raise InputError(f'{where} has type = {shown(kind)}: give "static" or "dynamic"')
     flag(where, "release", release)
     whole = {key: value for key, value in tables.items() if key != "stage"}
     for key in (key for key in BY_KEY if key in given):
         if not isinstance(given[key], dict) or not isinstance(whole.get(key, {}), dict):
-            raise InputError(f"{where}: {key} is {shown(given[key])}: give a table, here and in the case")
-        lasts = {"steps", "t_end"} if {"steps", "t_end"} & given[key].keys() else set()  # one of them ends a run
-        whole[key] = {name: one for name, one in whole.get(key, {}).items() if name not in lasts} | given[key]
+            raise InputError(
+                f"{where}: {key} is {shown(given[key])}: give a table, here and in the case"
+            )
+        lasts = (
+            {"steps", "t_end"} if {"steps", "t_end"} & given[key].keys() else set()
+        )  # one of them ends a run
+        whole[key] = {
+            name: one for name, one in whole.get(key, {}).items() if name not in lasts
+        } | given[key]
     if "out" in given.get("run", {}):
-        raise InputError(f"{where}: run has the key 'out', which all stages share: give it in [run]")
+        raise InputError(
+            f"{where}: run has the key 'out', which all stages share: give it in [run]"
+        )
     if kind == "static":
-        vain = [key for key in OF_MOTION if key in given] + [f"run.{key}" for key in given.get("run", {})
-                                                             if key != "tolerance"]
+        vain = [key for key in OF_MOTION if key in given] + [
+            f"run.{key}" for key in given.get("run", {}) if key != "tolerance"
+        ]
         if vain:
-            raise InputError(f"{where} is static and cannot use {vain[0]}: leave it out, or move it to a dynamic one")
-        whole["run"] = {key: one for key, one in whole.get("run", {}).items() if key in ("tolerance", "out")} | AT_REST
+            raise InputError(
+                f"{where} is static and cannot use {vain[0]}: leave it out, or move it to a dynamic one"
+            )
+        whole["run"] = {
+            key: one for key, one in whole.get("run", {}).items() if key in ("tolerance", "out")
+        } | AT_REST
     whole |= {key: given[key] for key in WHOLE if key in given}
     return Stage(f"{where} '{name}'", name, kind == "static", release, whole)
 
@@ -85,5 +124,7 @@ def refuse_own(tables: Mapping[str, Any], key: str, asked: str) -> None:
     stages = tables.get("stage")
     table = key.partition(".")[0].partition("=")[0]
     if isinstance(stages, list) and stages and isinstance(stages[-1], dict) and table in stages[-1]:
-        raise InputError(f"{asked} changes [{table}], and the last [[stage]] has its own: leave it out there, or give "
-                         f"--set stage.{len(stages)}.{table}…")
+        raise InputError(
+            f"{asked} changes [{table}], and the last [[stage]] has its own: leave it out there, or give "
+            f"--set stage.{len(stages)}.{table}…"
+        )

@@ -24,7 +24,17 @@ from ...core.step import State
 from ...fem.communicators import MpiComm
 from ...fem.released_supports import release, removed_support, same_supports, started
 from ...run.files.checkpoint import state_checksum
-from ...run.files.folder import CHECKPOINT, FOLLOWS, STAGES, clear, is_marked, locked, remove_run, run_folder, take
+from ...run.files.folder import (
+    CHECKPOINT,
+    FOLLOWS,
+    STAGES,
+    clear,
+    is_marked,
+    locked,
+    remove_run,
+    run_folder,
+    take,
+)
 from ...run.simulate import Solution, simulate
 from .stage_tables import Stage
 from .vocabulary import Parts
@@ -51,15 +61,26 @@ def leading(case: Any, comm: Any) -> tuple[Reached | None, Parts, State | None]:
         return None, case.parts(comm), None
     reached = Reached(0, case.meshed(comm))
     while reached.number < len(case.stages) - 1 and case.stages[reached.number].static:
-        reached, _ = _made(case.stages[reached.number], reached, comm, None, {"progress": False, "fields": None})
+        reached, _ = _made(
+            case.stages[reached.number], reached, comm, None, {"progress": False, "fields": None}
+        )
     return reached, *_entered(case.stages[reached.number], reached, comm)[1:]
 
 
-def run_stages(case: Any, comm: Any, out: Path | None, *, restart: bool | str | Path, reached: Reached | None,
-               **options: Any) -> Solution:
+def run_stages(
+    case: Any,
+    comm: Any,
+    out: Path | None,
+    *,
+    restart: bool | str | Path,
+    reached: Reached | None,
+    **options: Any,
+) -> Solution:
     """Run those stages of a case that are not reached yet; the solution of the last one. Collective."""
     ranks, stages, reached = MpiComm(comm), case.stages, reached or Reached(0, case.meshed(comm))
-    inner = [Path(STAGES) / f"{number}_{one.name}" for number, one in enumerate(stages[:-1], start=1)] + [Path()]
+    inner = [
+        Path(STAGES) / f"{number}_{one.name}" for number, one in enumerate(stages[:-1], start=1)
+    ] + [Path()]
     source, before = out if restart is True else Path(restart) if restart else None, ""
     with locked(ranks, None if out is None else run_folder(ranks, out)):
         if (place := source or out) is not None:
@@ -70,9 +91,13 @@ def run_stages(case: Any, comm: Any, out: Path | None, *, restart: bool | str | 
             if before and out is not None and not found:
                 on_root(ranks, partial(_begin, out, folder, before))
             more = {"restart": again if found or stage is stages[0] and again else False}
-            reached, solution = _made(stage, reached, comm, None if out is None else out / folder, options | more)
+            reached, solution = _made(
+                stage, reached, comm, None if out is None else out / folder, options | more
+            )
             place = out or (source if found else None)
-            left = None if place is None else on_root(ranks, partial(state_checksum, place / folder))
+            left = (
+                None if place is None else on_root(ranks, partial(state_checksum, place / folder))
+            )
             before += f"{left} {solution.state.k}\n"
     return solution
 
@@ -85,8 +110,10 @@ def _tidy(out: Path, stages: list[Path], *, keep: bool) -> None:
     found = [Path(STAGES) / name for name in names if name[0].isdecimal() and "_" in name]
     old = [one for one in found if one not in stages and is_marked(inner_folder(out, *one.parts))]
     if keep and old:
-        raise InputError(f"'{out / old[0]}' belongs to no stage of the case: give stages their old names and order, or "
-                         "start a new run, which removes it")
+        raise InputError(
+            f"'{out / old[0]}' belongs to no stage of the case: give stages their old names and order, or "
+            "start a new run, which removes it"
+        )
     for folder in () if keep else old:
         remove_run(out / folder)
     for folder in () if keep else stages:
@@ -108,8 +135,9 @@ def _begin(out: Path, folder: Path, before: str) -> None:
     write_atomically(place / FOLLOWS, before.encode())
 
 
-def _made(stage: Stage, reached: Reached, comm: Any, folder: Path | None,
-          options: dict[str, Any]) -> tuple[Reached, Solution]:
+def _made(
+    stage: Stage, reached: Reached, comm: Any, folder: Path | None, options: dict[str, Any]
+) -> tuple[Reached, Solution]:
     """Run a stage, or go on with it."""
     reached, parts, state = _entered(stage, reached, comm)
     if stage.static and options.get("restart"):  # it has been solved
@@ -118,8 +146,14 @@ def _made(stage: Stage, reached: Reached, comm: Any, folder: Path | None,
         stage.case.keep_model(comm, parts, folder)
         solution = simulate(**call | options | ({"state": None} if options.get("restart") else {}))
     earlier = reached.earlier if reached.problem is None else (*reached.earlier, reached.problem)
-    return replace(reached, number=reached.number + 1, problem=call["problem"], state=solution.state,
-                   static=stage.static, earlier=earlier), solution
+    return replace(
+        reached,
+        number=reached.number + 1,
+        problem=call["problem"],
+        state=solution.state,
+        static=stage.static,
+        earlier=earlier,
+    ), solution
 
 
 def _entered(stage: Stage, reached: Reached, comm: Any) -> tuple[Reached, Parts, State | None]:
@@ -138,13 +172,21 @@ def _entered(stage: Stage, reached: Reached, comm: Any) -> tuple[Reached, Parts,
         elif reached.static:
             begun, first = release(before, state, problem, earlier=reached.earlier)
         else:
-            raise InputError("it has other supports than the dynamic stage before it: put a static stage with the "
-                             "supports of that one between them, or change supports before the motion")
+            raise InputError(
+                "it has other supports than the dynamic stage before it: put a static stage with the "
+                "supports of that one between them, or change supports before the motion"
+            )
         force = begun.system.load.constant - problem.system.load.constant
         name, newtons = removed_support(before, begun, np.asarray(force))
         if name and not stage.release:
-            raise InputError(f"it removes the support '{name}', which carries {newtons:.4g} N: give release = true, "
-                             "which holds its reaction as a force, or keep the support")
+            raise InputError(
+                f"it removes the support '{name}', which carries {newtons:.4g} N: give release = true, "
+                "which holds its reaction as a force, or keep the support"
+            )
     except InputError as error:
         raise InputError(f"{stage.label}: {error}") from error
-    return replace(reached, force=force), replace(parts, system=begun.system), None if stage.static else first
+    return (
+        replace(reached, force=force),
+        replace(parts, system=begun.system),
+        None if stage.static else first,
+    )

@@ -24,34 +24,59 @@ from ...soil.strain_compatible import strain_compatible
 from .table_calls import Call, build, callee, nodes_in
 
 PLACE = "iterations"  # in the run folder
-CALL = replace(callee(strain_compatible, only=("curves", "ratio", "tolerance", "most"), given=()), function=dict)
+CALL = replace(
+    callee(strain_compatible, only=("curves", "ratio", "tolerance", "most"), given=()),
+    function=dict,
+)
 
 
-def iterate(case: Any, comm: Any, folder: Path | None, *, restart: bool | str | Path, **options: Any) -> Solution:
+def iterate(
+    case: Any, comm: Any, folder: Path | None, *, restart: bool | str | Path, **options: Any
+) -> Solution:
     """Run a case with [strain_compatible] until it is; the solution of the last run. Collective."""
-    spot, ranks, numbers, given = f"{case.path}: [strain_compatible]", MpiComm(comm), count(), case.nodes["system"]
+    spot, ranks, numbers, given = (
+        f"{case.path}: [strain_compatible]",
+        MpiComm(comm),
+        count(),
+        case.nodes["system"],
+    )
     if restart:
-        raise InputError(f"{spot} begins with the soil at small strains and cannot be continued: run it from the start")
+        raise InputError(
+            f"{spot} begins with the soil at small strains and cannot be continued: run it from the start"
+        )
     damping = given.arguments.get("damping")
     if not isinstance(damping, Call) or damping.callee.name != "DampingRatio":
-        raise InputError(f"{spot} gives every cell its damping ratio: give [system.damping] type = \"DampingRatio\"")
+        raise InputError(
+            f'{spot} gives every cell its damping ratio: give [system.damping] type = "DampingRatio"'
+        )
     if case.stages and case.stages[-1].static:
-        raise InputError(f"{spot} uses the strains of the last stage, which is static: give a dynamic one")
+        raise InputError(
+            f"{spot} uses the strains of the last stage, which is static: give a dynamic one"
+        )
     mesh, tags = case.meshed(comm)
 
     def softened(one: Any, material: Any, *strain: Any) -> Any:
         own = one.nodes.get("record", (Energy(), Contact()))
         nodes = {name: node for name, node in one.nodes.items() if name != "strain_compatible"}
-        nodes["system"] = replace(nodes["system"], arguments=nodes["system"].arguments | {"material": material})
+        nodes["system"] = replace(
+            nodes["system"], arguments=nodes["system"].arguments | {"material": material}
+        )
         nodes["record"] = (*(own if isinstance(own, tuple) else (own,)), *strain)
         return replace(one, nodes=nodes, ready=(mesh, tags))
 
     def run(material: Any, strain: Any) -> Any:
         if folder is not None:
             on_root(ranks, partial(_set_aside, folder, next(numbers)))
-        stages = tuple(replace(stage, case=softened(stage.case, material, *[strain][stage is not case.stages[-1] :]))
-                       for stage in case.stages)
-        return replace(softened(case, material, strain), stages=stages).run(comm, out=folder, **options)
+        stages = tuple(
+            replace(
+                stage,
+                case=softened(stage.case, material, *[strain][stage is not case.stages[-1] :]),
+            )
+            for stage in case.stages
+        )
+        return replace(softened(case, material, strain), stages=stages).run(
+            comm, out=folder, **options
+        )
 
     material = build(given.arguments.get("material", ()), {"tags": tags})
     asked = build(case.nodes["strain_compatible"], {"tags": tags})

@@ -17,7 +17,9 @@ from typing import Any, get_type_hints
 from ...core.errors import InputError
 
 Context = Mapping[str, Any]
-Node = Any  # what has been read: a Group or Call, a tuple or dict of nodes; all else stands for itself
+Node = (
+    Any  # what has been read: a Group or Call, a tuple or dict of nodes; all else stands for itself
+)
 GIVEN = ("mesh", "system", "excitations")  # parameters that the context supplies
 
 
@@ -68,7 +70,9 @@ class Group:
         except InputError as error:
             raise self.spot.wrong(f"is '{self.name}', but the {error}") from None
         if not isinstance(found, self.kind):
-            raise self.spot.wrong(f"is '{self.name}', {GROUP[type(found).__name__]}: {self._remedy(found)}")
+            raise self.spot.wrong(
+                f"is '{self.name}', {GROUP[type(found).__name__]}: {self._remedy(found)}"
+            )
         return replace(context["tags"][self.name], name=self.alias) if self.alias else found
 
     def _remedy(self, found: Any) -> str:
@@ -95,17 +99,30 @@ class Callee:
     given: tuple[str, ...] = ()
 
 
-def callee(function: Callable[..., Any], *, name: str = "", only: Sequence[str] = (),
-           given: Sequence[str] = GIVEN) -> Callee:
+def callee(
+    function: Callable[..., Any],
+    *,
+    name: str = "",
+    only: Sequence[str] = (),
+    given: Sequence[str] = GIVEN,
+) -> Callee:
     """Return how to call a function or class; ``only``: what a file may give; parameters ``given`` are supplied."""
     plain_class = isinstance(function, type) and not is_dataclass(function)
     hints = get_type_hints(function.__init__ if plain_class else function)  # type: ignore[misc]
     found = signature(function).parameters
-    parameters = {key: one for key, one in found.items() if one.kind not in (one.VAR_POSITIONAL, one.VAR_KEYWORD)}
+    parameters = {
+        key: one
+        for key, one in found.items()
+        if one.kind not in (one.VAR_POSITIONAL, one.VAR_KEYWORD)
+    }
     settable = [one for one in parameters if one not in given and (not only or one in only)]
-    return Callee(name or getattr(function, "__name__", ""), function, {one: hints.get(one, Any) for one in settable},
-                  frozenset(one for one in settable if parameters[one].default is Parameter.empty),
-                  tuple(one for one in parameters if one in given))
+    return Callee(
+        name or getattr(function, "__name__", ""),
+        function,
+        {one: hints.get(one, Any) for one in settable},
+        frozenset(one for one in settable if parameters[one].default is Parameter.empty),
+        tuple(one for one in parameters if one in given),
+    )
 
 
 @dataclass(frozen=True)
@@ -119,7 +136,9 @@ class Call:
     def build(self, context: Context) -> Any:
         lacking = [name for name in self.callee.given if name not in context]
         if lacking:
-            raise self.spot.inside(f"{self.callee.name} needs the {lacking[0]}, still unknown here: give numbers")
+            raise self.spot.inside(
+                f"{self.callee.name} needs the {lacking[0]}, still unknown here: give numbers"
+            )
         supplied = {name: context[name] for name in self.callee.given}
         arguments = build(self.arguments, context)
         try:
@@ -130,8 +149,10 @@ class Call:
 
 def needs_body(node: Node) -> bool:
     """Return whether groups of the mesh are named in it, or the assembled system is asked for."""
-    return any(isinstance(one, Group) or (isinstance(one, Call) and "system" in one.callee.given)
-               for one in nodes_in(node))
+    return any(
+        isinstance(one, Group) or (isinstance(one, Call) and "system" in one.callee.given)
+        for one in nodes_in(node)
+    )
 
 
 def build(node: Node, context: Context) -> Any:
@@ -147,5 +168,7 @@ def nodes_in(node: Node) -> Iterator[Node]:
     """Yield the node and all nodes in it."""
     yield node
     inside = node.arguments if isinstance(node, Call) else node
-    for one in inside.values() if isinstance(inside, dict) else inside if isinstance(inside, tuple) else ():
+    for one in (
+        inside.values() if isinstance(inside, dict) else inside if isinstance(inside, tuple) else ()
+    ):
         yield from nodes_in(one)

@@ -26,9 +26,13 @@ def read_toml(path: str | Path) -> dict[str, Any]:
             data = file.read(BYTES + 1)
         text = data.decode("utf-8")
     except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); give the path of a case file") from None
+        raise InputError(
+            f"{path}: cannot be read ({error.strerror}); give the path of a case file"
+        ) from None
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: byte {error.start} is no UTF-8 text; save the case file as UTF-8") from None
+        raise InputError(
+            f"{path}: byte {error.start} is no UTF-8 text; save the case file as UTF-8"
+        ) from None
     if len(data) > BYTES:
         raise InputError(f"{path}: the file is larger than {BYTES:.0e} bytes; give a case file")
     if _CHAIN.search(text):  # before tomllib, whose time grows as the square of the parts of a key
@@ -54,10 +58,18 @@ def checked(tables: dict[str, Any], source: str) -> dict[str, Any]:
         wrong = _defect(value, depth)
         if wrong:
             raise InputError(f"{source}: {key[:200]} {wrong}")
-        inside = value.items() if isinstance(value, dict) else enumerate(value, 1) if isinstance(value, list) else ()
+        inside = (
+            value.items()
+            if isinstance(value, dict)
+            else enumerate(value, 1)
+            if isinstance(value, list)
+            else ()
+        )
         left += [(f"{key}.{name}".lstrip("."), one, depth + 1) for name, one in inside]
         if any("\0" in str(name) for name, _ in inside):
-            raise InputError(f"{source}: a key below {key or 'the top'} contains the character NUL: correct it")
+            raise InputError(
+                f"{source}: a key below {key or 'the top'} contains the character NUL: correct it"
+            )
     return tables
 
 
@@ -68,7 +80,11 @@ def _defect(value: Any, depth: int) -> str:
         return "is nan: give a number"
     if isinstance(value, int) and not -(2**63) <= value < 2**63:
         return _TOO_LONG
-    return "contains the character NUL: leave it out" if isinstance(value, str) and "\0" in value else ""
+    return (
+        "contains the character NUL: leave it out"
+        if isinstance(value, str) and "\0" in value
+        else ""
+    )
 
 
 def with_settings(tables: dict[str, Any], settings: Sequence[str]) -> dict[str, Any]:
@@ -103,7 +119,11 @@ def _value(text: str) -> Any:
 
 def _value_error(error: ValueError) -> str:
     """What Python says of a value that is TOML; of a number of more digits than it reads, what helps."""
-    return _TOO_LONG if "digits" in str(error) else f"holds a value that cannot be read ({error}): correct it"
+    return (
+        _TOO_LONG
+        if "digits" in str(error)
+        else f"holds a value that cannot be read ({error}): correct it"
+    )
 
 
 def _set(there: Any, way: list[str], value: Any, setting: str) -> None:
@@ -123,7 +143,11 @@ def _set(there: Any, way: list[str], value: Any, setting: str) -> None:
 def toml_value(value: Any) -> str:
     """Return a value as TOML writes it on one line."""
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{_quoted(key)} = {toml_value(one)}" for key, one in value.items()) + "}"
+        return (
+            "{"
+            + ", ".join(f"{_quoted(key)} = {toml_value(one)}" for key, one in value.items())
+            + "}"
+        )
     if isinstance(value, list):
         return "[" + ", ".join(map(toml_value, value)) + "]"
     if isinstance(value, bool):
@@ -141,7 +165,11 @@ def _place(there: Any, name: str, setting: str) -> Any:
     if isinstance(there, dict):
         return name
     if not isinstance(there, list):
-        raise InputError(f"setting '{setting}': the part before '{name}' is a plain value; shorten the key")
+        raise InputError(
+            f"setting '{setting}': the part before '{name}' is a plain value; shorten the key"
+        )
     if not name.isdecimal() or not 1 <= int(name) <= len(there):
-        raise InputError(f"setting '{setting}': there is no entry '{name}'; give a number from 1 to {len(there)}")
+        raise InputError(
+            f"setting '{setting}': there is no entry '{name}'; give a number from 1 to {len(there)}"
+        )
     return int(name) - 1

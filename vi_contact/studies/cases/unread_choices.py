@@ -18,7 +18,11 @@ from .table_calls import Call, Node, nodes_in
 
 RATIO_LAW = "DampingRatio"
 BLIND_TO_RATIOS = (
-    "NoDamping", "MassProportional", "Rayleigh", "Rayleigh.from_frequencies", "KelvinVoigt",
+    "NoDamping",
+    "MassProportional",
+    "Rayleigh",
+    "Rayleigh.from_frequencies",
+    "KelvinVoigt",
 )
 OF_CONTACT = {"friction": "rubs", "impact": "strikes", "mass": "touches"}  # what does not happen
 MASSES = ("ConsistentMass", "Redistributed")
@@ -98,13 +102,17 @@ def _materials(path: Path, tables: Mapping[str, Any], parts: Sequence[Part]) -> 
     named = tables.get("material")
     for name in named if isinstance(named, Mapping) else ():
         users = [
-            part for part in parts
+            part
+            for part in parts
             if any(one is part.nodes["material"][name] for one in nodes_in(part.nodes["system"]))
         ]
         if not users:
-            yield f"material.{name}", (
-                f"{path}: [material.{name}] is of nothing, as [system] does not name it: give its "
-                "cell group in [system] material, or leave it out"
+            yield (
+                f"material.{name}",
+                (
+                    f"{path}: [material.{name}] is of nothing, as [system] does not name it: give its "
+                    "cell group in [system] material, or leave it out"
+                ),
             )
 
 
@@ -117,15 +125,21 @@ def _ratios(part: Part) -> Iterator[Finding]:
     names = [name for name, one in named.items() if any(one is other for other in used)]
     damped = [name for name in names if named[name].arguments.get("xi")]
     if word == RATIO_LAW and names and not damped and "strain_compatible" not in part.nodes:
-        yield "system.damping", (
-            f"{part.label}: [system.damping] {RATIO_LAW} damps by the ratios of the materials, and "
-            f"none has one: give [material.{names[0]}] xi = 0.05, or another type of damping"
+        yield (
+            "system.damping",
+            (
+                f"{part.label}: [system.damping] {RATIO_LAW} damps by the ratios of the materials, and "
+                f"none has one: give [material.{names[0]}] xi = 0.05, or another type of damping"
+            ),
         )
     if word in BLIND_TO_RATIOS and damped:
-        yield f"material.{damped[0]}", (
-            f"{part.label}: [material.{damped[0]}] has xi, which no damping reads here: give "
-            f'[system] damping = {{type = "{RATIO_LAW}", frequency = …}} with a frequency in Hz, or '
-            "leave xi out"
+        yield (
+            f"material.{damped[0]}",
+            (
+                f"{part.label}: [material.{damped[0]}] has xi, which no damping reads here: give "
+                f'[system] damping = {{type = "{RATIO_LAW}", frequency = …}} with a frequency in Hz, or '
+                "leave xi out"
+            ),
         )
 
 
@@ -134,27 +148,41 @@ def _without_contact(part: Part) -> Iterator[Finding]:
     surfaces = part.calls("contact")
     for table, happens in OF_CONTACT.items():
         laws = part.calls(table)
-        own = table == "mass" and laws and laws[0].callee.name not in MASSES  # may change all masses
+        own = (
+            table == "mass" and laws and laws[0].callee.name not in MASSES
+        )  # may change all masses
         if laws and not surfaces and not own:
-            yield table, (
-                f"{part.label}: [{table}] has no effect, as nothing {happens} without [[contact]]: "
-                "give the contact, or leave it out"
+            yield (
+                table,
+                (
+                    f"{part.label}: [{table}] has no effect, as nothing {happens} without [[contact]]: "
+                    "give the contact, or leave it out"
+                ),
             )
     if part.calls("impact") and surfaces and all("springs" in one.arguments for one in surfaces):
-        yield "impact", (
-            f"{part.label}: [impact] has no effect, as every [[contact]] has springs, which do not "
-            "collide: leave it out"
+        yield (
+            "impact",
+            (
+                f"{part.label}: [impact] has no effect, as every [[contact]] has springs, which do not "
+                "collide: leave it out"
+            ),
         )
     dt = part.nodes["run"].arguments.get("dt")
     if isinstance(dt, Call) and dt.callee.name == "HalvedAtImpact" and not surfaces:
-        yield "run.dt", (
-            f"{part.label}: [run] dt is HalvedAtImpact, which halves nothing without [[contact]]: "
-            "give the contact, or the step alone"
+        yield (
+            "run.dt",
+            (
+                f"{part.label}: [run] dt is HalvedAtImpact, which halves nothing without [[contact]]: "
+                "give the contact, or the step alone"
+            ),
         )
     if part.calls("mass") and any("mass" in one.arguments for one in part.calls("scheme")):
-        yield "scheme.mass", (
-            f"{part.label}: [scheme] mass is not read, as [mass] comes before it: leave one of the "
-            "two out"
+        yield (
+            "scheme.mass",
+            (
+                f"{part.label}: [scheme] mass is not read, as [mass] comes before it: leave one of the "
+                "two out"
+            ),
         )
 
 
@@ -167,28 +195,40 @@ def _of_solvers(part: Part) -> Iterator[Finding]:
             yield from _of_condensed(part.label, table, one.arguments, rubs)
     for one, other in combinations([*part.calls("solver"), *part.calls("escalation")], 2):
         if one == other:
-            yield "escalation", (
-                f"{part.label}: [[escalation]] names {other.callee.name} with the same keys as the "
-                "solver before it, which has failed by then: leave it out, or change a key"
+            yield (
+                "escalation",
+                (
+                    f"{part.label}: [[escalation]] names {other.callee.name} with the same keys as the "
+                    "solver before it, which has failed by then: leave it out, or change a key"
+                ),
             )
 
 
 def _of_condensed(label: str, table: str, keys: Mapping[str, Node], rubs: str) -> Iterator[Finding]:
     """Yield keys of the condensed solver without effect; ``rubs``: the law of friction, or empty."""
     if rubs and "method" in keys:
-        yield table, (
-            f"{label}: [{table}] method is for contact without friction, and [friction] is given: "
-            "give friction_method in its place, or leave it out"
+        yield (
+            table,
+            (
+                f"{label}: [{table}] method is for contact without friction, and [friction] is given: "
+                "give friction_method in its place, or leave it out"
+            ),
         )
     for key in (one for one in ("friction_method", "rates") if one in keys and not rubs):
-        yield table, (
-            f"{label}: [{table}] {key} is for contact with friction, and there is no [friction]: "
-            "give the friction, or leave it out"
+        yield (
+            table,
+            (
+                f"{label}: [{table}] {key} is for contact with friction, and there is no [friction]: "
+                "give the friction, or leave it out"
+            ),
         )
     if "rates" in keys and rubs in WITHOUT_RATES:
-        yield table, (
-            f"{label}: [{table}] rates is for friction that depends on the slip rate, and {rubs} "
-            "does not: leave it out"
+        yield (
+            table,
+            (
+                f"{label}: [{table}] rates is for friction that depends on the slip rate, and {rubs} "
+                "does not: leave it out"
+            ),
         )
 
 
@@ -200,9 +240,12 @@ def _twice(part: Part) -> Iterator[Finding]:
     for key, given in lists.items():
         for one, other in combinations(given if isinstance(given, list) else (), 2):
             if one == other:
-                yield key, (
-                    f"{part.label}: [[{key}]] has two tables that are alike, word for word: leave "
-                    "one of them out, or give one of twice the size"
+                yield (
+                    key,
+                    (
+                        f"{part.label}: [[{key}]] has two tables that are alike, word for word: leave "
+                        "one of them out, or give one of twice the size"
+                    ),
                 )
 
 
@@ -213,9 +256,12 @@ def _recorded_weight(part: Part) -> Iterator[Finding]:
         return
     for one in part.calls("record"):
         if "gravity" in one.arguments:
-            yield "record", (
-                f"{part.label}: [[record]] {one.callee.name} has gravity, and the body has no "
-                "weight: give [gravity], or leave it out"
+            yield (
+                "record",
+                (
+                    f"{part.label}: [[record]] {one.callee.name} has gravity, and the body has no "
+                    "weight: give [gravity], or leave it out"
+                ),
             )
 
 
@@ -225,15 +271,21 @@ def _start(parts: Sequence[Part]) -> Iterator[Finding]:
     weighted = "[gravity]" if "gravity" in first.nodes else ""
     at_rest = "the static stage" if first.static else weighted
     if at_rest and "initial_velocity" in first.system:
-        yield "system.initial_velocity", (
-            f"{first.label}: [system] initial_velocity is lost, as {at_rest} lets the body begin at "
-            "rest, in equilibrium: leave one of the two out"
+        yield (
+            "system.initial_velocity",
+            (
+                f"{first.label}: [system] initial_velocity is lost, as {at_rest} lets the body begin at "
+                "rest, in equilibrium: leave one of the two out"
+            ),
         )
     for part in later:
         for key in (one for one in AT_START if one in part.system and one not in first.system):
-            yield f"system.{key}", (
-                f"{part.label}: system has {key}, and a stage begins where the stage before has "
-                "left the body: give it in the first stage, or leave it out"
+            yield (
+                f"system.{key}",
+                (
+                    f"{part.label}: system has {key}, and a stage begins where the stage before has "
+                    "left the body: give it in the first stage, or leave it out"
+                ),
             )
 
 
@@ -241,9 +293,12 @@ def _ground(path: Path, parts: Sequence[Part]) -> Iterator[Finding]:
     """Yield masses of held nodes that no ground motion and no weight accelerates."""
     given = any("base_inertia" in part.system for part in parts)
     if given and not any(part.calls("excitation") or part.calls("gravity") for part in parts):
-        yield "system.base_inertia", (
-            f"{path}: [system] base_inertia is about the inertia load of a ground motion, and there "
-            "is no [[excitation]]: leave it out"
+        yield (
+            "system.base_inertia",
+            (
+                f"{path}: [system] base_inertia is about the inertia load of a ground motion, and there "
+                "is no [[excitation]]: leave it out"
+            ),
         )
 
 
@@ -254,16 +309,22 @@ def _replaced(path: Path, tables: Mapping[str, Any]) -> Iterator[Finding]:
     for key in (one for one in WHOLE if one in tables):
         readers = moving if key in OF_MOTION else stages
         if readers and all(one.get(key) for one in readers):  # excitation = [] takes it away
-            yield key, (
-                f"{path}: [{key}] is read by no stage, as every [[stage]] that could read it has "
-                "its own: leave it out there or here"
+            yield (
+                key,
+                (
+                    f"{path}: [{key}] is read by no stage, as every [[stage]] that could read it has "
+                    "its own: leave it out there or here"
+                ),
             )
     own = tables.get("system")
     for key in own if isinstance(own, Mapping) else ():
         if all(key in one.get("system", {}) for one in stages):
-            yield f"system.{key}", (
-                f"{path}: [system] {key} is read by no stage, as every [[stage]] has its own: leave "
-                "it out there or here"
+            yield (
+                f"system.{key}",
+                (
+                    f"{path}: [system] {key} is read by no stage, as every [[stage]] has its own: leave "
+                    "it out there or here"
+                ),
             )
 
 
@@ -274,7 +335,10 @@ def _released(path: Path, tables: Mapping[str, Any]) -> Iterator[Finding]:
     held = [[one.get(key) for key in SUPPORTS] for one in systems]
     for before, own, stage in zip(held, held[1:], stages[1:], strict=False):
         if stage.get("release") is True and before == own:
-            yield "stage", (
-                f"{path}: [[stage]] '{stage.get('name')}' has release = true, and the supports of "
-                "the stage before it: leave it out, or change the supports"
+            yield (
+                "stage",
+                (
+                    f"{path}: [[stage]] '{stage.get('name')}' has release = true, and the supports of "
+                    "the stage before it: leave it out, or change the supports"
+                ),
             )

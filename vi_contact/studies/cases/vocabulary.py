@@ -12,14 +12,33 @@ from types import MappingProxyType, ModuleType
 from typing import Any, get_origin, get_type_hints
 
 from ... import core, engineering, fem, ground_motion, laws, meshes, run, schemes, soil, solvers
-from ...core import ContactSurface, Excitation, FrictionLaw, ImpactLaw, MassLaw, Obstacle, Recorder, Scheme, Solver
+from ...core import (
+    ContactSurface,
+    Excitation,
+    FrictionLaw,
+    ImpactLaw,
+    MassLaw,
+    Obstacle,
+    Recorder,
+    Scheme,
+    Solver,
+)
 from ...core.checks import number
 from ...core.corners import FEATURE_ANGLE
 from ...core.system import SemiDiscreteSystem
 from ...core.units import STANDARD_GRAVITY
 from ...engineering import checks
 from ...engineering.checks.comparison import Check
-from ...fem import BodyForce, Cells, CompliantBase, Dashpots, Facets, Heterogeneous, Prescribed, Traction
+from ...fem import (
+    BodyForce,
+    Cells,
+    CompliantBase,
+    Dashpots,
+    Facets,
+    Heterogeneous,
+    Prescribed,
+    Traction,
+)
 from ...fem.contact.matching import Matching
 from ...ground_motion.record import LARGEST_PEAK, Record
 from ...laws.impact import VelocityUpdate
@@ -41,14 +60,29 @@ from .table_calls import Callee, callee
 
 _KINDS: Mapping[ModuleType, tuple[Any, ...]] = {  # room -> the kinds of things it lists
     core: (Obstacle, FrictionLaw),
-    laws: (LinearElastic, Orthotropic, Section, Damping, FrictionLaw, ImpactLaw, VelocityUpdate, MassLaw, Excitation),
+    laws: (
+        LinearElastic,
+        Orthotropic,
+        Section,
+        Damping,
+        FrictionLaw,
+        ImpactLaw,
+        VelocityUpdate,
+        MassLaw,
+        Excitation,
+    ),
     ground_motion: (Excitation,),
     meshes: (MeshScript,),
     fem: (Prescribed, Traction, BodyForce, Dashpots, Matching, Recorder, FieldWriter),
-    solvers: (Solver,), normal: (SmallMethod,), friction: (FrictionMethod, Extrapolation), volume: (Method,),
+    solvers: (Solver,),
+    normal: (SmallMethod,),
+    friction: (FrictionMethod, Extrapolation),
+    volume: (Method,),
     schemes: (Scheme,),
     run: (Solver, Schedule, HalvedAtImpact, Recorder),
-    engineering: (Recorder,), checks: (Check,), soil: (SoilCurves,),
+    engineering: (Recorder,),
+    checks: (Check,),
+    soil: (SoilCurves,),
 }
 
 
@@ -59,57 +93,111 @@ class MeshFile:
     path: Path
 
 
-def record(path: Path, units: str | None = None, *, dt: float | None = None, resample_dt: float | None = None,
-           channel: int | str | None = None, largest: float = LARGEST_PEAK,
-           processing: "ground_motion.Processing | None" = None) -> Record:
+def record(
+    path: Path,
+    units: str | None = None,
+    *,
+    dt: float | None = None,
+    resample_dt: float | None = None,
+    channel: int | str | None = None,
+    largest: float = LARGEST_PEAK,
+    processing: "ground_motion.Processing | None" = None,
+) -> Record:
     """Read a record, ``read_record``, then apply ``processing``."""
-    found = ground_motion.read_record(path, units, dt=dt, resample_dt=resample_dt, channel=channel, largest=largest)
+    found = ground_motion.read_record(
+        path, units, dt=dt, resample_dt=resample_dt, channel=channel, largest=largest
+    )
     return found if processing is None else processing(found)
 
 
-def surface(system: SemiDiscreteSystem, facets: Facets, *, obstacle: Obstacle | None = None,
-            points: Sequence[tuple[float, ...]] | None = None, feature_angle: float = FEATURE_ANGLE, held: bool = False,
-            springs: float | None = None, frictionless_corners: bool = False, hinges: bool = False,
-            name: str = "") -> ContactSurface:
+def surface(
+    system: SemiDiscreteSystem,
+    facets: Facets,
+    *,
+    obstacle: Obstacle | None = None,
+    points: Sequence[tuple[float, ...]] | None = None,
+    feature_angle: float = FEATURE_ANGLE,
+    held: bool = False,
+    springs: float | None = None,
+    frictionless_corners: bool = False,
+    hinges: bool = False,
+    name: str = "",
+) -> ContactSurface:
     """Make a ``contact_surface``; held: bilateral everywhere; springs: on these; no friction in corners; hinges: of
     bodies that share nodes; name: of it as ``part`` of recorders."""
-    found = fem.contact_surface(system, facets, obstacle=obstacle, points=points, feature_angle=feature_angle,
-                                hinges=hinges)
+    found = fem.contact_surface(
+        system, facets, obstacle=obstacle, points=points, feature_angle=feature_angle, hinges=hinges
+    )
     found = found if springs is None else found.on_springs(springs)
     found = found.with_frictionless_corners() if frictionless_corners else found
     return found.bilateral_everywhere() if held else found
 
 
-def pair(system: SemiDiscreteSystem, facets1: Facets, facets2: Facets, *, matching: Matching | None = None,
-         points: Sequence[tuple[float, ...]] | None = None, feature_angle: float = FEATURE_ANGLE, held: bool = False,
-         frictionless_corners: bool = False, hinges: bool = False, name: str = "") -> ContactSurface:
+def pair(
+    system: SemiDiscreteSystem,
+    facets1: Facets,
+    facets2: Facets,
+    *,
+    matching: Matching | None = None,
+    points: Sequence[tuple[float, ...]] | None = None,
+    feature_angle: float = FEATURE_ANGLE,
+    held: bool = False,
+    frictionless_corners: bool = False,
+    hinges: bool = False,
+    name: str = "",
+) -> ContactSurface:
     """Make a ``contact_pair``; held: ``.bilateral_everywhere()``; the others: as of ``surface``."""
-    found = fem.contact_pair(system, facets1, facets2, matching=matching, points=points, feature_angle=feature_angle,
-                             hinges=hinges)
+    found = fem.contact_pair(
+        system,
+        facets1,
+        facets2,
+        matching=matching,
+        points=points,
+        feature_angle=feature_angle,
+        hinges=hinges,
+    )
     found = found.with_frictionless_corners() if frictionless_corners else found
     return found.bilateral_everywhere() if held else found
 
 
-def weight(system: SemiDiscreteSystem, *, acceleration: float = STANDARD_GRAVITY,
-           direction: tuple[float, ...] | None = None, cells: Cells | None = None) -> SemiDiscreteSystem:
+def weight(
+    system: SemiDiscreteSystem,
+    *,
+    acceleration: float = STANDARD_GRAVITY,
+    direction: tuple[float, ...] | None = None,
+    cells: Cells | None = None,
+) -> SemiDiscreteSystem:
     """Return the system ``with_weight``; cells: a group of whole bodies, which alone have weight."""
     bodies = None if cells is None else fem.bodies_of(system, cells)
     return laws.with_weight(system, acceleration=acceleration, direction=direction, bodies=bodies)
 
 
-def first_mode_harmonic(system: SemiDiscreteSystem, *, amplitude: float, ratio: float = 0.5,
-                        direction: tuple[float, ...] = (1.0, 0.0)) -> laws.Harmonic:
+def first_mode_harmonic(
+    system: SemiDiscreteSystem,
+    *,
+    amplitude: float,
+    ratio: float = 0.5,
+    direction: tuple[float, ...] = (1.0, 0.0),
+) -> laws.Harmonic:
     """Return the harmonic with ``ratio`` times the lowest frequency of the body without contact."""
-    return laws.Harmonic(amplitude, ratio * engineering.lowest_frequency(system), direction=direction)
+    return laws.Harmonic(
+        amplitude, ratio * engineering.lowest_frequency(system), direction=direction
+    )
 
 
 def first_mode_period(system: SemiDiscreteSystem, *, parts: float) -> float:
     """Return the time step that divides the body's longest period into so many parts [s]."""
-    return 1.0 / (number("the period", "parts", parts, positive=True) * engineering.lowest_frequency(system))
+    return 1.0 / (
+        number("the period", "parts", parts, positive=True) * engineering.lowest_frequency(system)
+    )
 
 
-def heterogeneous(E: float | Expression, nu: float | Expression, rho: float | Expression,
-                  xi: float | Expression = 0.0) -> Heterogeneous:
+def heterogeneous(
+    E: float | Expression,
+    nu: float | Expression,
+    rho: float | Expression,
+    xi: float | Expression = 0.0,
+) -> Heterogeneous:
     def of(value: float | Expression) -> Any:
         return (lambda x, own=Places(value): own(x.T)) if isinstance(value, Expression) else value
 
@@ -120,25 +208,50 @@ def analytic_gap(function: Expression) -> core.AnalyticGap:
     return core.AnalyticGap(Places(function))
 
 
-def resultants(name: str = "", centre: tuple[float, ...] | None = None, normal: tuple[float, ...] | None = None,
-               part: Facets | str | tuple[tuple[float, ...], ...] | None = None) -> engineering.Resultants:
+def resultants(
+    name: str = "",
+    centre: tuple[float, ...] | None = None,
+    normal: tuple[float, ...] | None = None,
+    part: Facets | str | tuple[tuple[float, ...], ...] | None = None,
+) -> engineering.Resultants:
     """Record ``Resultants``; part: the name of a [[contact]] or of a boundary group, or a box."""
     return engineering.Resultants(name, centre, normal=normal, part=part)
 
 
-def upgoing(excitations: Any, motion: Record | Excitation | Sequence[Excitation] | None = None, *,
-            direction: tuple[float, ...] = (1.0, 0.0), dt: float | None = None, outcrop: bool = True) -> Any:
+def upgoing(
+    excitations: Any,
+    motion: Record | Excitation | Sequence[Excitation] | None = None,
+    *,
+    direction: tuple[float, ...] = (1.0, 0.0),
+    dt: float | None = None,
+    outcrop: bool = True,
+) -> Any:
     """Return ``soil.upgoing`` of a motion, or of the run's excitations, which then come up through the base alone."""
-    return soil.upgoing(excitations if motion is None else motion, direction=direction, dt=dt, outcrop=outcrop)
+    return soil.upgoing(
+        excitations if motion is None else motion, direction=direction, dt=dt, outcrop=outcrop
+    )
 
 
-def compliant_base(facets: Facets, *, motion: UpgoingVelocity, material: LinearElastic | None = None,
-                   normal: float = 1.0, tangential: float = 1.0) -> CompliantBase:
+def compliant_base(
+    facets: Facets,
+    *,
+    motion: UpgoingVelocity,
+    material: LinearElastic | None = None,
+    normal: float = 1.0,
+    tangential: float = 1.0,
+) -> CompliantBase:
     return CompliantBase(facets, material, normal, tangential, motion=motion)
 
 
-def free_field(excitations: Any, facets: Facets, *, base: CompliantBase | None = None,
-               material: LinearElastic | None = None, normal: float = 1.0, tangential: float = 1.0) -> "soil.FreeField":
+def free_field(
+    excitations: Any,
+    facets: Facets,
+    *,
+    base: CompliantBase | None = None,
+    material: LinearElastic | None = None,
+    normal: float = 1.0,
+    tangential: float = 1.0,
+) -> "soil.FreeField":
     """Make a free-field side on the base of the run's excitations, or a compliant one."""
     foot = excitations if base is None else base
     return soil.FreeField(facets, material, normal, tangential, base=foot)
@@ -163,7 +276,9 @@ class Parts:
         return not (self.system.companions or self.surface.companions or self.moved)
 
 
-_FUNCTIONS: Mapping[Any, Mapping[str, Callable[[], Any]]] = {  # kind -> word -> what it calls, when asked
+_FUNCTIONS: Mapping[
+    Any, Mapping[str, Callable[[], Any]]
+] = {  # kind -> word -> what it calls, when asked
     MeshFile: {"read_mesh": lambda: MeshFile},
     Dashpots: {"CompliantBase": lambda: compliant_base, "FreeField": lambda: free_field},
     CompliantBase: {"CompliantBase": lambda: compliant_base},
@@ -201,10 +316,16 @@ class _Listed(Mapping[str, Callee]):
         """What words with these names before the dot call; None: all."""
         found: dict[str, Callee] = {}
         for room in self._rooms:
-            own = room.__all__ if names is None else [name for name in names if name in room.__all__]
+            own = (
+                room.__all__ if names is None else [name for name in names if name in room.__all__]
+            )
             found |= {one.name: one for one in _callees(room, self._kind, own)}
         functions = _FUNCTIONS.get(self._kind, {}).items()
-        return found | {name: callee(one(), name=name) for name, one in functions if names is None or name in names}
+        return found | {
+            name: callee(one(), name=name)
+            for name, one in functions
+            if names is None or name in names
+        }
 
     @cached_property
     def _all(self) -> dict[str, Callee]:
@@ -228,8 +349,11 @@ def _callees(room: ModuleType, kind: Any, names: Sequence[str]) -> Iterator[Call
     for cls in (getattr(room, name) for name in names):
         if isinstance(cls, type) and not is_protocol(cls) and not defect(cls, kind):
             made = [callee(one, name=one.__qualname__) for one in (cls, *_constructors(cls))]
-            yield from (one for one in made
-                        if not any(get_origin(one.hints[name]) is Callable for name in one.required))
+            yield from (
+                one
+                for one in made
+                if not any(get_origin(one.hints[name]) is Callable for name in one.required)
+            )
 
 
 def _constructors(cls: type) -> Iterator[Any]:
@@ -241,6 +365,14 @@ def _constructors(cls: type) -> Iterator[Any]:
 
 def words(folder: Path, allowed: Sequence[str] = ()) -> Words:
     """Return the words of a case file in this folder, where its relative paths begin; ``allowed``: others' packages."""
-    default = {LinearElastic: "LinearElastic", Record: "read_record", ContactSurface: "contact_surface",
-               Traction: "Traction", Dashpots: "Dashpots", FieldWriter: "XDMF"}
-    return Words(folder, _choices(), default, (Facets, Cells), short={Record: "path"}, allowed=allowed)
+    default = {
+        LinearElastic: "LinearElastic",
+        Record: "read_record",
+        ContactSurface: "contact_surface",
+        Traction: "Traction",
+        Dashpots: "Dashpots",
+        FieldWriter: "XDMF",
+    }
+    return Words(
+        folder, _choices(), default, (Facets, Cells), short={Record: "path"}, allowed=allowed
+    )

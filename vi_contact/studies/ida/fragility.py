@@ -40,8 +40,10 @@ def limit(text: str) -> tuple[Demand, float]:
     except ValueError:
         found = math.nan
     if not math.isfinite(found):
-        raise InputError(f"limit '{text}': give COLUMN:WAY=VALUE with a number in the unit of the column, such as "
-                         "contact_max_slip:max=0.05")
+        raise InputError(
+            f"limit '{text}': give COLUMN:WAY=VALUE with a number in the unit of the column, such as "
+            "contact_max_slip:max=0.05"
+        )
     return demand(name), found
 
 
@@ -50,7 +52,9 @@ def passing(rows: Sequence[Mapping[str, Any]], text: str, level: str) -> Array:
 
     Of a record count the runs below its first failed one; one without any is left out."""
     (one, most), found, ended = limit(text), dict[str, tuple[float, float]](), set()
-    for row in sorted((row for row in rows if row[level] is not None), key=lambda row: float(row[level])):
+    for row in sorted(
+        (row for row in rows if row[level] is not None), key=lambda row: float(row[level])
+    ):
         record, value = row["record"], row[one.name]
         if record in ended or row["status"] != "finished" or not math.isfinite(value):
             ended.add(record)
@@ -91,26 +95,39 @@ def fragility_curve(brackets: Array) -> Fragility:
     """Return the fragility of brackets (records, 2). InputError where they do not tell median and dispersion."""
     brackets = np.asarray(brackets, dtype=float)
     if brackets.ndim != 2 or brackets.shape[1] != 2:
-        raise InputError(f"fragility_curve: brackets has shape {brackets.shape}; give two intensities for each record")
+        raise InputError(
+            f"fragility_curve: brackets has shape {brackets.shape}; give two intensities for each record"
+        )
     low, high = np.max(brackets[:, 0], initial=0.0), np.min(brackets[:, 1], initial=math.inf)
     if low <= high * (1.0 + SAME):
-        raise InputError(f"{np.isfinite(brackets[:, 1]).sum()} of {len(brackets)} records pass the limit, maybe all at "
-                         f"one intensity from {low:g} to {high:g}: give other or closer levels, or more records")
+        raise InputError(
+            f"{np.isfinite(brackets[:, 1]).sum()} of {len(brackets)} records pass the limit, maybe all at "
+            f"one intensity from {low:g} to {high:g}: give other or closer levels, or more records"
+        )
     with np.errstate(divide="ignore"):
         x = np.log(brackets)
     centre, spread = np.mean(seen := x[np.isfinite(x)]), np.std(seen)
     x = (x - centre) / spread
-    p = minimize(lambda p: [-one for one in _likelihood(p, x)[:2]], [1.0, 0.0], jac=True, method="L-BFGS-B",
-                 bounds=[(LEAST, None), (None, None)]).x
+    p = minimize(
+        lambda p: [-one for one in _likelihood(p, x)[:2]],
+        [1.0, 0.0],
+        jac=True,
+        method="L-BFGS-B",
+        bounds=[(LEAST, None), (None, None)],
+    ).x
     if p[0] <= LEAST:
-        raise InputError(f"the capacities of {len(brackets)} records have a spread that cannot be fitted: give more "
-                         "levels, or more records")
+        raise InputError(
+            f"the capacities of {len(brackets)} records have a spread that cannot be fitted: give more "
+            "levels, or more records"
+        )
     for _ in range(3):  # of Newton, from digits that are enough to all of them
         _, slope, bend = _likelihood(p, x)
         p = p - np.linalg.solve(bend, slope)
     beta, median = spread / p[0], spread * p[1] / p[0]
     by = np.array([[-median, spread], [-1.0, 0.0]]) / p[0]  # derivatives of ln theta and ln beta
-    return Fragility(float(np.exp(centre + median)), float(beta), by @ np.linalg.inv(-bend) @ by.T, brackets)
+    return Fragility(
+        float(np.exp(centre + median)), float(beta), by @ np.linalg.inv(-bend) @ by.T, brackets
+    )
 
 
 def _likelihood(p: Array, x: Array) -> tuple[float, Array, Array]:

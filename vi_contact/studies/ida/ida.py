@@ -70,9 +70,13 @@ class IDA:
             raise InputError("give either scales or levels of the intensity, at least one value")
         values = (*self.scales, *self.levels)
         if len(set(values)) < len(values) or not all(0.0 < value < math.inf for value in values):
-            raise InputError(f"scales or levels are {list(values)}: give different positive numbers")
+            raise InputError(
+                f"scales or levels are {list(values)}: give different positive numbers"
+            )
         if not self.demands:
-            raise InputError("demands is empty: give a column of history.csv, such as contact_uplift:max")
+            raise InputError(
+                "demands is empty: give a column of history.csv, such as contact_uplift:max"
+            )
         _ = self.measure, self.wanted, self.shakings
 
     @cached_property
@@ -88,7 +92,9 @@ class IDA:
     @property
     def wanted(self) -> list[Demand]:
         """Return the demand parameters, those of the limits among them."""
-        return list(dict.fromkeys((*map(demand, self.demands), *(limit(text)[0] for text in self.limits))))
+        return list(
+            dict.fromkeys((*map(demand, self.demands), *(limit(text)[0] for text in self.limits)))
+        )
 
     @property
     def shakings(self) -> list[Shaking]:
@@ -97,7 +103,11 @@ class IDA:
 
     def runs(self, out: Path) -> list[OneRun]:
         """Return every record at every scale, record by record."""
-        return [self._run(out, one, value) for one in self.shakings for value in (*self.scales, *self.levels)]
+        return [
+            self._run(out, one, value)
+            for one in self.shakings
+            for value in (*self.scales, *self.levels)
+        ]
 
     def _run(self, out: Path, shaking: Shaking, value: float) -> OneRun:
         folder = out / RUNS / f"{shaking.name}_{self.measure.name if self.levels else 'x'}{value!r}"
@@ -105,13 +115,23 @@ class IDA:
             record = shaking.record(self.case)
             factor = self.measure.scale(record, value) if self.levels else value
         except InputError as error:
-            return OneRun(self.case, shaking, math.nan if self.levels else value, folder, str(error))
+            return OneRun(
+                self.case, shaking, math.nan if self.levels else value, folder, str(error)
+            )
         return OneRun(self.case, shaking, factor, folder)
 
 
 @checked
-def run_ida(study: IDA, out: str | Path, *, jobs: int = 1, part: tuple[int, int] = (1, 1), launch: Sequence[str] = (),
-            say: Callable[[str], None] = print, wall_time: str | None = None) -> list[Row]:
+def run_ida(
+    study: IDA,
+    out: str | Path,
+    *,
+    jobs: int = 1,
+    part: tuple[int, int] = (1, 1),
+    launch: Sequence[str] = (),
+    say: Callable[[str], None] = print,
+    wall_time: str | None = None,
+) -> list[Row]:
     """Make the runs that have not finished yet, and the table and figure of all that are in ``out``. Return its rows.
 
     Eight runs share a process and, where the body serves all excitations, its assembly and every pass over its
@@ -131,7 +151,9 @@ def run_ida(study: IDA, out: str | Path, *, jobs: int = 1, part: tuple[int, int]
         KeyboardInterrupt: after the runs have been told to stop; OutOfTime: likewise. Call again to go on."""
     refuse_mpirun()
     if jobs < 1 or not 1 <= part[0] <= part[1]:
-        raise InputError(f"jobs = {jobs}, part = {part[0]}/{part[1]}: give one job or more, and 1 <= i <= n for i/n")
+        raise InputError(
+            f"jobs = {jobs}, part = {part[0]}/{part[1]}: give one job or more, and 1 <= i <= n for i/n"
+        )
     out, end = Path(out), WallTime(wall_time)
     _claim(study, out)
     with locked(SerialComm(), out, LOCK if part[1] == 1 else f"{LOCK}-{part[0]}-of-{part[1]}"):
@@ -140,7 +162,9 @@ def run_ida(study: IDA, out: str | Path, *, jobs: int = 1, part: tuple[int, int]
         left = [run for run in mine if run.done() is None]
         if left:
             _check_demands(study)
-        say(f"{len(every)} runs, {len(mine)} of them here, {len(mine) - len(left)} finished already")
+        say(
+            f"{len(every)} runs, {len(mine)} of them here, {len(mine) - len(left)} finished already"
+        )
         number, begin = 0, time.monotonic()
         told = begin
         for found in executed(left, jobs, launch, end):
@@ -149,13 +173,21 @@ def run_ida(study: IDA, out: str | Path, *, jobs: int = 1, part: tuple[int, int]
                 if now > told + SECONDS and found > 0.0:
                     told = now
                     seconds = int((now - begin) / found * (len(left) - found))
-                    say(f"{100.0 * found / len(left):.0f} % of the steps are done, {timedelta(seconds=seconds)} left")
+                    say(
+                        f"{100.0 * found / len(left):.0f} % of the steps are done, {timedelta(seconds=seconds)} left"
+                    )
                 continue
             number, told = number + 1, now
             _tell(study, out)
-            scale = "?" if found["scale"] is None or math.isnan(found["scale"]) else f"{found['scale']:g}"
-            say(f"[{number}/{len(left)}] {found['record']} x {scale}: {found['status']}"
-                + (f": {found['reason']}" if found["reason"] else ""))
+            scale = (
+                "?"
+                if found["scale"] is None or math.isnan(found["scale"])
+                else f"{found['scale']:g}"
+            )
+            say(
+                f"[{number}/{len(left)}] {found['record']} x {scale}: {found['status']}"
+                + (f": {found['reason']}" if found["reason"] else "")
+            )
         rows = _tell(study, out, draw=True)
         if study.limits:
             _fragilities(study, out, rows, say)
@@ -170,36 +202,51 @@ def _check_demands(study: IDA) -> None:
         return  # every run will say it, in its row
     for one in study.wanted:
         if one.column not in written:
-            raise InputError(f"demand '{one.column}': the runs record no such column: {nearest(one.column, written)}")
+            raise InputError(
+                f"demand '{one.column}': the runs record no such column: {nearest(one.column, written)}"
+            )
 
 
 def _claim(study: IDA, out: Path) -> None:
     """Notes in the folder whose it is; InputError when it is another study's."""
     case = _digest(to_json(study.case.tables).encode())
-    records = {one.name: [_digest(path.read_bytes()) for path in one.files if path.is_file()] for one in study.shakings}
+    records = {
+        one.name: [_digest(path.read_bytes()) for path in one.files if path.is_file()]
+        for one in study.shakings
+    }
     old = read_json(out / STUDY)
     if old is None:
         if is_own(out / STUDY):
-            raise InputError(f"'{out / STUDY}' is damaged, or of no study: restore it, choose another folder, or move "
-                             "this one away")
+            raise InputError(
+                f"'{out / STUDY}' is damaged, or of no study: restore it, choose another folder, or move "
+                "this one away"
+            )
         for name in (TABLE, COLUMNS, FIGURE, FRAGILITY):
             if os.path.lexists(out / name):
-                raise InputError(f"'{out / name}' is not of a study of vi_contact, which would replace it (there is no "
-                                 f"whole {STUDY} in '{out}'): choose another folder, or move the file")
+                raise InputError(
+                    f"'{out / name}' is not of a study of vi_contact, which would replace it (there is no "
+                    f"whole {STUDY} in '{out}'): choose another folder, or move the file"
+                )
     else:
         kept = old.get("records")
         if not isinstance(kept, dict) or "case" not in old:
-            raise InputError(f"'{out / STUDY}' is damaged: restore it, choose another folder, or delete this one")
+            raise InputError(
+                f"'{out / STUDY}' is damaged: restore it, choose another folder, or delete this one"
+            )
         changed = [name for name, digests in records.items() if kept.get(name, digests) != digests]
         if old["case"] != case or changed:
             what = f"the record '{changed[0]}'" if changed else "the case"
-            raise InputError(f"'{out}' holds runs from before {what} was changed: choose another folder, or delete it")
+            raise InputError(
+                f"'{out}' holds runs from before {what} was changed: choose another folder, or delete it"
+            )
         records = kept | records
     try:
         out.mkdir(parents=True, exist_ok=True)
         write_atomically(out / STUDY, to_json({"case": case, "records": records}).encode())
     except OSError as error:
-        raise InputError(f"output folder '{out}' cannot be written ({error.strerror}): choose another one") from None
+        raise InputError(
+            f"output folder '{out}' cannot be written ({error.strerror}): choose another one"
+        ) from None
 
 
 def _digest(data: bytes) -> str:
@@ -209,23 +256,33 @@ def _digest(data: bytes) -> str:
 def _tell(study: IDA, out: Path, *, draw: bool = False) -> list[Row]:
     """Writes table and units of all runs in the folder, and draws the figure."""
     rows, units = _tabulated(study.case, inner_folder(out, RUNS), study.measure, study.wanted)
-    described = {name: {"unit": unit, "meaning": meaning} for name, (unit, meaning) in units.items()}
+    described = {
+        name: {"unit": unit, "meaning": meaning} for name, (unit, meaning) in units.items()
+    }
     write_csv(out / TABLE, list(units), (list(row.values()) for row in rows))
     write_atomically(out / COLUMNS, to_json(described).encode())
     if draw and any(row["status"] == "finished" for row in rows):
-        panels = [_panel(rows, study.measure.name, one.name, units[one.name]) for one in study.wanted]
+        panels = [
+            _panel(rows, study.measure.name, one.name, units[one.name]) for one in study.wanted
+        ]
         plot_ida(panels, out / FIGURE, unit=study.measure.unit, intensity=study.measure.meaning)
     return rows
 
 
-def _tabulated(case: Case, out: Path, measure: Intensity, demands: Sequence[Demand]) -> tuple[list[Row], Units]:
+def _tabulated(
+    case: Case, out: Path, measure: Intensity, demands: Sequence[Demand]
+) -> tuple[list[Row], Units]:
     """Return (rows by record and scale, column -> (unit, meaning)) of all runs in the folder that have ended,
     None for what a run has not measured. InputError when a finished run has no such column."""
     folders = [out / name for name in sorted(os.listdir(out))] if out.is_dir() else []
     own = [one for one in folders if one.is_dir() and not one.is_symlink()]
     found = [(one, row) for one in own if (row := read_row(one / ROW)) is not None]
-    found.sort(key=lambda one: (one[1]["record"], math.inf if one[1]["scale"] is None else one[1]["scale"]))
-    units: Units = _COLUMNS["first"] | {measure.name: (measure.unit, f"{measure.meaning} of the scaled motion")}
+    found.sort(
+        key=lambda one: (one[1]["record"], math.inf if one[1]["scale"] is None else one[1]["scale"])
+    )
+    units: Units = _COLUMNS["first"] | {
+        measure.name: (measure.unit, f"{measure.meaning} of the scaled motion")
+    }
     units |= {one.name: ("", one.meaning) for one in demands} | _COLUMNS["last"]
     rows = []
     for folder, row in found:
@@ -233,12 +290,17 @@ def _tabulated(case: Case, out: Path, measure: Intensity, demands: Sequence[Dema
         shaking = Shaking(row["record"], tuple(map(Path, row["files"])))
         if row["scale"] is not None:
             with suppress(InputError):
-                measured[measure.name] = measure.of(shaking.record(case)) * row["scale"] ** measure.degree
+                measured[measure.name] = (
+                    measure.of(shaking.record(case)) * row["scale"] ** measure.degree
+                )
         if row["status"] == "finished":
             history, of_column = _history(folder, tuple(one.column for one in demands))
             for one in demands:
                 measured[one.name] = one.of(history)
-                units[one.name] = (of_column[one.column][0], f"{one.meaning}: {of_column[one.column][1]}")
+                units[one.name] = (
+                    of_column[one.column][0],
+                    f"{one.meaning}: {of_column[one.column][1]}",
+                )
         rows.append({name: measured.get(name, row.get(name)) for name in units})
     return rows, units
 
@@ -262,24 +324,51 @@ def _fragilities(study: IDA, out: Path, rows: Sequence[Row], say: Callable[[str]
             say(f"fragility of {text}: {error}")
             continue
         found[text] = fit.probability, fit.brackets
-        table.append([text, fit.theta, *fit.intervals[0], fit.beta, *fit.intervals[1], len(fit.brackets)])
-        say("fragility of {}: median {:.4g} ({:.4g} to {:.4g}) {unit}, dispersion {:.3g} ({:.3g} to {:.3g}), {} records"
-            .format(*table[-1], unit=measure.unit))
-    names = ["limit", "theta", "theta_low", "theta_high", "beta", "beta_low", "beta_high", "records"]
+        table.append(
+            [text, fit.theta, *fit.intervals[0], fit.beta, *fit.intervals[1], len(fit.brackets)]
+        )
+        say(
+            "fragility of {}: median {:.4g} ({:.4g} to {:.4g}) {unit}, dispersion {:.3g} ({:.3g} to {:.3g}), {} records".format(
+                *table[-1], unit=measure.unit
+            )
+        )
+    names = [
+        "limit",
+        "theta",
+        "theta_low",
+        "theta_high",
+        "beta",
+        "beta_low",
+        "beta_high",
+        "records",
+    ]
     write_csv(out / FRAGILITY, names, table)
     if found:
-        plot_fragility(found, (out / FRAGILITY).with_suffix(".png"), unit=measure.unit, intensity=measure.meaning)
+        plot_fragility(
+            found,
+            (out / FRAGILITY).with_suffix(".png"),
+            unit=measure.unit,
+            intensity=measure.meaning,
+        )
 
 
 def _panel(rows: Sequence[Row], level: str, name: str, column: tuple[str, str]) -> DemandPanel:
     """What one demand shows."""
     curves: dict[str, tuple[Array, Array]] = {}
     failed: list[float] = []
-    known = sorted((row for row in rows if row[level] is not None), key=lambda row: float(row[level]))
+    known = sorted(
+        (row for row in rows if row[level] is not None), key=lambda row: float(row[level])
+    )
     for record in dict.fromkeys(row["record"] for row in rows):
         own = [row for row in known if row["record"] == record]
-        good = [(row[level], row[name]) for row in own if row["status"] == "finished" and math.isfinite(row[name])]
+        good = [
+            (row[level], row[name])
+            for row in own
+            if row["status"] == "finished" and math.isfinite(row[name])
+        ]
         failed += [row[level] for row in own if row["status"] != "finished"]
         levels, values = np.array(good).reshape(-1, 2).T
         curves[record] = levels, values
-    return DemandPanel(column[1].partition(":")[0], column[0], curves, *fractiles(curves, SHARES), tuple(failed))
+    return DemandPanel(
+        column[1].partition(":")[0], column[0], curves, *fractiles(curves, SHARES), tuple(failed)
+    )

@@ -33,19 +33,24 @@ class Intensity:
         """Return the factor that brings the record to this level; InputError unless both are positive."""
         value = self.of(record)
         if not (level > 0.0 and value > 0.0):
-            raise InputError(f"level {level:g} of {self.name}: the record has {value:g}; give levels above zero, and "
-                             "records with a motion")
+            raise InputError(
+                f"level {level:g} of {self.name}: the record has {value:g}; give levels above zero, and "
+                "records with a motion"
+            )
         return float((level / value) ** (1.0 / self.degree))
 
 
-_MEASURES = {one.name: one for one in (
-    Intensity("pga", "m/s²", "peak ground acceleration", 1, pga),
-    Intensity("pgv", "m/s", "peak ground velocity", 1, pgv),
-    Intensity("pgd", "m", "peak ground displacement", 1, pgd),
-    Intensity("arias", "m/s", "Arias intensity", 2, arias),
-    Intensity("cav", "m/s", "cumulative absolute velocity", 1, cav),
-    Intensity("housner", "m", "Housner intensity", 1, housner_intensity),
-)}
+_MEASURES = {
+    one.name: one
+    for one in (
+        Intensity("pga", "m/s²", "peak ground acceleration", 1, pga),
+        Intensity("pgv", "m/s", "peak ground velocity", 1, pgv),
+        Intensity("pgd", "m", "peak ground displacement", 1, pgd),
+        Intensity("arias", "m/s", "Arias intensity", 2, arias),
+        Intensity("cav", "m/s", "cumulative absolute velocity", 1, cav),
+        Intensity("housner", "m", "Housner intensity", 1, housner_intensity),
+    )
+}
 
 
 def _seconds(text: str) -> float:
@@ -61,13 +66,21 @@ def intensity(text: str, first_period: Callable[[], float] | None = None) -> Int
     "sa:T1" at the period that ``first_period`` finds [s]."""
     word, _, period = text.partition(":")
     if word == "sa":
-        seconds = first_period() if period == "T1" and first_period is not None else _seconds(period)
+        seconds = (
+            first_period() if period == "T1" and first_period is not None else _seconds(period)
+        )
         if not 0.0 < seconds < np.inf:
-            raise InputError(f"intensity '{text}': give the period after the colon in seconds, such as sa:0.5")
+            raise InputError(
+                f"intensity '{text}': give the period after the colon in seconds, such as sa:0.5"
+            )
         meaning = f"pseudo-acceleration at {seconds:g} s, 5 % damping"
-        return Intensity(f"sa_{seconds:g}", "m/s²", meaning, 1, cache(partial(psa, period=seconds)))  # asked often
+        return Intensity(
+            f"sa_{seconds:g}", "m/s²", meaning, 1, cache(partial(psa, period=seconds))
+        )  # asked often
     if period or word not in _MEASURES:
-        raise InputError(f"unknown intensity '{text}': choose one of {', '.join(_MEASURES)}, or sa:T with T in seconds")
+        raise InputError(
+            f"unknown intensity '{text}': choose one of {', '.join(_MEASURES)}, or sa:T with T in seconds"
+        )
     return _MEASURES[word]
 
 
@@ -92,7 +105,9 @@ class Demand:
         """Return the value of a run; InputError for a column it has not recorded."""
         if self.column not in history:
             known = ", ".join(history)
-            raise InputError(f"the run has no column '{self.column}': record it, or choose one of {known}")
+            raise InputError(
+                f"the run has no column '{self.column}': record it, or choose one of {known}"
+            )
         return _WAYS[self.way][0](np.asarray(history[self.column], dtype=float))
 
 
@@ -100,11 +115,15 @@ def demand(text: str) -> Demand:
     """Return the demand of "COLUMN" (its largest magnitude) or "COLUMN:max", ":min", ":absmax", ":last"."""
     column, _, way = text.partition(":")
     if not column or (way or "absmax") not in _WAYS:
-        raise InputError(f"demand '{text}': give COLUMN or COLUMN:WAY, WAY one of {', '.join(_WAYS)}")
+        raise InputError(
+            f"demand '{text}': give COLUMN or COLUMN:WAY, WAY one of {', '.join(_WAYS)}"
+        )
     return Demand(column, way or "absmax")
 
 
-def fractiles(curves: Mapping[str, tuple[Array, Array]], shares: tuple[float, ...]) -> tuple[Array, Array]:
+def fractiles(
+    curves: Mapping[str, tuple[Array, Array]], shares: tuple[float, ...]
+) -> tuple[Array, Array]:
     """Return (levels (n,), demands (n, shares)): fractiles over the records of the demand at equal intensity.
 
     curves: record -> (intensities, demands), straight lines between them; the levels are those of all records in the

@@ -25,15 +25,24 @@ ATTEMPTS = 5  # of runs that end without a word: Gmsh 4.8, asked before it is in
 PATIENCE = 20.0  # seconds for a run to save its state
 ASIDE = 5.0  # seconds of a wall time for the beginning and the end of a process
 AGAIN = "ended the study: give the same command again to go on"
-_MPI = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK")  # in the environment of what mpirun has started
+_MPI = (
+    "OMPI_COMM_WORLD_SIZE",
+    "PMI_SIZE",
+    "PMIX_RANK",
+)  # in the environment of what mpirun has started
 
 
 def command(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> list[str]:
     """Return the command of these runs, each from its checkpoint if there is one; OutOfTime without wall time left."""
     case, folders = runs[0].case, [one.folder for one in runs]
-    asked = {"case": str(case.path), "allow": case.allowed, "settings": [one.settings for one in runs],
-             "folders": [*map(str, folders)], "restart": [is_own(one / CHECKPOINT) for one in folders],
-             "wall_time": None}
+    asked = {
+        "case": str(case.path),
+        "allow": case.allowed,
+        "settings": [one.settings for one in runs],
+        "folders": [*map(str, folders)],
+        "restart": [is_own(one / CHECKPOINT) for one in folders],
+        "wall_time": None,
+    }
     if end.text is not None:
         if (left := int(end.left - ASIDE)) < 1:
             raise OutOfTime(f"{end.words} {AGAIN}")
@@ -45,7 +54,11 @@ def started(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> sub
     """Start them, in the environment without what MPI of this process may have put there."""
     package = str(Path(__file__).resolve().parents[2])
     way = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
-    environment = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"} | dict(os.environ) | {"PYTHONPATH": way}
+    environment = (
+        {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+        | dict(os.environ)
+        | {"PYTHONPATH": way}
+    )
     words = command(runs, launch, end)
     for one in runs:
         if read_row(one.folder / ROW) is not None:
@@ -53,11 +66,24 @@ def started(runs: Sequence[OneRun], launch: Sequence[str], end: WallTime) -> sub
         if is_marked(one.folder):
             remove(one.folder / SUMMARY)
     try:
-        return subprocess.Popen(words, env=environment, text=True, encoding="utf-8", errors="replace",
-                                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                                start_new_session=True)
-    except (FileNotFoundError, PermissionError) as error:  # of a program; others tell of the machine
-        raise InputError(f"'{error.filename}' cannot be started ({error.strerror}): correct --launch") from None
+        return subprocess.Popen(
+            words,
+            env=environment,
+            text=True,
+            encoding="utf-8",
+            errors="replace",
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+    except (
+        FileNotFoundError,
+        PermissionError,
+    ) as error:  # of a program; others tell of the machine
+        raise InputError(
+            f"'{error.filename}' cannot be started ({error.strerror}): correct --launch"
+        ) from None
 
 
 class Processes:
@@ -118,7 +144,9 @@ class Processes:
         _stop(left)
 
 
-def executed(runs: Sequence[OneRun], jobs: int, launch: Sequence[str], end: WallTime) -> Iterator[Row | float]:
+def executed(
+    runs: Sequence[OneRun], jobs: int, launch: Sequence[str], end: WallTime
+) -> Iterator[Row | float]:
     """Run them, in so many processes at a time, and yield the row of each when it ends, and between rows how many have
     been made, with parts of runs. Left early, it stops those that go on; OutOfTime when one has ended with its status.
     """
@@ -128,7 +156,9 @@ def executed(runs: Sequence[OneRun], jobs: int, launch: Sequence[str], end: Wall
         try:
             for row in processes.rows(batch):
                 told.put(row)
-        except BaseException as error:  # of any kind: it is raised again by the thread that waits for this one
+        except (
+            BaseException
+        ) as error:  # of any kind: it is raised again by the thread that waits for this one
             told.put(error)
 
     wrong = [run for run in runs if run.wrong]
@@ -137,7 +167,9 @@ def executed(runs: Sequence[OneRun], jobs: int, launch: Sequence[str], end: Wall
     right = [run for run in runs if not run.wrong]
     size = 1 if launch else max(min(TOGETHER, -(-len(right) // jobs)), 1)
     with ThreadPoolExecutor(jobs) as pool:
-        futures = [pool.submit(make, right[first : first + size]) for first in range(0, len(right), size)]
+        futures = [
+            pool.submit(make, right[first : first + size]) for first in range(0, len(right), size)
+        ]
         try:
             ended = 0
             while ended < len(right):
@@ -145,7 +177,11 @@ def executed(runs: Sequence[OneRun], jobs: int, launch: Sequence[str], end: Wall
                 if isinstance(found, BaseException):
                     raise found
                 ended += found is not None
-                yield float(len(wrong) + sum(list(processes.shares.values()))) if found is None else found
+                yield (
+                    float(len(wrong) + sum(list(processes.shares.values())))
+                    if found is None
+                    else found
+                )
         finally:
             processes.stop()
             for future in futures:
@@ -175,5 +211,7 @@ def _stop(processes: Sequence[subprocess.Popen[str]]) -> None:
 def refuse_mpirun() -> None:
     """Raise InputError in a process that mpirun has started: those it starts would take themselves for it."""
     if any(name in os.environ for name in _MPI):
-        raise InputError("ida starts processes and must not be one of MPI's: start it without mpirun, and give the "
-                         "runs their ranks with --launch 'mpirun -n N'")
+        raise InputError(
+            "ida starts processes and must not be one of MPI's: start it without mpirun, and give the "
+            "runs their ranks with --launch 'mpirun -n N'"
+        )

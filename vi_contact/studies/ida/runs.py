@@ -37,8 +37,15 @@ class Shaking:
         found = []
         for (place, table), path in zip(ground_motions(case), self.files, strict=True):
             record = table.get("record")
-            key = f"{place}.record.path" if isinstance(record, dict) and "path" in record else f"{place}.record"
-            found += [f"{key}={toml_value(str(path))}", f"{place}.scale={float(table.get('scale', 1.0)) * factor!r}"]
+            key = (
+                f"{place}.record.path"
+                if isinstance(record, dict) and "path" in record
+                else f"{place}.record"
+            )
+            found += [
+                f"{key}={toml_value(str(path))}",
+                f"{place}.scale={float(table.get('scale', 1.0)) * factor!r}",
+            ]
         return tuple(found)
 
     def record(self, case: Case) -> Record:
@@ -62,10 +69,14 @@ def ground_motions(case: Case) -> list[tuple[str, Mapping[str, Any]]]:
         found = [(f"excitation.{number}", table) for number, table in enumerate(tables, start=1)]
     for place, table in found:
         if table.get("type") != "GroundMotion":
-            raise InputError(f"{case.path}: [{place}] has no record that others can replace: make it a GroundMotion "
-                             "with a record file")
+            raise InputError(
+                f"{case.path}: [{place}] has no record that others can replace: make it a GroundMotion "
+                "with a record file"
+            )
     if not found:
-        raise InputError(f"{case.path}: no [[excitation]] has a record to replace: give a GroundMotion")
+        raise InputError(
+            f"{case.path}: no [[excitation]] has a record to replace: give a GroundMotion"
+        )
     return found
 
 
@@ -79,13 +90,19 @@ def record_set(word: str) -> list[list[str]]:
             folder, lines = path.parent, path.read_text(encoding="utf-8").splitlines()
             names = [one for line in lines if (one := line.partition("#")[0].strip())]
         elif path.is_dir():
-            every = sorted(str(one) for one in path.iterdir() if one.is_file() and not one.name.startswith("."))
+            every = sorted(
+                str(one) for one in path.iterdir() if one.is_file() and not one.name.startswith(".")
+            )
             names = [one for one in every if one.lower().endswith(".at2")] or every
     except (OSError, ValueError) as error:
-        raise InputError(f"--motions {word} cannot be read ({error}): give a text file, one record in a line") from None
+        raise InputError(
+            f"--motions {word} cannot be read ({error}): give a text file, one record in a line"
+        ) from None
     found = [[name.strip() for name in one.split(",")] for one in names]
     if not found or not all(map(all, found)):
-        raise InputError(f"--motions {word}: give FILE or FILE,FILE, a folder, or @LIST with one record in a line")
+        raise InputError(
+            f"--motions {word}: give FILE or FILE,FILE, a folder, or @LIST with one record in a line"
+        )
     return [[str(folder / name) for name in files] for files in found]
 
 
@@ -94,13 +111,19 @@ def shakings(case: Case, motions: Sequence[str | Path | Sequence[str | Path]]) -
     count = len(ground_motions(case))
     found: dict[str, Shaking] = {}
     for motion in motions:
-        files = tuple(Path(one).resolve() for one in ([motion] if isinstance(motion, str | Path) else motion))
+        files = tuple(
+            Path(one).resolve() for one in ([motion] if isinstance(motion, str | Path) else motion)
+        )
         if len(files) != count:
             names = ", ".join(one.name for one in files)
-            raise InputError(f"{names}: the case has {count} ground motion{'s' * (count > 1)}: give as many files")
+            raise InputError(
+                f"{names}: the case has {count} ground motion{'s' * (count > 1)}: give as many files"
+            )
         name = files[0].stem
         if name in found:
-            raise InputError(f"two motions are called '{name}': rename a file, as their runs need different names")
+            raise InputError(
+                f"two motions are called '{name}': rename a file, as their runs need different names"
+            )
         found[name] = Shaking(name, files)
     if not found:
         raise InputError("motions is empty: give at least one record file")
@@ -128,17 +151,29 @@ class OneRun:
     @property
     def settings(self) -> tuple[str, ...]:
         """Return all KEY=VALUE that make the run of the case file; it writes fields only if the study sets them."""
-        asked = "fields" not in self.case.tables or any(one.startswith("fields") for one in self.case.settings)
-        return (*self.case.settings, *self.shaking.settings(self.case, self.factor), *(() if asked else ("fields=",)))
+        asked = "fields" not in self.case.tables or any(
+            one.startswith("fields") for one in self.case.settings
+        )
+        return (
+            *self.case.settings,
+            *self.shaking.settings(self.case, self.factor),
+            *(() if asked else ("fields=",)),
+        )
 
     def keep(self, said: str, code: int) -> Row:
         """Write the row of a run that ended with this status, having said this; failed ones leave that in a file."""
         facts = read_json(self.folder / SUMMARY) or {}
         finished = code == 0 and facts.get("status") == "finished"
-        row = {"record": self.shaking.name, "files": [str(path) for path in self.shaking.files], "scale": self.factor,
-               "status": "finished" if finished else "failed", "reason": "" if finished else _sentence(said, code),
-               "certificate": facts.get("worst_certificate"), "energy_created": facts.get("energy_created"),
-               "steps": facts.get("steps")}
+        row = {
+            "record": self.shaking.name,
+            "files": [str(path) for path in self.shaking.files],
+            "scale": self.factor,
+            "status": "finished" if finished else "failed",
+            "reason": "" if finished else _sentence(said, code),
+            "certificate": facts.get("worst_certificate"),
+            "energy_created": facts.get("energy_created"),
+            "steps": facts.get("steps"),
+        }
         make_inner_folder(self.folder.parents[1], self.folder.parent.name, self.folder.name)
         if not finished:
             write_atomically(self.folder / SAID, said.encode())
@@ -160,7 +195,11 @@ def read_row(path: Path) -> dict[str, Any] | None:
     files, scale = row.get("files"), row.get("scale")
     whole = all(isinstance(row.get(name), str) for name in ("record", "status", "reason"))
     numbers = scale is None or (isinstance(scale, int | float) and not isinstance(scale, bool))
-    return row if whole and numbers and isinstance(files, list) and all(isinstance(f, str) for f in files) else None
+    return (
+        row
+        if whole and numbers and isinstance(files, list) and all(isinstance(f, str) for f in files)
+        else None
+    )
 
 
 def _sentence(said: str, code: int) -> str:
