@@ -25,6 +25,7 @@ fi
 
 status=0
 $venv/bin/ruff check --quiet --output-format concise . || status=1
+$venv/bin/ruff format --quiet --check . || status=1
 "$vi_python" docs/make_api.py --check || status=1
 $venv/bin/mypy --no-error-summary || status=1
 exit "$status"
